@@ -1,0 +1,24 @@
+"""How a system is to be run: said by a diagram or a caller, obeyed by the simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationOptions:
+    """Settings of one run. ``None`` leaves the choice to the simulation, which says what it chose.
+
+    ``stop_time`` s; ``solver`` a name of ``armblocks.simulation.tableaux`` or ``"auto"``; ``step`` s: size
+    of a fixed step; ``sample_time`` s: spacing of the recorded instants (they are ``k * sample_time``,
+    computed and never accumulated, and the stop time itself); ``max_step`` s; ``rtol``, ``atol``: an
+    adaptive step is accepted where the error is below ``atol + rtol |x|`` in the root-mean-square norm.
+    """
+
+    stop_time: float = 10.0
+    solver: str = "auto"
+    step: float | None = None
+    sample_time: float | None = None
+    max_step: float | None = None
+    rtol: float = 1e-6
+    atol: float = 1e-9

@@ -1,0 +1,142 @@
+"""How named quantities lie in flat vectors: the only code that knows.
+
+A ``Slot`` is one named quantity; a ``Signature`` is an ordered set of them. In a flat vector the slots lie
+one after the other, and a matrix lies row by row (C order), so that a NumPy reshape is all that is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from casadi import SX, densify, reshape
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError, UnknownNameError
+
+Shape = tuple[int, ...]
+"""``()`` a scalar, ``(n,)`` a vector, ``(m, n)`` a matrix, ``(k, m, n)`` a stack of matrices."""
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One named quantity: its shape and its SI unit (``""`` where it has none or they differ)."""
+
+    name: str
+    shape: Shape = ()
+    unit: str = ""
+
+    @property
+    def size(self) -> int:
+        """Count of scalars."""
+        return math.prod(self.shape)
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Ordered, uniquely named slots and where each lies in one flat vector."""
+
+    slots: tuple[Slot, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [slot.name for slot in self.slots]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"the name '{name}' stands twice in one signature", fix="rename one of them")
+
+    @cached_property
+    def size(self) -> int:
+        """Length of the flat vector."""
+        return sum(slot.size for slot in self.slots)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The slots' names, in order."""
+        return tuple(slot.name for slot in self.slots)
+
+    @cached_property
+    def ranges(self) -> Mapping[str, slice]:
+        """The place of each slot in the flat vector."""
+        places: dict[str, slice] = {}
+        start = 0
+        for slot in self.slots:
+            places[slot.name] = slice(start, start + slot.size)
+            start += slot.size
+        return places
+
+    def __len__(self) -> int:
+        return len(self.slots)
+
+    def __iter__(self) -> Iterator[Slot]:
+        return iter(self.slots)
+
+    def __getitem__(self, name: str) -> Slot:
+        for slot in self.slots:
+            if slot.name == name:
+                return slot
+        raise UnknownNameError("quantity", name, self.names)
+
+    def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+        """Lay named values, shape of their slot each, into a new flat vector of shape ``(size,)``."""
+        for name in values:
+            if name not in self.ranges:
+                raise UnknownNameError("quantity", name, self.names)
+        flat = np.empty(self.size)
+        for slot in self.slots:
+            if slot.name not in values:
+                raise InputError(f"no value is given for '{slot.name}'", allowed=", ".join(self.names))
+            value = np.asarray(values[slot.name], dtype=np.float64)
+            if value.shape != slot.shape:
+                raise InputError(
+                    f"'{slot.name}' has shape {value.shape}", allowed=f"shape {slot.shape}", fix="reshape it"
+                )
+            flat[self.ranges[slot.name]] = value.ravel()
+        return flat
+
+    def unpack(self, flat: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Views of a flat array of shape ``(..., size)``: each slot as ``(..., *slot.shape)``."""
+        lead = flat.shape[:-1]
+        return {
+            slot.name: flat[..., self.ranges[slot.name]].reshape(*lead, *slot.shape) for slot in self.slots
+        }
+
+
+def flatten(value: SX, shape: Shape) -> SX:
+    """Lay a symbolic scalar, vector (column) or matrix into a flat column, row by row.
+
+    A stack ``(k, m, n)`` is given as the ``(k m, n)`` matrix of its members, one under the other.
+    """
+    rows, columns = matrix_shape(shape)
+    if value.shape != (rows, columns):
+        raise InputError(f"symbolic value has shape {value.shape}", allowed=f"{(rows, columns)} for {shape}")
+    return reshape(densify(value).T, rows * columns, 1)
+
+
+def unflatten(flat: SX, shape: Shape) -> SX:
+    """Inverse of :func:`flatten`: a flat column as scalar, column vector or matrix."""
+    rows, columns = matrix_shape(shape)
+    return reshape(flat, columns, rows).T
+
+
+def matrix_shape(shape: Shape) -> tuple[int, int]:
+    """Rows and columns of the CasADi matrix that carries a quantity of this shape."""
+    if len(shape) == 0:
+        return 1, 1
+    if len(shape) == 1:
+        return shape[0], 1
+    return math.prod(shape[:-1]), shape[-1]
+
+
+def signature(*slots: Slot | tuple[str, Sequence[int]] | tuple[str, Sequence[int], str]) -> Signature:
+    """Short form: ``signature(("q", (n,), "rad"), ("qd", (n,), "rad/s"))``."""
+    return Signature(
+        tuple(
+            slot
+            if isinstance(slot, Slot)
+            else Slot(slot[0], tuple(slot[1]), slot[2] if len(slot) > 2 else "")
+            for slot in slots
+        )
+    )

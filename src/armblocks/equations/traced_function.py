@@ -1,0 +1,58 @@
+"""One symbolic map with named ends: what modelling hands to numerics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.equations.signature import Signature, flatten, matrix_shape, unflatten
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class TracedFunction:
+    """``results = f(arguments)``, written once in symbols.
+
+    ``arguments[i]`` is the flat column of symbols of input slot ``i`` and ``results[j]`` the flat dense
+    column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signature`).
+    """
+
+    name: str
+    inputs: Signature
+    outputs: Signature
+    arguments: tuple[SX, ...]
+    results: tuple[SX, ...]
+
+    @classmethod
+    def trace(
+        cls, name: str, inputs: Signature, outputs: Signature, equations: Callable[..., SX | Sequence[SX]]
+    ) -> TracedFunction:
+        """Call ``equations`` once with symbols.
+
+        It gets one SX per input slot in its natural shape (scalar 1x1, vector a column, matrix as it is) and
+        returns one SX per output slot, likewise.
+        """
+        symbols = tuple(SX.sym(slot.name, *matrix_shape((slot.size,))) for slot in inputs)
+        natural = [unflatten(symbol, slot.shape) for symbol, slot in zip(symbols, inputs)]
+        returned = equations(*natural)
+        values = (returned,) if isinstance(returned, SX) else tuple(returned)
+        if len(values) != len(outputs):
+            raise InputError(
+                f"the equations of '{name}' return {len(values)} values", allowed=f"{len(outputs)} values"
+            )
+        results = tuple(flatten(SX(value), slot.shape) for value, slot in zip(values, outputs))
+        return cls(name=name, inputs=inputs, outputs=outputs, arguments=symbols, results=results)
+
+    def casadi_function(self) -> Function:
+        """The same map as a CasADi ``Function``: flat columns in, flat columns out."""
+        return Function("f", list(self.arguments), list(self.results), {"cse": True})
+
+    def __call__(self, *values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
+        """Evaluate through CasADi's own interpreter: slow, and independent of the compiler."""
+        flat = [np.asarray(value, dtype=np.float64).reshape(-1) for value in values]
+        results = self.casadi_function().call(flat)
+        return tuple(np.asarray(value).reshape(slot.shape) for value, slot in zip(results, self.outputs))

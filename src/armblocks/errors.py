@@ -1,0 +1,123 @@
+"""Every error and warning that armblocks shows to a person.
+
+::
+
+    ArmblocksError(ValueError)
+    ├── InputError            a call was given a wrong shape, dtype, value or option
+    ├── UnknownNameError      a name that is not in a list of known names (the nearest is said)
+    ├── RobotError            a robot description that contradicts itself
+    ├── DiagramError          a diagram that cannot be built
+    │   └── AlgebraicLoopError
+    ├── FormatError           a file that cannot be read or written (file:line)
+    ├── CompileError          equations that the compiler cannot translate
+    └── SimulationError       a run that could not go on (partial results are kept)
+
+    ArmblocksWarning(UserWarning)
+    ├── InertiaWarning        an inertia that no body can have
+    └── LimitWarning          a joint beyond its range or speed
+
+A message has four parts: *what* was found, *where*, what was *allowed*, and what to do (*fix*).
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+
+def compose_message(what: str, where: str = "", allowed: str = "", fix: str = "") -> str:
+    """Join the four parts of a message into the text that a person reads."""
+    head = f"{where}: {what}" if where else what
+    parts = [head]
+    if allowed:
+        parts.append(f"Allowed: {allowed}")
+    if fix:
+        parts.append(f"Fix: {fix}")
+    return ". ".join(part.rstrip(".") for part in parts) + "."
+
+
+class ArmblocksError(ValueError):
+    """Base of all errors that name what, where, what is allowed and what to do.
+
+    ``what`` one sentence with the user's own names and the value found; ``where`` a file:line, block
+    path, robot/link or parameter; ``allowed`` the rule or the valid names; ``fix`` one action.
+    """
+
+    def __init__(self, what: str, *, where: str = "", allowed: str = "", fix: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.allowed = allowed
+        self.fix = fix
+        super().__init__(compose_message(what, where, allowed, fix))
+
+
+class InputError(ArmblocksError):
+    """A call was given a wrong shape, dtype, value or option."""
+
+
+class UnknownNameError(ArmblocksError):
+    """A name that is not among the known ones; says the nearest and lists them."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str = "") -> None:
+        self.kind = kind
+        self.name = name
+        self.known: Sequence[str] = sorted(known)
+        folded = {entry.casefold(): entry for entry in self.known}
+        near = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.5)
+        super().__init__(
+            f"there is no {kind} named '{name}'",
+            where=where,
+            allowed=", ".join(self.known) if self.known else "none exist",
+            fix=f"did you mean '{folded[near[0]]}'?" if near else "use one of the names above",
+        )
+
+
+class RobotError(ArmblocksError):
+    """A robot description that contradicts itself, or lacks what the request needs."""
+
+
+class DiagramError(ArmblocksError):
+    """A diagram that cannot be built: the block path is in ``where``."""
+
+
+class AlgebraicLoopError(DiagramError):
+    """Blocks that feed each other with nothing in between that holds a state; ``loop`` lists them."""
+
+    def __init__(self, loop: Sequence[str], *, where: str = "") -> None:
+        self.loop = tuple(loop)
+        super().__init__(
+            "algebraic loop: " + " -> ".join((*self.loop, *self.loop[:1])),
+            where=where,
+            allowed="every loop passes through a block with a state, such as Integrator",
+            fix="break the loop with an Integrator or remove one of these connections",
+        )
+
+
+class FormatError(ArmblocksError):
+    """A file that cannot be read or written; ``where`` is file:line."""
+
+
+class CompileError(ArmblocksError):
+    """Equations that the compiler cannot translate."""
+
+
+class SimulationError(ArmblocksError):
+    """A run that could not go on. ``partial`` holds the result up to the last good time, if any."""
+
+    def __init__(
+        self, what: str, *, where: str = "", allowed: str = "", fix: str = "", partial: object = None
+    ) -> None:
+        self.partial = partial
+        super().__init__(what, where=where, allowed=allowed, fix=fix)
+
+
+class ArmblocksWarning(UserWarning):
+    """Base of all warnings: the result is usable, but something deserves a look."""
+
+
+class InertiaWarning(ArmblocksWarning):
+    """An inertia that no rigid body can have (negative, or against the triangle inequality)."""
+
+
+class LimitWarning(ArmblocksWarning):
+    """A joint beyond its range or speed: joint, time and value are in the text."""
