@@ -1,0 +1,97 @@
+"""The project's own virtual environment, ``.venv``: made when absent, brought up to date when needed.
+
+Standard library only, so that ``python3 scripts/…`` works on a bare machine, on Linux, macOS and Windows.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VENV = ROOT / ".venv"
+BINARIES = VENV / ("Scripts" if os.name == "nt" else "bin")
+PYTHON = BINARIES / ("python.exe" if os.name == "nt" else "python")
+STAMP = VENV / "armblocks-installed.json"
+OLDEST_PYTHON = (3, 11)
+
+
+def say(text: str) -> None:
+    """Print at once, so that the order holds when the output goes to a file."""
+    print(text, flush=True)
+
+
+def run(*command: str | Path, cwd: Path = ROOT) -> int:
+    """Run a command without standard input; its output goes straight through. Returns the exit code."""
+    return subprocess.run([str(part) for part in command], cwd=cwd, stdin=subprocess.DEVNULL).returncode
+
+
+def prepare(*extras: str) -> None:
+    """Make ``.venv`` hold armblocks (editable) with these extras of pyproject.toml.
+
+    A stamp in ``.venv`` remembers what was installed: nothing happens while pyproject.toml asks for the same.
+    Exits with a message if Python is too old or a step fails.
+    """
+    if sys.version_info < OLDEST_PYTHON:
+        oldest = ".".join(str(part) for part in OLDEST_PYTHON)
+        sys.exit(f"armblocks needs Python {oldest} or newer; this is {sys.version.split()[0]}")
+    if not _runs():
+        _create()
+    wanted_by_pyproject = _digest()
+    present = _read_stamp(wanted_by_pyproject)
+    if present is not None and set(extras) <= present:
+        return
+    together = sorted(set(extras) | (present or set()))
+    target = f".[{','.join(together)}]" if together else "."
+    say(f"== install armblocks {target} (some minutes the first time)")
+    code = run(PYTHON, "-m", "pip", "install", "--quiet", "--no-input", "--editable", target)
+    if code != 0:
+        sys.exit(f"pip could not install armblocks (exit code {code}); its own message stands above")
+    STAMP.write_text(json.dumps({"digest": wanted_by_pyproject, "extras": together}), encoding="utf-8")
+
+
+def _runs() -> bool:
+    """Whether the environment is there and its interpreter still works (the system's may have moved on)."""
+    if not PYTHON.exists():
+        return False
+    command = [str(PYTHON), "-c", "import pip"]
+    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True).returncode == 0
+
+
+def _create() -> None:
+    say(f"== make {VENV.name} with Python {sys.version.split()[0]}")
+    if run(sys.executable, "-m", "venv", "--clear", VENV) != 0:
+        sys.exit(
+            f"Python could not make a virtual environment in {VENV}. "
+            "On Debian and Ubuntu its module is a package of its own: apt-get install python3-venv"
+        )
+
+
+def _digest() -> str:
+    """Changes whenever pyproject.toml asks for something else to be installed, or the checkout moved."""
+    import tomllib  # not at the top: an older Python must get as far as the message about its age
+
+    pyproject = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project = pyproject["project"]
+    asked = [
+        pyproject["build-system"],
+        project["name"],
+        project["version"],
+        project["dependencies"],
+        project.get("optional-dependencies"),
+        project.get("scripts"),
+        str(ROOT),
+    ]
+    return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+
+
+def _read_stamp(digest: str) -> set[str] | None:
+    try:
+        stamp = json.loads(STAMP.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return set(stamp["extras"]) if stamp.get("digest") == digest else None
