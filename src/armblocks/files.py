@@ -1,0 +1,103 @@
+"""Whole files, written all or nothing and read within a cap: the only code that knows how."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+
+from armblocks.errors import FormatError
+
+
+def write_atomically(path: str | Path, data: bytes) -> None:
+    """Replace the file at ``path`` by ``data``, so that a reader or a crash sees the old file or the new one.
+
+    The bytes go to a new file in the same folder, reach the disk (``fsync``), and take the name in one step;
+    then the folder's entry reaches the disk too. A symbolic link stays a link: its target is replaced. The
+    permissions of a file that was there are kept.
+
+    Source: Pillai et al., "All File Systems Are Not Created Equal", OSDI 2014: a rename without both
+    ``fsync`` calls is not safe.
+
+    Raises ``FormatError`` where the folder is missing, is not a folder or cannot be written, where ``path``
+    is a folder, and where the disk refuses the data. The old file is then still whole.
+    """
+    if "\0" in str(path):
+        raise FormatError("the path holds a NUL character", where=repr(str(path)), fix="choose another name")
+    target = Path(os.path.realpath(path))
+    folder = target.parent
+    if not folder.is_dir():
+        raise FormatError(
+            f"the folder '{folder}' does not exist",
+            where=str(path),
+            fix="create the folder, or choose another",
+        )
+    if target.is_dir():
+        raise FormatError(
+            "a folder stands where the file should go", where=str(path), fix="choose another name"
+        )
+    temporary = folder / f".{target.name[:64]}.{secrets.token_hex(6)}.tmp"
+    try:
+        _write_through(temporary, data)
+        if target.exists():
+            temporary.chmod(target.stat().st_mode & 0o7777)
+        temporary.replace(target)
+        _sync_folder(folder)
+    except OSError as error:
+        raise FormatError(
+            f"the file cannot be written ({error.strerror or error})",
+            where=str(path),
+            fix="check the folder's permissions and free space; a file that was there is unchanged",
+        ) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def read_bounded(path: str | Path, limit: int) -> bytes:
+    """All bytes of the file at ``path``, of which it may hold at most ``limit``.
+
+    Raises ``FormatError`` where the file is missing, is a folder, cannot be read or is larger.
+    """
+    try:
+        # Not the size that the folder tells: a device or a growing file lies about it.
+        with Path(path).open("rb") as stream:
+            data = stream.read(limit + 1)
+    except FileNotFoundError as error:
+        raise FormatError("there is no such file", where=str(path), fix="check the path") from error
+    except IsADirectoryError as error:
+        raise FormatError("this is a folder", where=str(path), fix="give the path of a file in it") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise FormatError(
+            f"the file cannot be read ({reason})", where=str(path), fix="check its permissions"
+        ) from error
+    if len(data) > limit:
+        raise FormatError(
+            "the file is too large",
+            where=str(path),
+            allowed=f"at most {limit} bytes",
+            fix="split or shorten it",
+        )
+    return data
+
+
+def _write_through(path: Path, data: bytes) -> None:
+    """Create ``path`` with the permissions of the user's umask, and return when the disk has the bytes."""
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+    with os.fdopen(descriptor, "wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+
+
+def _sync_folder(folder: Path) -> None:
+    """Bring a folder's entries to the disk. Windows has no such call and orders its renames itself."""
+    if os.name == "nt":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
