@@ -1,0 +1,31 @@
+"""Robot descriptions: frozen values, as the user says them, and the same numbered for algorithms."""
+
+from armblocks.robot.dh import DhConvention, DhRow, link_from_dh, modified_dh, serial_chain, standard_dh
+from armblocks.robot.friction_model import FrictionModel
+from armblocks.robot.joints import JOINT_TYPES, Fixed, Joint, JointLimits, Prismatic, Revolute
+from armblocks.robot.link import Link, Motor, inertia_matrix
+from armblocks.robot.physicality import InertiaFinding, inertia_findings, warn_of_inertias
+from armblocks.robot.robot import Robot
+
+__all__ = [
+    "JOINT_TYPES",
+    "DhConvention",
+    "DhRow",
+    "Fixed",
+    "FrictionModel",
+    "InertiaFinding",
+    "Joint",
+    "JointLimits",
+    "Link",
+    "Motor",
+    "Prismatic",
+    "Revolute",
+    "Robot",
+    "inertia_findings",
+    "inertia_matrix",
+    "link_from_dh",
+    "modified_dh",
+    "serial_chain",
+    "standard_dh",
+    "warn_of_inertias",
+]

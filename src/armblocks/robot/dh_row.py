@@ -1,0 +1,73 @@
+"""One row of a Denavit-Hartenberg table and the transforms that it stands for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from armblocks.errors import RobotError
+from armblocks.robot.joints import Joint, JointLimits, Prismatic, Revolute
+from armblocks.spatial import Transform, transl, trotx, trotz
+
+
+class DhConvention(Enum):
+    """Where the joint stands in the row."""
+
+    STANDARD = "standard"
+    """``T = Rz(theta) Tz(d) Tx(a) Rx(alpha)``: the link frame lies at the link's far end."""
+    MODIFIED = "modified"
+    """``T = Rx(alpha) Tx(a) Rz(theta) Tz(d)`` (Craig): the link frame lies on the link's own joint axis."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DhRow:
+    """``alpha`` rad, ``a`` m, ``d`` m, ``theta`` rad, ``sigma`` 0 revolute or 1 prismatic, ``offset`` rad, m.
+
+    As in the toolbox, the row's own ``theta`` of a revolute joint and ``d`` of a prismatic joint are places
+    of the joint variable and not used: the variable is ``q + offset``.
+
+    Source: Denavit and Hartenberg 1955 as in Corke, *Robotics, Vision and Control*, 2nd ed., section 7.1;
+    modified: Craig, *Introduction to Robotics*, section 3.4.
+    """
+
+    alpha: float = 0.0
+    a: float = 0.0
+    d: float = 0.0
+    theta: float = 0.0
+    sigma: int = 0
+    offset: float = 0.0
+    convention: DhConvention = DhConvention.STANDARD
+
+    def __post_init__(self) -> None:
+        for name in ("alpha", "a", "d", "theta", "offset"):
+            object.__setattr__(self, name, float(getattr(self, name)) + 0.0)
+        if self.sigma not in (0, 1):
+            raise RobotError(
+                f"sigma of a D-H row is {self.sigma}", allowed="0 for a revolute, 1 for a prismatic joint"
+            )
+        object.__setattr__(self, "sigma", int(self.sigma))
+
+    @property
+    def before(self) -> Transform:
+        """The constant transform from the parent's frame to the joint."""
+        if self.convention is DhConvention.STANDARD:
+            return trotz(self.theta) if self.sigma else Transform()
+        return trotx(self.alpha) @ transl(self.a, 0.0, 0.0) @ self._fixed_part
+
+    @property
+    def after(self) -> Transform:
+        """The constant transform from the joint to the link's frame."""
+        if self.convention is DhConvention.MODIFIED:
+            return Transform()
+        fixed = Transform() if self.sigma else self._fixed_part
+        return fixed @ transl(self.a, 0.0, 0.0) @ trotx(self.alpha)
+
+    @property
+    def _fixed_part(self) -> Transform:
+        """Of ``Rz(theta) Tz(d)`` the factor that does not move; the two commute."""
+        return trotz(self.theta) if self.sigma else transl(0.0, 0.0, self.d)
+
+    def joint(self, limits: JointLimits | None = None) -> Joint:
+        """The joint about or along z that the row describes."""
+        kind = Prismatic if self.sigma else Revolute
+        return kind(offset=self.offset, limits=limits or JointLimits())

@@ -1,0 +1,36 @@
+"""How motor friction comes through the gear, by release of the Robotics Toolbox for MATLAB."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class FrictionModel(Enum):
+    """The joint torque against which friction works, ``tau = rigid body + G^2 Jm qdd + friction(qd)``.
+
+    ``G`` gear ratio (its sign says which way the motor turns), ``B`` viscous and ``Tc`` Coulomb friction,
+    both at the motor; ``Tc`` is ``Tc+`` where the *joint* speed ``qd`` is positive, ``Tc-`` (a negative
+    number) where it is negative, and 0 at rest.
+    """
+
+    SQUARED_GEAR = "squared-gear"
+    """``G^2 B qd + |G| Tc``: releases 9.5 to 10, and physically right."""
+    ABSOLUTE_GEAR = "absolute-gear"
+    """``|G| (B qd + Tc)``: releases 9.0 to 9.4."""
+    SIGNED_GEAR = "signed-gear"
+    """``G (B qd + Tc)``: releases 7 and 8. Where G is negative, friction drives the joint."""
+    RELEASE_6 = "release-6"
+    """``G^2 (B qd + Tc)``: release 6."""
+
+    def factors(self, gear_ratio: float) -> tuple[float, float]:
+        """What multiplies ``B qd`` and ``Tc``."""
+        G = gear_ratio
+        match self:
+            case FrictionModel.SQUARED_GEAR:
+                return G * G, abs(G)
+            case FrictionModel.ABSOLUTE_GEAR:
+                return abs(G), abs(G)
+            case FrictionModel.SIGNED_GEAR:
+                return G, G
+            case FrictionModel.RELEASE_6:
+                return G * G, G * G

@@ -1,0 +1,24 @@
+"""A joint that holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.robot.joints.joint import Joint
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed(Joint):
+    """No motion and no coordinate: the link is bolted to its parent."""
+
+    letter: ClassVar[str] = "F"
+    unit: ClassVar[str] = ""
+
+    @property
+    def turn(self) -> float:
+        return 0.0
+
+    @property
+    def slide(self) -> float:
+        return 0.0

@@ -1,0 +1,82 @@
+"""What all joints have in common: one axis, along which a joint turns, slides, or both."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from armblocks.spatial import Transform, Vector3, rotation_about, vector3
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointLimits:
+    """What a joint may do; ``None`` where nothing is known.
+
+    ``position`` lowest and highest joint coordinate (rad or m), ``speed`` greatest magnitude (rad/s or m/s),
+    ``torque`` greatest magnitude at the joint side (N m or N).
+    """
+
+    position: tuple[float, float] | None = None
+    speed: float | None = None
+    torque: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.position is not None:
+            low, high = self.position
+            object.__setattr__(self, "position", (float(low), float(high)))
+        for name in ("speed", "torque"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, float(value))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint(ABC):
+    """A joint with at most one degree of freedom: with ``s = q + offset`` the distal side turns by ``turn s``
+    rad about ``axis`` and slides by ``slide s`` m along it.
+
+    ``axis`` unit vector in the joint frame (normalised here; a zero axis is refused by the robot);
+    ``offset`` rad or m, added to the joint coordinate before anything else.
+    """
+
+    axis: Vector3 = (0.0, 0.0, 1.0)
+    offset: float = 0.0
+    limits: JointLimits = field(default_factory=JointLimits)
+
+    letter: ClassVar[str] = ""
+    """R, P, F: as in the toolbox's ``RRRRRR``."""
+    unit: ClassVar[str] = ""
+    """SI unit of the joint coordinate."""
+
+    def __post_init__(self) -> None:
+        axis = vector3(self.axis, where="axis of a joint")
+        length = math.hypot(*axis)
+        if length > 0 and length != 1 and math.isfinite(length):
+            axis = (axis[0] / length, axis[1] / length, axis[2] / length)
+        object.__setattr__(self, "axis", axis)
+        object.__setattr__(self, "offset", float(self.offset))
+
+    @property
+    @abstractmethod
+    def turn(self) -> float:
+        """Rotation about the axis per unit of the joint coordinate, rad."""
+
+    @property
+    @abstractmethod
+    def slide(self) -> float:
+        """Translation along the axis per unit of the joint coordinate, m."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the joint has a coordinate."""
+        return self.turn != 0 or self.slide != 0
+
+    def motion(self, s: float) -> Transform:
+        """The pose of the distal side in the joint frame at ``s = q + offset``."""
+        x, y, z = self.axis
+        shift = self.slide * s
+        return Transform(
+            rotation=rotation_about(self.axis, self.turn * s), translation=(x * shift, y * shift, z * shift)
+        )

@@ -1,0 +1,24 @@
+"""A joint that slides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.robot.joints.joint import Joint
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prismatic(Joint):
+    """Slides by q m along its axis."""
+
+    letter: ClassVar[str] = "P"
+    unit: ClassVar[str] = "m"
+
+    @property
+    def turn(self) -> float:
+        return 0.0
+
+    @property
+    def slide(self) -> float:
+        return 1.0

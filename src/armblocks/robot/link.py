@@ -1,0 +1,125 @@
+"""One link of an arm with the joint that carries it and the motor that drives it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import RobotError
+from armblocks.robot.dh_row import DhRow
+from armblocks.robot.joints import Joint, Revolute
+from armblocks.robot.shapes import Shape
+from armblocks.spatial import Matrix3, Transform, Vector3, matrix3, vector3
+
+ZERO3: Matrix3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor:
+    """A motor and its gear, all numbers at the motor's side of the gear.
+
+    ``inertia`` Jm of the rotor, kg m2; ``gear_ratio`` G, motor turns per joint turn (motor rad per m of a
+    prismatic joint), negative where the motor turns the other way; ``viscous_friction`` B, N m s/rad;
+    ``coulomb_friction`` (Tc+, Tc-), N m, Tc- negative. A single number t means (t, -t).
+    """
+
+    inertia: float = 0.0
+    gear_ratio: float = 1.0
+    viscous_friction: float = 0.0
+    coulomb_friction: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("inertia", "gear_ratio", "viscous_friction"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+        Tc = np.atleast_1d(np.asarray(self.coulomb_friction, dtype=np.float64)).ravel()
+        if Tc.size not in (1, 2):
+            raise RobotError(
+                f"the Coulomb friction of a motor has {Tc.size} numbers", allowed="Tc, or the pair Tc+ Tc-"
+            )
+        pair = (float(Tc[0]), -float(Tc[0]) if Tc.size == 1 else float(Tc[1]))
+        object.__setattr__(self, "coulomb_friction", (pair[0] + 0.0, pair[1] + 0.0))
+
+    @property
+    def reflected_inertia(self) -> float:
+        """``G^2 Jm``: what the joint feels of the rotor, kg m2 (kg for a prismatic joint)."""
+        return self.gear_ratio**2 * self.inertia
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A rigid body, and the joint that ties it to ``parent`` (a link's name; ``None`` is the robot's base).
+
+    Pose in the parent's frame: ``T_parent_link = before joint.motion(q + offset) after``. ``dh`` is the
+    Denavit-Hartenberg row that the three came from, where they did, and must agree with them
+    (:func:`armblocks.robot.dh.standard_dh` builds all four).
+
+    ``mass`` kg; ``centre_of_mass`` m in the link's frame; ``inertia`` kg m2 about the centre of mass in the
+    link's axes: a (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz (the matrix entries themselves,
+    so Ixy is minus the integral of x y dm). ``motor`` drives the link's joint. ``geometry`` what the link is
+    drawn with; ``None`` leaves the drawing to be made from the kinematics.
+
+    Raises RobotError for wrong shapes. Values are checked by :class:`armblocks.robot.Robot`, which can say
+    which link of which robot they stand in.
+    """
+
+    name: str
+    parent: str | None = None
+    joint: Joint = field(default_factory=Revolute)
+    before: Transform = field(default_factory=Transform)
+    after: Transform = field(default_factory=Transform)
+    dh: DhRow | None = None
+    mass: float = 0.0
+    centre_of_mass: Vector3 = (0.0, 0.0, 0.0)
+    inertia: Matrix3 = ZERO3
+    motor: Motor | None = None
+    geometry: tuple[Shape, ...] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", float(self.mass))
+        where = f"centre_of_mass of link '{self.name}'"
+        object.__setattr__(self, "centre_of_mass", vector3(self.centre_of_mass, where=where))
+        object.__setattr__(self, "inertia", inertia_matrix(self.inertia, link=self.name))
+        if self.geometry is not None:
+            object.__setattr__(self, "geometry", tuple(self.geometry))
+
+    @property
+    def I(self) -> NDArray[np.float64]:  # noqa: E743 - the field's letter
+        """The inertia about the centre of mass in link axes, a new (3, 3) array, kg m2."""
+        return np.array(self.inertia)
+
+    @property
+    def r(self) -> NDArray[np.float64]:
+        """The centre of mass in the link's frame, a new (3,) array, m."""
+        return np.array(self.centre_of_mass)
+
+    def pose(self, q: float = 0.0) -> Transform:
+        """``T_parent_link`` at the joint coordinate ``q`` (rad or m; without use for a fixed joint)."""
+        return self.before @ self.joint.motion(q + self.joint.offset) @ self.after
+
+
+def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
+    """A (3, 3) array, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz, as a symmetric matrix.
+
+    Raises RobotError, naming ``link``, for another shape or an asymmetric matrix.
+    """
+    where = f"inertia of link '{link}'" if link else "inertia"
+    numbers = np.asarray(value, dtype=np.float64)
+    if numbers.shape == (3, 3):
+        if not np.allclose(numbers, numbers.T, rtol=1e-9, atol=0.0, equal_nan=True):
+            raise RobotError(
+                "the matrix is not symmetric", where=where, allowed="Ixy = Iyx, Iyz = Izy, Ixz = Izx"
+            )
+        return matrix3((numbers + numbers.T) / 2, where=where)
+    flat = [float(number) + 0.0 for number in numbers.ravel()]
+    if len(flat) == 3:
+        flat += [0.0, 0.0, 0.0]
+    if len(flat) != 6:
+        raise RobotError(
+            f"the shape is {numbers.shape}",
+            where=where,
+            allowed="(3, 3), or 3 numbers Ixx Iyy Izz, or 6 numbers Ixx Iyy Izz Ixy Iyz Ixz",
+        )
+    xx, yy, zz, xy, yz, xz = flat
+    return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)

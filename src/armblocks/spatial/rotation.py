@@ -1,0 +1,97 @@
+"""Three-vectors and rotation matrices as plain tuples of floats, so that descriptions are values.
+
+A quarter turn is exact here: ``cos(pi/2)`` is 0 and not 6e-17, so that an arm whose axes stand at right
+angles has true zeros in its matrices and the traced equations lose every term that they multiply.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+
+Vector3: TypeAlias = tuple[float, float, float]
+"""x, y, z."""
+Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
+"""Three rows."""
+
+IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
+    """Three numbers in any array shape of size 3 as a tuple; raises InputError for another count."""
+    array = _numbers(value, where)
+    if array.size != 3:
+        raise InputError(f"{array.size} numbers are given", where=where, allowed="3 numbers x y z")
+    x, y, z = (float(number) + 0.0 for number in array.ravel())
+    return x, y, z
+
+
+def matrix3(value: ArrayLike, *, where: str = "") -> Matrix3:
+    """A (3, 3) array as three rows of floats; raises InputError for another shape."""
+    array = _numbers(value, where)
+    if array.shape != (3, 3):
+        raise InputError(f"the shape is {array.shape}", where=where, allowed="shape (3, 3)")
+    return vector3(array[0]), vector3(array[1]), vector3(array[2])
+
+
+def _numbers(value: ArrayLike, where: str) -> NDArray[np.float64]:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{value!r} is not an array of numbers", where=where) from None
+
+
+def cos_exact(angle: float) -> float:
+    """cos of an angle in rad; exactly 1, 0 or -1 where the angle is a quarter turn to rounding."""
+    quarter = _quarter_turn(angle)
+    return math.cos(angle) if quarter is None else (1.0, 0.0, -1.0, 0.0)[quarter]
+
+
+def sin_exact(angle: float) -> float:
+    """sin of an angle in rad; exactly 1, 0 or -1 where the angle is a quarter turn to rounding."""
+    quarter = _quarter_turn(angle)
+    return math.sin(angle) if quarter is None else (0.0, 1.0, 0.0, -1.0)[quarter]
+
+
+def _quarter_turn(angle: float) -> int | None:
+    """0, 1, 2, 3 where ``angle`` is that many quarter turns (modulo four) within four roundings."""
+    if not math.isfinite(angle):
+        return None
+    turns = round(angle / (math.pi / 2))
+    near = abs(angle - turns * (math.pi / 2)) <= 4 * math.ulp(max(abs(angle), math.pi / 2))
+    return turns % 4 if near and (turns or angle == 0) else None
+
+
+def rotation_x(angle: float) -> Matrix3:
+    """Rotation by ``angle`` rad about x."""
+    c, s = cos_exact(angle), sin_exact(angle)
+    return (1.0, 0.0, 0.0), (0.0, c, 0.0 - s), (0.0, s, c)
+
+
+def rotation_y(angle: float) -> Matrix3:
+    """Rotation by ``angle`` rad about y."""
+    c, s = cos_exact(angle), sin_exact(angle)
+    return (c, 0.0, s), (0.0, 1.0, 0.0), (0.0 - s, 0.0, c)
+
+
+def rotation_z(angle: float) -> Matrix3:
+    """Rotation by ``angle`` rad about z."""
+    c, s = cos_exact(angle), sin_exact(angle)
+    return (c, 0.0 - s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)
+
+
+def rotation_about(axis: Vector3, angle: float) -> Matrix3:
+    """Rotation by ``angle`` rad about the unit vector ``axis``: Rodrigues, ``c I + s [k] + (1 - c) k k'``."""
+    x, y, z = axis
+    c, s = cos_exact(angle), sin_exact(angle)
+    v = 1.0 - c
+    return (
+        (c + v * x * x, v * x * y - s * z, v * x * z + s * y),
+        (v * x * y + s * z, c + v * y * y, v * y * z - s * x),
+        (v * x * z - s * y, v * y * z + s * x, c + v * z * z),
+    )

@@ -1,0 +1,144 @@
+"""Rigid transforms between frames: ``p_a = T_ab p_b``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+from armblocks.spatial.rotation import (
+    IDENTITY3,
+    Matrix3,
+    Vector3,
+    matrix3,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    vector3,
+)
+
+ORTHONORMALITY = 1e-8
+"""How far ``R' R`` may be from the identity: eight printed digits are taken, four are not."""
+
+
+@dataclass(frozen=True, init=False)
+class Transform:
+    """The pose of frame b in frame a: ``p_a = rotation p_b + translation`` (m).
+
+    A value: tuples inside, equal and hashable by content. ``T_ac = T_ab @ T_bc``.
+    Raises InputError where ``rotation`` is no rotation or is a mirror. NaN passes here, so that the robot
+    that holds the transform can name the link.
+    """
+
+    rotation: Matrix3
+    translation: Vector3
+
+    def __init__(self, *, rotation: ArrayLike = IDENTITY3, translation: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        R = matrix3(rotation, where="rotation of a transform")
+        p = vector3(translation, where="translation of a transform")
+        _check_rotation(R)
+        object.__setattr__(self, "rotation", R)
+        object.__setattr__(self, "translation", p)
+
+    @classmethod
+    def from_matrix(cls, matrix: ArrayLike) -> Transform:
+        """From a homogeneous (4, 4) matrix; raises InputError where its last row is not 0 0 0 1."""
+        T = np.asarray(matrix, dtype=np.float64)
+        if T.shape != (4, 4):
+            raise InputError(f"a transform has shape {T.shape}", allowed="shape (4, 4)")
+        if not np.array_equal(T[3], (0.0, 0.0, 0.0, 1.0)) and np.isfinite(T).all():
+            raise InputError(
+                f"the last row of a transform is {T[3].tolist()}",
+                allowed="0 0 0 1",
+                fix="pass the pose of a frame as [R p; 0 0 0 1]",
+            )
+        return cls(rotation=T[:3, :3], translation=T[:3, 3])
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """The homogeneous matrix, a new (4, 4) array."""
+        T = np.eye(4)
+        T[:3, :3] = self.rotation
+        T[:3, 3] = self.translation
+        return T
+
+    @property
+    def R(self) -> NDArray[np.float64]:
+        """The rotation, a new (3, 3) array."""
+        return np.array(self.rotation)
+
+    @property
+    def p(self) -> NDArray[np.float64]:
+        """The translation in m, a new (3,) array."""
+        return np.array(self.translation)
+
+    @cached_property
+    def is_identity(self) -> bool:
+        """Whether nothing moves."""
+        return self == Transform()
+
+    def __matmul__(self, other: Transform) -> Transform:
+        """Composition: ``T_ac = T_ab @ T_bc``."""
+        R_ab, R_bc = self.rotation, other.rotation
+        columns = tuple(zip(*R_bc))
+        # Sums of three products in a fixed order: products of quarter turns stay exact.
+        rotation = tuple(tuple(_dot(row, column) for column in columns) for row in R_ab)
+        return Transform(rotation=rotation, translation=self.apply(other.translation))
+
+    def apply(self, point: Vector3) -> Vector3:
+        """A point (m) of frame b in frame a."""
+        x, y, z = (_dot(row, point) + offset for row, offset in zip(self.rotation, self.translation))
+        return x, y, z
+
+    def inverse(self) -> Transform:
+        """The pose of frame a in frame b."""
+        columns = tuple(zip(*self.rotation))
+        return Transform(
+            rotation=columns, translation=tuple(0.0 - _dot(column, self.translation) for column in columns)
+        )
+
+
+def transl(x: float, y: float, z: float) -> Transform:
+    """Translation by x, y, z m."""
+    return Transform(translation=(x, y, z))
+
+
+def trotx(angle: float) -> Transform:
+    """Rotation by ``angle`` rad about x."""
+    return Transform(rotation=rotation_x(angle))
+
+
+def troty(angle: float) -> Transform:
+    """Rotation by ``angle`` rad about y."""
+    return Transform(rotation=rotation_y(angle))
+
+
+def trotz(angle: float) -> Transform:
+    """Rotation by ``angle`` rad about z."""
+    return Transform(rotation=rotation_z(angle))
+
+
+def _dot(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    return sum(x * y for x, y in zip(a, b)) + 0.0
+
+
+def _check_rotation(rotation: Matrix3) -> None:
+    R = np.array(rotation)
+    if not np.isfinite(R).all():
+        return
+    error = float(np.abs(R.T @ R - np.eye(3)).max())
+    if error > ORTHONORMALITY:
+        raise InputError(
+            f"a matrix that should be a rotation is not: R'R differs from the identity by {error:.3g}",
+            allowed=f"at most {ORTHONORMALITY:g}",
+            fix="give its numbers with more digits, or build it from angles with trotx, troty, trotz",
+        )
+    if np.linalg.det(R) < 0:
+        raise InputError(
+            "a matrix that should be a rotation is a mirror (its determinant is -1)",
+            allowed="determinant +1",
+            fix="check the sign of one of its axes",
+        )
