@@ -1,0 +1,36 @@
+"""Diagrams: what a block is, how blocks are wired and checked, and how the whole becomes equations."""
+
+from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.builder import BlockHandle, DiagramBuilder
+from armblocks.diagram.check import check_diagram
+from armblocks.diagram.diagram import Connection, Diagram, Placement
+from armblocks.diagram.library import BlockLibrary
+from armblocks.diagram.names import check_block_name
+from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
+from armblocks.diagram.port import Port, PortRef, State, View, ViewKind
+from armblocks.diagram.variation import with_parameters
+
+__all__ = [
+    "REQUIRED",
+    "Block",
+    "BlockHandle",
+    "BlockLibrary",
+    "Connection",
+    "Diagram",
+    "DiagramBuilder",
+    "Parameter",
+    "ParameterKind",
+    "Placement",
+    "Port",
+    "PortRef",
+    "Shapes",
+    "Signals",
+    "State",
+    "View",
+    "ViewKind",
+    "check_block_name",
+    "check_diagram",
+    "parameter",
+    "shape_of",
+    "with_parameters",
+]

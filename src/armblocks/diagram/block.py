@@ -1,0 +1,151 @@
+"""What a block is: frozen parameters plus pure equations over ``t, x, u, p``. It stores no state."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+
+from casadi import SX
+
+from armblocks.diagram.parameter import Parameter, Value
+from armblocks.diagram.port import Port, State, View
+from armblocks.equations import Shape
+
+Shapes = Mapping[str, Shape]
+"""Shapes by port name."""
+Signals = Mapping[str, SX]
+"""Symbolic values by name, each in its natural shape: scalar 1x1, vector a column, matrix as it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block(ABC):
+    """One kind of block. Subclasses are final frozen dataclasses whose fields are parameters.
+
+    A subclass sets ``family`` and ``title``, declares its parameters with
+    :func:`~armblocks.diagram.parameter.parameter`, and overrides what it has: ports, states, equations.
+    In the equations ``t`` is the time (s), ``x`` the block's states, ``u`` its inputs, ``p`` its tunable
+    parameters, all symbolic; the other parameters are plain attributes. An equation must not read a tunable
+    parameter from ``self``, only from ``p``: the compiled system may be run with another value.
+
+    The first line of a subclass's docstring says in one sentence what the block does, with its equation.
+    """
+
+    family: ClassVar[str]
+    """Palette group: ``sources``, ``maths``, ``continuous``, ``routing``, ``sinks``, ``robots``, …"""
+    title: ClassVar[str]
+    """The name people know the block by, as Simulink or the toolbox shows it: ``XY Graph``."""
+    time_derivatives: ClassVar[Mapping[str, str]] = {}
+    """Output ports that are the exact time derivative of an input: output name to input name.
+
+    They have no equation: the tracing differentiates what feeds the input."""
+
+    def __post_init__(self) -> None:
+        for rule in self.parameters():
+            where = f"{type(self).__name__}.{rule.name}"
+            object.__setattr__(self, rule.name, rule.check(getattr(self, rule.name), where))
+        self.check()
+
+    # -- description -------------------------------------------------------------------------------------
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """The parameters, in the order of declaration."""
+        return _parameters_of(cls)
+
+    @classmethod
+    def type_name(cls) -> str:
+        """The name of this kind of block in files: the class's own."""
+        return cls.__name__
+
+    @classmethod
+    def summary(cls) -> str:
+        """One sentence for people: the docstring's first line."""
+        return (cls.__doc__ or "").strip().splitlines()[0]
+
+    def value(self, parameter: str) -> Value:
+        """The checked value of one parameter."""
+        return getattr(self, parameter)
+
+    def check(self) -> None:  # noqa: B027 - optional, most blocks have nothing to add
+        """Raise ``InputError`` where parameters contradict each other; each alone is already checked."""
+
+    # -- ends --------------------------------------------------------------------------------------------
+
+    def input_ports(self) -> tuple[Port, ...]:
+        """Inputs, in order."""
+        return ()
+
+    def output_ports(self) -> tuple[Port, ...]:
+        """Outputs, in order."""
+        return ()
+
+    def record_ports(self) -> tuple[Port, ...]:
+        """Signals that a run records as ``block/name`` but that nothing can be connected to.
+
+        Their shape must be given.
+        """
+        return ()
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        """Continuous states, given the shapes of all inputs."""
+        return ()
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        """Shapes of those outputs whose port does not state one, given the shapes of all inputs.
+
+        Raises ``InputError`` where the inputs do not fit together.
+        """
+        return {}
+
+    def assumed_output_shapes(self) -> Shapes:
+        """Shapes to assume for outputs in a loop, before the inputs are known (an integrator's start value).
+
+        They are only ever widened from a scalar to what the inputs turn out to need.
+        """
+        return {}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        """SI units of outputs that follow from the inputs' units; a port's own unit is the default."""
+        return {}
+
+    def views(self) -> tuple[View, ...]:
+        """The pictures that this block asks for: sinks have one or more."""
+        return ()
+
+    # -- equations ---------------------------------------------------------------------------------------
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """Value of every output port (but those of ``time_derivatives``)."""
+        return {}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """Time derivative of every state, each of its state's shape (a scalar is spread over it)."""
+        return {}
+
+    def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """Value of every record port. A stack (k, m, n) is given as a (k m, n) matrix."""
+        return {}
+
+    def initial_states(self, p: Signals) -> Signals:
+        """Start value of every state (a scalar is spread over it)."""
+        return {}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        """Instants (s) at which an output or a derivative of it jumps, as far as parameters tell."""
+        return ()
+
+
+@cache
+def _parameters_of(kind: type[Block]) -> tuple[Parameter, ...]:
+    return tuple(dataclasses.replace(_declared(field), name=field.name) for field in dataclasses.fields(kind))
+
+
+def _declared(field: dataclasses.Field[Any]) -> Parameter:
+    # A plain field would be invisible to files and dialogs: this is a mistake of the block's author.
+    if "parameter" not in field.metadata:
+        raise TypeError(f"field '{field.name}' of a block must be declared with parameter(...)")
+    return field.metadata["parameter"]

@@ -1,0 +1,164 @@
+"""The only mutable thing of the diagram layer: it collects blocks and wires, and ``build`` checks them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.check import check_diagram
+from armblocks.diagram.diagram import Connection, Diagram, Placement
+from armblocks.diagram.names import check_block_name, folded
+from armblocks.diagram.port import PortRef
+from armblocks.equations import SimulationOptions
+from armblocks.errors import DiagramError, UnknownNameError
+
+
+class BlockHandle:
+    """A block that a builder has added: ``handle["q"]`` is its port q, for use as a source or a target."""
+
+    def __init__(self, name: str, block: Block) -> None:
+        self.name = name
+        self.block = block
+
+    def __getitem__(self, port: str) -> PortRef:
+        """The port of this name; raises ``UnknownNameError`` with the nearest."""
+        known = [entry.name for entry in (*self.block.output_ports(), *self.block.input_ports())]
+        if port not in known:
+            raise UnknownNameError("port", port, known, where=_where(self.name, self.block))
+        return PortRef(self.name, port)
+
+    def __repr__(self) -> str:
+        return f"BlockHandle({self.name!r}, {type(self.block).__name__})"
+
+
+Source = PortRef | BlockHandle
+"""What may feed an input: an output port, or a block that has exactly one output."""
+
+
+class DiagramBuilder:
+    """Builds a diagram step by step::
+
+        builder = DiagramBuilder("falling")
+        fall = builder.add("fall", Constant(value=-9.81))
+        speed = builder.add("speed", Integrator(), fall)
+        height = builder.add("height", Integrator(initial=10.0), speed)
+        diagram = builder.build()
+
+    The names of blocks become the paths of signals, ``"height/y"``. Errors are ``DiagramError`` or
+    ``UnknownNameError``, at the line that makes them.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        settings: SimulationOptions | None = None,
+        extras: Mapping[str, object] | None = None,
+    ) -> None:
+        self.name = name
+        self.settings = settings or SimulationOptions()
+        self._extras = dict(extras or {})
+        self._blocks: dict[str, Block] = {}
+        self._taken: dict[str, str] = {}
+        self._wires: dict[PortRef, PortRef] = {}
+        self._layout: dict[str, Placement] = {}
+
+    def add(self, name: str, block: Block, *inputs: Source, **inputs_by_port: Source) -> BlockHandle:
+        """Add a block under a new name and connect its inputs, in order or by port name."""
+        where = f"diagram '{self.name}'"
+        check_block_name(name, where)
+        other = self._taken.get(folded(name))
+        if other is not None:
+            same = f"a block is named '{other}', which differs only by case or by how accents are encoded"
+            raise DiagramError(
+                f"two blocks are named '{name}'" if other == name else f"'{name}': {same}",
+                where=where,
+                allowed="every name once",
+                fix="rename one of them",
+            )
+        ports = block.input_ports()
+        if len(inputs) > len(ports):
+            raise DiagramError(
+                f"{len(inputs)} inputs are given",
+                where=_where(name, block),
+                allowed=f"{len(ports)}: {', '.join(port.name for port in ports)}" if ports else "no inputs",
+                fix="remove the last ones",
+            )
+        self._taken[folded(name)] = name
+        self._blocks[name] = block
+        handle = BlockHandle(name, block)
+        for port, source in zip(ports, inputs):
+            self.connect(source, PortRef(name, port.name))
+        for port_name, source in inputs_by_port.items():
+            self.connect(source, PortRef(name, port_name))
+        return handle
+
+    def connect(self, source: Source, target: Source) -> None:
+        """Connect an output port to an input port; a block stands for its only output or only input."""
+        driver = self._resolve(source, output=True)
+        driven = self._resolve(target, output=False)
+        other = self._wires.get(driven)
+        if other is not None:
+            raise DiagramError(
+                f"input '{driven}' has two drivers, '{other}' and '{driver}'",
+                where=f"diagram '{self.name}'",
+                allowed="one driver for each input",
+                fix="remove one of the connections, or join the signals with a Sum or a Mux",
+            )
+        self._wires[driven] = driver
+
+    def place(
+        self,
+        block: BlockHandle | str,
+        x: float,
+        y: float,
+        *,
+        width: float | None = None,
+        height: float | None = None,
+        flipped: bool = False,
+    ) -> None:
+        """Say where a block stands on the sheet (pixels, y downwards)."""
+        name = block if isinstance(block, str) else block.name
+        self._known(name)
+        self._layout[name] = Placement(x=x, y=y, width=width, height=height, flipped=flipped)
+
+    def build(self) -> Diagram:
+        """The frozen diagram, after all checks of :func:`armblocks.diagram.check.check_diagram`."""
+        diagram = Diagram(
+            name=self.name,
+            blocks=self._blocks,
+            connections=tuple(Connection(source, target) for target, source in self._wires.items()),
+            layout=self._layout,
+            settings=self.settings,
+            extras=self._extras,
+        )
+        check_diagram(diagram)
+        return diagram
+
+    def _known(self, name: str) -> Block:
+        if name not in self._blocks:
+            raise UnknownNameError("block", name, self._blocks, where=f"diagram '{self.name}'")
+        return self._blocks[name]
+
+    def _resolve(self, end: Source, *, output: bool) -> PortRef:
+        """The port that is meant, checked to exist on the right side of its block."""
+        side = "output" if output else "input"
+        name = end.block if isinstance(end, PortRef) else end.name
+        block = self._known(name)
+        ports = [port.name for port in (block.output_ports() if output else block.input_ports())]
+        if isinstance(end, PortRef):
+            if end.port not in ports:
+                raise UnknownNameError(f"{side} port", end.port, ports, where=_where(name, block))
+            return end
+        if len(ports) != 1:
+            raise DiagramError(
+                f"the block has {len(ports)} {side}s, so its name alone does not tell which",
+                where=_where(name, block),
+                allowed=", ".join(f'"{port}"' for port in ports) or "a block with one",
+                fix='name the port: handle["port"]',
+            )
+        return PortRef(name, ports[0])
+
+
+def _where(name: str, block: Block) -> str:
+    return f"block '{name}' ({block.title})"

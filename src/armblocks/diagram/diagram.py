@@ -1,0 +1,79 @@
+"""A checked, frozen diagram: blocks by name, connections, and how it is to be drawn and run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.port import PortRef, View
+from armblocks.equations import SimulationOptions
+from armblocks.errors import UnknownNameError
+
+
+@dataclass(frozen=True, order=True)
+class Connection:
+    """A wire from an output port to an input port."""
+
+    source: PortRef
+    target: PortRef
+
+    def __str__(self) -> str:
+        return f"{self.source} -> {self.target}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """Where a block stands on the sheet: top left corner and size in pixels, y downwards.
+
+    ``width`` and ``height`` ``None``: the drawing chooses. ``flipped``: inputs on the right.
+    """
+
+    x: float
+    y: float
+    width: float | None = None
+    height: float | None = None
+    flipped: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagram:
+    """Blocks and wires. Only ``DiagramBuilder.build`` makes one, and what it makes is checked.
+
+    ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams look alike. ``layout``
+    may name only some blocks. ``extras`` are unknown keys of a file, preserved: it has the keys
+    ``""`` (the document), ``"blocks"`` (by block name), and whatever else a file format puts there.
+    """
+
+    name: str
+    blocks: Mapping[str, Block]
+    connections: tuple[Connection, ...] = ()
+    layout: Mapping[str, Placement] = field(default_factory=dict[str, Placement])
+    settings: SimulationOptions = field(default_factory=SimulationOptions)
+    extras: Mapping[str, object] = field(default_factory=dict[str, object])
+
+    def __post_init__(self) -> None:
+        for name in ("blocks", "layout", "extras"):
+            ordered = dict(sorted(getattr(self, name).items()))
+            object.__setattr__(self, name, MappingProxyType(ordered))
+        object.__setattr__(self, "connections", tuple(sorted(self.connections)))
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self.blocks.items()), self.connections, self.settings))
+
+    @cached_property
+    def drivers(self) -> Mapping[PortRef, PortRef]:
+        """The output port that drives each input port."""
+        return {wire.target: wire.source for wire in self.connections}
+
+    def block(self, name: str) -> Block:
+        """The block of this name; raises ``UnknownNameError`` with the nearest."""
+        if name not in self.blocks:
+            raise UnknownNameError("block", name, self.blocks, where=f"diagram '{self.name}'")
+        return self.blocks[name]
+
+    def views(self) -> tuple[tuple[str, View], ...]:
+        """Every picture that the diagram asks for, with the name of the block that asks."""
+        return tuple((name, view) for name, block in self.blocks.items() for view in block.views())

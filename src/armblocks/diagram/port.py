@@ -1,0 +1,74 @@
+"""The ends of a block: ports, states, and how a sink shows what it receives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from armblocks.equations import Shape
+
+
+@dataclass(frozen=True)
+class Port:
+    """One input or output of a block.
+
+    ``shape`` is the only shape that the port takes or gives, or ``None`` where it follows from what is
+    connected. ``unit`` is SI, ``""`` where the port has none or takes that of its signal.
+    """
+
+    name: str
+    doc: str
+    unit: str = ""
+    shape: Shape | None = None
+
+
+@dataclass(frozen=True)
+class State:
+    """One continuous state of a block; the numerics hold its value, the block never does."""
+
+    name: str
+    shape: Shape
+    doc: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, order=True)
+class PortRef:
+    """A port of a named block, written ``block/port``."""
+
+    block: str
+    port: str
+
+    def __str__(self) -> str:
+        return f"{self.block}/{self.port}"
+
+
+class ViewKind(Enum):
+    """What a sink wants to be seen as."""
+
+    TRACES = "traces"
+    """Every signal over time (Scope)."""
+    PATH = "path"
+    """The second signal over the first, equal axes where the units agree (XY Graph)."""
+    VALUE = "value"
+    """The number itself, as it stands at the end or at the moment looked at (Display)."""
+    ROBOT = "robot"
+    """A moving robot: the one signal holds the poses of its links, shape (L+2, 4, 4)."""
+    DATA = "data"
+    """Kept for export only (To Workspace)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """One picture that a block asks for; report and studio draw it without knowing the block's class.
+
+    ``signals`` names ports or records of the block itself, so that ``f"{block}/{signal}"`` is a name that a
+    simulation result knows. ``labels`` gives a text for each (``""``: the signal's own name). ``subject`` is
+    the ``Robot`` to draw where the kind is ``ROBOT``.
+    """
+
+    kind: ViewKind
+    signals: tuple[str, ...]
+    labels: tuple[str, ...] = ()
+    title: str = ""
+    subject: object | None = None
