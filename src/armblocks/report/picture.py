@@ -36,7 +36,7 @@ class Polyline:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A path of commands as in SVG: ``("M", x, y)``, ``("L", …)``, ``("Q", x1, y1, x, y)``, ``("C", …)``, ``("Z",)``."""
+    """A path of absolute commands as in SVG: ``("M", x, y)``, ``("Q", x1, y1, x, y)`` and L, C, Z."""
 
     commands: tuple[tuple[str | float, ...], ...]
     stroke: Tone | None = Tone.INK
@@ -76,7 +76,7 @@ class Disc:
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """One line of text; (x, y) is on its baseline, at its start, middle or end; ``turn`` degrees anticlockwise."""
+    """One line of text; (x, y) is on its baseline, at its ``anchor``; ``turn`` degrees anticlockwise."""
 
     x: float
     y: float

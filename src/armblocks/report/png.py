@@ -119,7 +119,7 @@ class _Painter:
         if stroke is not None:
             gc.set_foreground(self._colour(stroke, opacity), isRGBA=True)
         if dash:
-            gc.set_dashes(0, [d for d in dash])
+            gc.set_dashes(0, list(dash))
         gc.set_joinstyle("miter" if sharp else "round")
         gc.set_capstyle("butt" if sharp or dash else "round")
         gc.set_snap(None if not sharp else False)

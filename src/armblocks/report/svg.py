@@ -7,6 +7,7 @@ tell the reader's preference. Written for a page, it takes its colours from the 
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -126,8 +127,8 @@ def _path_data(points: Points, closed: bool) -> str:
     array = np.asarray(points, dtype=np.float64)
     pieces: list[str] = []
     pen = "M"
-    for (x, y), good in zip(array.tolist(), np.isfinite(array).all(axis=1).tolist()):
-        if not good:
+    for x, y in array.tolist():
+        if not (math.isfinite(x) and math.isfinite(y)):
             pen = "M"
             continue
         pieces.append(f"{pen}{number(x)} {number(y)}")
@@ -151,10 +152,8 @@ def _mark(mark: Mark) -> str:
             data = "".join(
                 str(c[0]) + " ".join(number(float(value)) for value in c[1:]) for c in mark.commands
             )
-            return (
-                f'<path d="{data}"{_paint(mark.fill, mark.stroke, mark.width, mark.opacity)}{_dash(mark.dash)}'
-                ' stroke-linejoin="round" stroke-linecap="round"/>'
-            )
+            paint = _paint(mark.fill, mark.stroke, mark.width, mark.opacity) + _dash(mark.dash)
+            return f'<path d="{data}"{paint} stroke-linejoin="round" stroke-linecap="round"/>'
         case Rectangle():
             radius = f' rx="{number(mark.radius)}"' if mark.radius else ""
             return (
