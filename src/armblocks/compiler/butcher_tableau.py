@@ -1,0 +1,155 @@
+"""An explicit Runge-Kutta method as data: what the native integrator is generated from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import InputError
+
+Row = tuple[float, ...]
+
+CONSISTENCY = 1e-12
+"""Largest residual of a row sum: rounding of published decimals, and nothing that hides a misprint."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ButcherTableau:
+    """One explicit Runge-Kutta method with the polynomial that gives its values between the steps.
+
+    One step of size ``h`` from ``(t, x)`` to ``(t + h, x_new)``, with ``s = len(nodes)`` stages::
+
+        K[i]   = f(t + nodes[i] h,  x + h * sum_j matrix[i][j] K[j])        i = 0 … s-1,  j < i
+        x_new  = x + h * sum_j weights[j] K[j]
+        K[s]   = f(t + h, x_new)                 the first stage of the next step, so it costs nothing
+        K[s+1…] = the extra stages, of the same form, evaluated only where a sample instant asks for them
+        x(t + theta h) = x + h * sum_j (sum_m dense[j][m] theta^(m+1)) K[j]
+
+    An adaptive method also has ``error`` (s + 1 weights): the estimate ``h * sum_j error[j] K[j]`` is of
+    order ``error_order``, so the step scales with ``norm^(-1 / (error_order + 1))``. Where ``stretched_error``
+    is given, the two estimates are joined as in DOP853: ``e = h |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2)``.
+
+    ``order`` is that of the steps, ``dense_order`` that of the values between them (global, both).
+    """
+
+    name: str
+    title: str
+    source: str
+    order: int
+    dense_order: int
+    nodes: Row
+    matrix: tuple[Row, ...]
+    weights: Row
+    dense: tuple[Row, ...]
+    aliases: tuple[str, ...] = ()
+    error: Row | None = None
+    error_order: int = 0
+    stretched_error: Row | None = None
+    extra_nodes: Row = ()
+    extra_matrix: tuple[Row, ...] = ()
+
+    def __post_init__(self) -> None:
+        s = len(self.nodes)
+        rows = {
+            "matrix": [len(row) for row in self.matrix] == list(range(s)),
+            "weights": len(self.weights) == s,
+            "error": self.error is None or len(self.error) == s + 1,
+            "stretched_error": self.stretched_error is None or len(self.stretched_error) == s + 1,
+            "extra_matrix": [len(row) for row in self.extra_matrix]
+            == [s + 1 + k for k in range(len(self.extra_nodes))],
+            "dense": len(self.dense) == s + 1 + len(self.extra_nodes)
+            and len({len(row) for row in self.dense}) == 1,
+        }
+        for field, fits in rows.items():
+            if not fits:
+                raise InputError(
+                    f"'{field}' does not fit the {s} stages",
+                    where=f"integrator {self.name}",
+                    allowed="row i of the matrix has i numbers; see ButcherTableau",
+                )
+        sums = {f"matrix row {i}": (sum(row), self.nodes[i]) for i, row in enumerate(self.matrix)}
+        sums |= {f"extra row {i}": (sum(row), self.extra_nodes[i]) for i, row in enumerate(self.extra_matrix)}
+        sums["weights"] = (sum(self.weights), 1.0)
+        end = [sum(row) for row in self.dense]
+        sums |= {f"dense row {j} at the step's end": (end[j], w) for j, w in enumerate(self.weights)}
+        if self.error is not None:
+            sums["error"] = (sum(self.error), 0.0)
+        for what, (found, expected) in sums.items():
+            if abs(found - expected) > CONSISTENCY * max(1.0, abs(expected)):
+                raise InputError(
+                    f"{what} adds up to {found!r}",
+                    where=f"integrator {self.name}",
+                    allowed=f"{expected!r}",
+                    fix="check the coefficients against their source",
+                )
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether the method estimates its error and chooses its steps."""
+        return self.error is not None
+
+    @property
+    def stages(self) -> int:
+        """Evaluations of the derivative that one step costs."""
+        return len(self.nodes)
+
+    @property
+    def rows(self) -> int:
+        """Rows of ``K``: stages, the derivative at the new point, and the extra stages."""
+        return len(self.dense)
+
+    @cached_property
+    def dense_array(self) -> NDArray[np.float64]:
+        """``dense`` as an array of shape ``(rows, degree)``."""
+        return np.array(self.dense)
+
+    @cached_property
+    def real_stability(self) -> float:
+        """Length of the interval of absolute stability on the negative real axis.
+
+        A linear decay of rate ``lambda`` stays bounded while ``h lambda`` is below it. From the stability
+        function ``R(z) = 1 + z b (I - z A)^-1 1`` (Hairer, Wanner II, IV.2, proposition 2.1) on a grid of 0.01.
+        """
+        s = self.stages
+        A = np.zeros((s, s))
+        for i, row in enumerate(self.matrix):
+            A[i, :i] = row
+        b, ones = np.array(self.weights), np.ones(s)
+        grid = np.arange(1, 2000) * 0.01
+        for z in grid:
+            if abs(1.0 - z * (b @ np.linalg.solve(np.eye(s) + z * A, ones))) > 1.0 + 1e-9:
+                return float(z)
+        return float(grid[-1])
+
+    @property
+    def content(self) -> str:
+        """All numbers of the method as text, exactly: the part of a cache key that stands for it."""
+        return repr(
+            (
+                self.nodes,
+                self.matrix,
+                self.weights,
+                self.dense,
+                self.error,
+                self.error_order,
+                self.stretched_error,
+                self.extra_nodes,
+                self.extra_matrix,
+            )
+        )
+
+
+def hermite_dense(weights: Row) -> tuple[Row, ...]:
+    """Cubic Hermite polynomial through both ends of a step, values and slopes, as rows of ``dense``.
+
+    Its own error is of order ``h^4``, so a method up to order 4 keeps its order between the steps.
+    Source: Hairer, Norsett, Wanner, *Solving Ordinary Differential Equations I*, II.6, equation (6.7).
+    """
+    s = len(weights)
+    rows = [[0.0, 3.0 * w, -2.0 * w] for w in (*weights, 0.0)]
+    for j, slope in ((0, (1.0, -2.0, 1.0)), (s, (0.0, -1.0, 1.0))):
+        rows[j] = [a + b for a, b in zip(rows[j], slope)]
+    return tuple(tuple(row) for row in rows)
