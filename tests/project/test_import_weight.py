@@ -1,0 +1,22 @@
+"""``import armblocks`` brings nothing heavy with it, and neither does asking the command line for help."""
+
+import json
+import subprocess
+import sys
+
+HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "fastapi"}
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Names of the modules that a new process holds after the statement."""
+    script = f"{statement}\nimport sys, json\nprint(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout))
+
+
+def test_import_armblocks_loads_no_heavy_library() -> None:
+    assert loaded_by("import armblocks") & (HEAVY | {"typer", "rich"}) == set()
+
+
+def test_the_command_line_starts_without_heavy_libraries() -> None:
+    assert loaded_by("import armblocks.cli.main") & HEAVY == set()

@@ -1,0 +1,111 @@
+"""Every error and warning that the package can show is read by some test.
+
+The check is static and approximate: for each construction of an armblocks error or warning it takes the
+literal words of the message and looks whether three words in a row of them stand in a file under ``tests``.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from armblocks import errors
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "src" / "armblocks"
+TREE = {
+    name
+    for name, kind in vars(errors).items()
+    if isinstance(kind, type) and issubclass(kind, errors.ArmblocksError | errors.ArmblocksWarning)
+}
+RUN_OF_WORDS = 3
+
+
+def words(text: str) -> list[str]:
+    """Words of a message or of a test, freed of quotes, regular-expression escapes and punctuation."""
+    return re.findall(r"[^\W_]+(?:[-'.][^\W_]+)*", text.replace("\\", ""))
+
+
+def literal_pieces(node: ast.expr, names: dict[str, ast.expr]) -> Iterator[str]:
+    """The constant texts in an expression; a local variable is followed to what was assigned to it."""
+    for part in ast.walk(node):
+        if isinstance(part, ast.Constant) and isinstance(part.value, str):
+            yield part.value
+        elif isinstance(part, ast.Name) and part.id in names:
+            value = names[part.id]
+            yield from (
+                inner.value
+                for inner in ast.walk(value)
+                if isinstance(inner, ast.Constant) and isinstance(inner.value, str)
+            )
+
+
+def messages() -> Iterator[tuple[str, list[str]]]:
+    """Every place where an error or warning is made, with the literal pieces of its message."""
+    for path in sorted(SOURCE.rglob("*.py")):
+        if path.name == "errors.py":
+            continue
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        scopes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+        seen: set[int] = set()
+        for scope in (*scopes, tree):
+            names = {
+                target.id: node.value
+                for node in ast.walk(scope)
+                if isinstance(node, ast.Assign)
+                for target in node.targets
+                if isinstance(target, ast.Name)
+            }
+            for node in ast.walk(scope):
+                if not isinstance(node, ast.Call) or id(node) in seen or not node.args:
+                    continue
+                kind = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+                is_warning = kind == "warn" and any(
+                    isinstance(argument, ast.Name) and argument.id in TREE for argument in node.args[1:]
+                )
+                if kind not in TREE and not is_warning:
+                    continue
+                seen.add(id(node))
+                first = node.args[0]
+                if kind == "UnknownNameError" and isinstance(first, ast.Constant):
+                    pieces = [f"there is no {first.value} named"]
+                else:
+                    pieces = list(literal_pieces(first, names))
+                place = f"{path.relative_to(SOURCE).as_posix()}:{node.lineno}"
+                yield place, pieces
+
+
+def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:
+    """All runs of words by which a message can be known: three in a row, or a whole shorter piece."""
+    split = [words(piece) for piece in pieces]
+    longest = max((len(piece) for piece in split), default=0)
+    size = min(RUN_OF_WORDS, longest)
+    for piece in split:
+        for start in range(len(piece) - size + 1):
+            yield tuple(piece[start : start + size])
+
+
+@pytest.fixture(scope="module")
+def tested() -> set[tuple[str, ...]]:
+    """All runs of one, two and three words in the texts of the tests."""
+    found: set[tuple[str, ...]] = set()
+    for path in sorted((ROOT / "tests").rglob("*.py")):
+        if path == Path(__file__):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                text = words(node.value)
+                for size in range(1, RUN_OF_WORDS + 1):
+                    found.update(tuple(text[start : start + size]) for start in range(len(text) - size + 1))
+    return found
+
+
+def test_every_message_is_read_by_a_test(tested: set[tuple[str, ...]]) -> None:
+    unread = []
+    for place, pieces in messages():
+        candidates = [run for run in runs(pieces) if run]
+        if candidates and not any(run in tested for run in candidates):
+            unread.append(f"{place}: {' … '.join(pieces)}")
+    assert unread == [], f"{len(unread)} messages that no test reads:\n" + "\n".join(unread)
