@@ -8,6 +8,9 @@ from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
 from armblocks.diagram.port import Port, PortRef, State, View, ViewKind
+from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
+from armblocks.diagram.trace import trace_diagram
+from armblocks.diagram.units import infer_units, integral_unit, rate_unit
 from armblocks.diagram.variation import with_parameters
 
 __all__ = [
@@ -18,6 +21,7 @@ __all__ = [
     "Connection",
     "Diagram",
     "DiagramBuilder",
+    "DiagramShapes",
     "Parameter",
     "ParameterKind",
     "Placement",
@@ -28,9 +32,15 @@ __all__ = [
     "State",
     "View",
     "ViewKind",
+    "broadcast",
     "check_block_name",
     "check_diagram",
+    "infer_shapes",
+    "infer_units",
+    "integral_unit",
     "parameter",
+    "rate_unit",
     "shape_of",
+    "trace_diagram",
     "with_parameters",
 ]

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.ordering import Network, evaluation_order
 from armblocks.diagram.port import PortRef
+from armblocks.diagram.shapes import infer_shapes
+from armblocks.diagram.trace import diagram_equations
 from armblocks.errors import DiagramError
 
 MOST_LISTED = 20
@@ -12,10 +15,13 @@ MOST_LISTED = 20
 
 def check_diagram(diagram: Diagram) -> None:
     """Raise ``DiagramError`` for unconnected inputs, mismatched widths or an algebraic loop."""
-    _check_connected(diagram)
+    check_connected(diagram)
+    shapes = infer_shapes(diagram)
+    evaluation_order(Network(diagram, diagram_equations(diagram, shapes)))
 
 
-def _check_connected(diagram: Diagram) -> None:
+def check_connected(diagram: Diagram) -> None:
+    """Raise ``DiagramError`` that lists the inputs that nothing drives."""
     drivers = diagram.drivers
     open_inputs = [
         str(PortRef(name, port.name))

@@ -42,10 +42,13 @@ class Signature:
     slots: tuple[Slot, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [slot.name for slot in self.slots]
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"the name '{name}' stands twice in one signature", fix="rename one of them")
+        seen: set[str] = set()
+        for slot in self.slots:
+            if slot.name in seen:
+                raise InputError(
+                    f"the name '{slot.name}' stands twice in one signature", fix="rename one of them"
+                )
+            seen.add(slot.name)
 
     @cached_property
     def size(self) -> int:
@@ -67,6 +70,10 @@ class Signature:
             start += slot.size
         return places
 
+    @cached_property
+    def _by_name(self) -> Mapping[str, Slot]:
+        return {slot.name: slot for slot in self.slots}
+
     def __len__(self) -> int:
         return len(self.slots)
 
@@ -74,10 +81,9 @@ class Signature:
         return iter(self.slots)
 
     def __getitem__(self, name: str) -> Slot:
-        for slot in self.slots:
-            if slot.name == name:
-                return slot
-        raise UnknownNameError("quantity", name, self.names)
+        if name not in self._by_name:
+            raise UnknownNameError("quantity", name, self.names)
+        return self._by_name[name]
 
     def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
         """Lay named values, shape of their slot each, into a new flat vector of shape ``(size,)``."""

@@ -1,0 +1,131 @@
+"""In which order the groups of a diagram's blocks can be worked out, and which loops forbid one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from armblocks.diagram.block_equations import BlockEquations, SlotKind
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.port import PortRef
+from armblocks.errors import AlgebraicLoopError
+
+
+class Node(NamedTuple):
+    """The ``order``-th time derivative of one group of one block; order 0 is the value itself."""
+
+    block: str
+    group: int
+    order: int
+
+
+class Value(NamedTuple):
+    """Where the value of a signal is found: a slot of a node."""
+
+    node: Node
+    kind: SlotKind
+    name: str
+
+
+@dataclass(frozen=True)
+class Network:
+    """A diagram with the equations of its blocks: who needs whom."""
+
+    diagram: Diagram
+    equations: Mapping[str, BlockEquations]
+
+    def output(self, ref: PortRef, order: int = 0) -> Value:
+        """Where an output port's value is found. A derivative port is one order more of what feeds it."""
+        passed = {ref}
+        drivers = self.diagram.drivers
+        while ref.port in self.diagram.blocks[ref.block].time_derivatives:
+            source = self.diagram.blocks[ref.block].time_derivatives[ref.port]
+            ref = drivers[PortRef(ref.block, source)]
+            order += 1
+            if ref in passed:
+                raise AlgebraicLoopError(
+                    [str(entry) for entry in sorted(passed)], where=f"diagram '{self.diagram.name}'"
+                )
+            passed.add(ref)
+        return self._slot(ref.block, SlotKind.OUTPUT, ref.port, order)
+
+    def input(self, block: str, port: str, order: int = 0) -> Value:
+        """Where the value that feeds an input port is found."""
+        return self.output(self.diagram.drivers[PortRef(block, port)], order)
+
+    def state_rate(self, block: str, state: str, order: int) -> Value:
+        """Where the ``order``-th (at least first) derivative of a state is found."""
+        return self._slot(block, SlotKind.DERIVATIVE, state, order - 1)
+
+    def needs(self, node: Node) -> Iterator[tuple[Node, str]]:
+        """The nodes that must be worked out before, each with the path of the signal that is needed."""
+        group = self.equations[node.block].groups[node.group]
+        for order in range(node.order + 1):
+            for port in group.inputs:
+                ref = self.diagram.drivers[PortRef(node.block, port)]
+                yield self.output(ref, order).node, str(ref)
+            if order:
+                for state in group.states:
+                    yield self.state_rate(node.block, state, order).node, f"{node.block}/{state}'"
+
+    def roots(self) -> Iterator[tuple[Node, str]]:
+        """Everything that a run asks for: all groups, and what the derivative ports need."""
+        for name, block in self.diagram.blocks.items():
+            for index, group in enumerate(self.equations[name].groups):
+                yield Node(name, index, 0), f"{name}/{group.slots[0].name}"
+            for port in block.time_derivatives:
+                yield self.output(PortRef(name, port)).node, f"{name}/{port}"
+
+    def _slot(self, block: str, kind: SlotKind, name: str, order: int) -> Value:
+        return Value(Node(block, self.equations[block].group_of[kind, name], order), kind, name)
+
+
+def evaluation_order(network: Network) -> list[Node]:
+    """All nodes, each after those it needs; the same for the same diagram, however it was built.
+
+    Depth-first and without recursion, so that a chain may be as long as it likes.
+
+    Raises ``AlgebraicLoopError`` with the signals of the loop, in the direction in which they flow. Meeting
+    a group again in the same or in a higher order of differentiation is a loop (the orders would rise for
+    ever); in a lower order it is not.
+    """
+    order: list[Node] = []
+    done: set[Node] = set()
+    for root, label in network.roots():
+        if root in done:
+            continue
+        path = [(root, label)]
+        pending = [network.needs(root)]
+        open_orders: dict[tuple[str, int], list[int]] = {(root.block, root.group): [root.order]}
+        while path:
+            step = next(pending[-1], None)
+            if step is None:
+                node, _ = path.pop()
+                pending.pop()
+                open_orders[node.block, node.group].pop()
+                done.add(node)
+                order.append(node)
+                continue
+            node, _ = step
+            if node in done:
+                continue
+            orders = open_orders.setdefault((node.block, node.group), [])
+            if orders and node.order >= min(orders):
+                raise AlgebraicLoopError(_loop(path, step), where=f"diagram '{network.diagram.name}'")
+            orders.append(node.order)
+            path.append(step)
+            pending.append(network.needs(node))
+    return order
+
+
+def _loop(path: list[tuple[Node, str]], closing: tuple[Node, str]) -> list[str]:
+    """The signals from the last visit of the closing node's group to the closing one, as they flow."""
+    node = closing[0]
+    start = max(
+        place
+        for place, (entry, _) in enumerate(path)
+        if (entry.block, entry.group) == (node.block, node.group) and entry.order <= node.order
+    )
+    needed = [label for _, label in path[start + 1 :]] + [closing[1]]
+    return needed[::-1]

@@ -1,0 +1,166 @@
+"""Shapes of all signals of a diagram, from what the ports state and what the blocks conclude."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from armblocks.diagram.block import Block, Shapes
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.port import PortRef
+from armblocks.equations import Shape
+from armblocks.errors import DiagramError, InputError
+
+
+def broadcast(shapes: Shapes) -> Shape:
+    """The shape of an elementwise result: scalars (and single elements) spread over the others, as in
+    Simulink; all others must agree.
+
+    Raises ``InputError`` that names two ports that do not agree.
+    """
+    result: Shape = ()
+    first = ""
+    for name, shape in shapes.items():
+        if math.prod(shape) == 1:
+            if math.prod(result) == 1 and len(shape) > len(result):
+                result, first = shape, name
+        elif math.prod(result) == 1:
+            result, first = shape, name
+        elif shape != result:
+            raise InputError(
+                f"'{first}' has shape {result} and '{name}' has shape {shape}",
+                allowed="equal shapes, or a scalar with anything",
+                fix="change the width of one of the signals",
+            )
+    return result
+
+
+def shapes_agree(given: Shape, taken: Shape) -> bool:
+    """Whether a signal fits a port: equal shapes, or one element each."""
+    return given == taken or math.prod(given) == math.prod(taken) == 1
+
+
+@dataclass(frozen=True)
+class DiagramShapes:
+    """The shape at every port of a diagram, by block and port name."""
+
+    inputs: Mapping[str, Shapes]
+    outputs: Mapping[str, Shapes]
+
+
+def infer_shapes(diagram: Diagram) -> DiagramShapes:
+    """Find the shape of every signal; every input must be connected.
+
+    Shapes spread from the ports that state theirs. A loop in which nobody does starts from what its
+    integrators assume (a scalar start value), which is widened where the loop turns out to be wider.
+
+    Raises ``DiagramError`` where the two ends of a connection, or the inputs of a block, do not agree.
+    """
+    known: dict[PortRef, Shape] = {}
+    consumers: dict[str, list[str]] = {name: [] for name in diagram.blocks}
+    for wire in diagram.connections:
+        consumers[wire.source.block].append(wire.target.block)
+    drivers = diagram.drivers
+    changes: dict[PortRef, int] = {}
+    queue: deque[str] = deque(diagram.blocks)
+    queued = set(queue)
+
+    def learn(ref: PortRef, shape: Shape) -> None:
+        if known.get(ref) == shape:
+            return
+        # Widening ends after as many changes as there are assumptions to widen; more would go on for ever.
+        changes[ref] = changes.get(ref, -1) + 1
+        if changes[ref] > len(diagram.blocks):
+            raise DiagramError(
+                f"the shape of '{ref}' does not settle: it was {known[ref]} and becomes {shape}",
+                where=f"diagram '{diagram.name}'",
+                allowed="loops whose width is the same all around",
+                fix="give the integrators of the loop start values of the intended size",
+            )
+        known[ref] = shape
+        for consumer in consumers[ref.block]:
+            if consumer not in queued:
+                queued.add(consumer)
+                queue.append(consumer)
+
+    def spread() -> None:
+        while queue:
+            name = queue.popleft()
+            queued.discard(name)
+            block = diagram.blocks[name]
+            inputs = _input_shapes(name, block, drivers, known)
+            if inputs is None:
+                continue
+            try:
+                shapes = block.output_shapes(inputs)
+            except InputError:
+                continue  # said at the end, if it is still so when all shapes are known
+            for port, shape in shapes.items():
+                learn(PortRef(name, port), shape)
+
+    for name, block in diagram.blocks.items():
+        for port in block.output_ports():
+            if port.shape is not None:
+                known[PortRef(name, port.name)] = port.shape
+    spread()
+    for name, block in diagram.blocks.items():
+        for port, shape in block.assumed_output_shapes().items():
+            if PortRef(name, port) not in known:
+                learn(PortRef(name, port), shape)
+    spread()
+    return _checked(diagram, known)
+
+
+def _input_shapes(
+    name: str, block: Block, drivers: Mapping[PortRef, PortRef], known: Mapping[PortRef, Shape]
+) -> Shapes | None:
+    """Shapes of all inputs, or ``None`` while one is unknown."""
+    shapes: dict[str, Shape] = {}
+    for port in block.input_ports():
+        shape = port.shape if port.shape is not None else known.get(drivers[PortRef(name, port.name)])
+        if shape is None:
+            return None
+        shapes[port.name] = shape
+    return shapes
+
+
+def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
+    """All shapes by block, after the complaints that had to wait until they were known."""
+    drivers = diagram.drivers
+    for wire in diagram.connections:
+        given = known.get(wire.source)
+        port = next(p for p in diagram.blocks[wire.target.block].input_ports() if p.name == wire.target.port)
+        if given is not None and port.shape is not None and not shapes_agree(given, port.shape):
+            raise DiagramError(
+                f"'{wire.source}' gives shape {given} but '{wire.target}' takes shape {port.shape}",
+                where=f"diagram '{diagram.name}'",
+                allowed="both ends of a connection have the same shape",
+                fix="change the width of one end, or put a Mux, Demux or Gain matrix in between",
+            )
+    inputs: dict[str, Shapes] = {}
+    outputs: dict[str, Shapes] = {}
+    for name, block in diagram.blocks.items():
+        # Still unknown: behind a block that complains below, or in a loop without any integrator, which the
+        # ordering refuses; any shape does until then.
+        taken = {
+            port.name: port.shape
+            if port.shape is not None
+            else known.get(drivers[PortRef(name, port.name)], ())
+            for port in block.input_ports()
+        }
+        try:
+            if all(drivers[PortRef(name, port)] in known for port in taken):
+                block.output_shapes(taken)
+        except InputError as error:
+            fed = ", ".join(f"'{port}' by '{drivers[PortRef(name, port)]}'" for port in taken)
+            raise DiagramError(
+                error.what,
+                where=f"block '{name}' ({block.title}), fed at {fed}",
+                allowed=error.allowed,
+                fix=error.fix,
+            ) from None
+        inputs[name] = taken
+        outputs[name] = {port.name: known.get(PortRef(name, port.name), ()) for port in block.output_ports()}
+    return DiagramShapes(inputs=inputs, outputs=outputs)
