@@ -1,0 +1,114 @@
+"""CasADi graphs to tapes: the only place on the numerics side that knows CasADi."""
+
+from __future__ import annotations
+
+import casadi
+from casadi import Function
+
+from armblocks.compiler.opcodes import Opcode
+from armblocks.compiler.tape import Tape
+from armblocks.compiler.tape_builder import TapeBuilder
+from armblocks.equations import TracedFunction
+from armblocks.errors import CompileError
+
+# Operations that mean the same in both, by CasADi's name.
+_SAME = {
+    "OP_ADD": Opcode.ADD,
+    "OP_SUB": Opcode.SUBTRACT,
+    "OP_MUL": Opcode.MULTIPLY,
+    "OP_DIV": Opcode.DIVIDE,
+    "OP_NEG": Opcode.NEGATE,
+    "OP_SQRT": Opcode.SQUARE_ROOT,
+    "OP_FABS": Opcode.ABSOLUTE,
+    "OP_SIGN": Opcode.SIGN,
+    "OP_FLOOR": Opcode.FLOOR,
+    "OP_CEIL": Opcode.CEILING,
+    "OP_FMIN": Opcode.MINIMUM,
+    "OP_FMAX": Opcode.MAXIMUM,
+    "OP_COPYSIGN": Opcode.COPY_SIGN,
+    "OP_FMOD": Opcode.MODULO,
+    "OP_REMAINDER": Opcode.REMAINDER,
+    "OP_LT": Opcode.LESS,
+    "OP_LE": Opcode.LESS_EQUAL,
+    "OP_EQ": Opcode.EQUAL,
+    "OP_NE": Opcode.NOT_EQUAL,
+    "OP_NOT": Opcode.NOT,
+    "OP_AND": Opcode.AND,
+    "OP_OR": Opcode.OR,
+    "OP_SIN": Opcode.SIN,
+    "OP_COS": Opcode.COS,
+    "OP_TAN": Opcode.TAN,
+    "OP_ASIN": Opcode.ASIN,
+    "OP_ACOS": Opcode.ACOS,
+    "OP_ATAN": Opcode.ATAN,
+    "OP_ATAN2": Opcode.ATAN2,
+    "OP_SINH": Opcode.SINH,
+    "OP_COSH": Opcode.COSH,
+    "OP_TANH": Opcode.TANH,
+    "OP_ASINH": Opcode.ASINH,
+    "OP_ACOSH": Opcode.ACOSH,
+    "OP_ATANH": Opcode.ATANH,
+    "OP_EXP": Opcode.EXP,
+    "OP_EXPM1": Opcode.EXPM1,
+    "OP_LOG": Opcode.LOG,
+    "OP_LOG1P": Opcode.LOG1P,
+    "OP_POW": Opcode.POWER,
+    "OP_CONSTPOW": Opcode.POWER,
+    "OP_HYPOT": Opcode.HYPOT,
+    "OP_ERF": Opcode.ERF,
+}
+_NAMES: dict[int, str] = {
+    int(number): name
+    for name, number in vars(casadi).items()
+    if name.startswith("OP_") and isinstance(number, int)
+}
+_OPCODES = {number: _SAME[name] for number, name in _NAMES.items() if name in _SAME}
+
+
+def tape_from(traced: TracedFunction) -> Tape:
+    """The tape of a traced function.
+
+    Raises :class:`CompileError` naming the operation, if the graph has one that tapes do not know.
+    """
+    function = traced.casadi_function()
+    builder = TapeBuilder([slot.size for slot in traced.inputs])
+    outputs = [[builder.constant(0.0)] * slot.size for slot in traced.outputs]
+    places = [function.sparsity_out(k).row() for k in range(len(outputs))]
+    work = [-1] * function.sz_w()  # handle of the value that each work slot holds now
+    for k in range(function.n_instructions()):
+        number = function.instruction_id(k)
+        if number == casadi.OP_OUTPUT:
+            slot, place = function.instruction_output(k)
+            outputs[slot][places[slot][place]] = work[function.instruction_input(k)[0]]
+        else:
+            work[function.instruction_output(k)[0]] = _translate(builder, function, k, work, traced.name)
+    return builder.build(outputs)
+
+
+def _translate(builder: TapeBuilder, function: Function, k: int, work: list[int], name: str) -> int:
+    number = function.instruction_id(k)
+    if number == casadi.OP_CONST:
+        return builder.constant(function.instruction_constant(k))
+    sources = function.instruction_input(k)
+    if number == casadi.OP_INPUT:
+        return builder.input(sources[0], sources[1])
+    operands = [work[source] for source in sources]
+    opcode = _OPCODES.get(number)
+    if opcode is not None:
+        return builder.add(opcode, *operands[: opcode.arity])
+    if number == casadi.OP_SQ:
+        return builder.add(Opcode.MULTIPLY, operands[0], operands[0])
+    if number == casadi.OP_TWICE:
+        return builder.add(Opcode.ADD, operands[0], operands[0])
+    if number == casadi.OP_INV:
+        return builder.add(Opcode.DIVIDE, builder.constant(1.0), operands[0])
+    if number == casadi.OP_IF_ELSE_ZERO:
+        return builder.add(Opcode.SELECT, operands[0], operands[1], builder.constant(0.0))
+    if number in (casadi.OP_ASSIGN, casadi.OP_LIFT):
+        return operands[0]
+    raise CompileError(
+        f"the equations use the operation {_NAMES.get(number, number)}",
+        where=name,
+        allowed="CasADi SX operations with a scalar meaning, such as +, sin, if_else",
+        fix="write it with other operations",
+    )

@@ -1,0 +1,189 @@
+"""A slow interpreter of tapes in NumPy: the second opinion on compiled code.
+
+It shares nothing with the code generator but the tape: arithmetic is NumPy's, and sin, exp and the others are
+NumPy's or the C library's own. Tapes without elementary functions give the same bits as compiled code when
+``fused`` is true, because fused multiply-adds are then rounded once, as the hardware does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.compiler.opcodes import Opcode
+from armblocks.compiler.tape import Tape
+from armblocks.errors import InputError
+
+Values = NDArray[np.float64]
+
+
+def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) -> list[Values]:
+    """Evaluate ``tape`` for samples.
+
+    ``inputs[k]`` has shape ``(..., size of slot k)``; the leading shapes broadcast against each other. Gives one
+    array ``(..., size)`` per output slot. With ``fused=False`` a multiply-add is rounded twice.
+    Raises :class:`InputError` when the count of inputs or the size of one is wrong.
+    """
+    arrays = [np.asarray(value, dtype=np.float64) for value in inputs]
+    found = tuple(array.shape[-1] if array.ndim else -1 for array in arrays)
+    if found != tape.input_sizes:
+        raise InputError(f"inputs of sizes {found}", allowed=f"sizes {tape.input_sizes} on the last axis")
+    lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    registers: list[Values] = []
+    for array in arrays:
+        registers += [np.broadcast_to(array[..., place], lead) for place in range(array.shape[-1])]
+    registers += [np.full(lead, value) for value in tape.constants]
+    with np.errstate(all="ignore"):
+        for opcode, operands in tape.operations:
+            registers.append(evaluate(opcode, [registers[operand] for operand in operands], fused=fused))
+    return [
+        np.stack([registers[register] for register in slot], axis=-1) if slot else np.empty((*lead, 0))
+        for slot in tape.outputs
+    ]
+
+
+def evaluate(opcode: Opcode, values: Sequence[Values], *, fused: bool = True) -> Values:
+    """One operation on arrays of equal shape."""
+    if opcode in (Opcode.FMA, Opcode.FMS, Opcode.FNMA):
+        a, b, c = values
+        a = -a if opcode is Opcode.FNMA else a
+        c = -c if opcode is Opcode.FMS else c
+        return multiply_add(a, b, c) if fused else a * b + c
+    return np.asarray(_RULES[opcode](*values), dtype=np.float64)
+
+
+def multiply_add(a: Values, b: Values, c: Values) -> Values:
+    """``a b + c`` rounded once.
+
+    Where no partial result can leave the range of normal numbers: the product and the sum without error
+    (Dekker 1971, Knuth), the rest added with rounding to odd (Boldo and Melquiond, "Emulation of FMA and
+    correctly rounded sums", IEEE Trans. Computers 57, 2008, section 3). Elsewhere by exact fractions.
+    """
+    product, product_error = _two_product(a, b)
+    high, low = _two_sum(product, c)
+    rest, rest_error = _two_sum(product_error, low)
+    # Round to odd: if the sum was inexact and its last bit is even, step towards the error.
+    even = (rest.view(np.int64) & 1) == 0
+    target = np.where(rest_error > 0.0, np.inf, -np.inf)
+    odd = np.where((rest_error != 0.0) & even, np.nextafter(rest, target), rest)
+    result = np.asarray(high + odd)
+    size = [np.abs(value) for value in (a, b, c, product)]
+    tame = np.all([(value < 1e250) & ((value > 1e-250) | (value == 0.0)) for value in size], axis=0)
+    # An exactly cancelled sum, and a product of zero, have signs that the splitting may lose.
+    tame &= (product != 0.0) & (result != 0.0)
+    for place in zip(*np.nonzero(np.atleast_1d(~tame))):
+        at = place if result.ndim else ()
+        result[at] = _exact_multiply_add(float(a[at]), float(b[at]), float(c[at]))
+    return result
+
+
+def _two_product(a: Values, b: Values) -> tuple[Values, Values]:
+    def split(x: Values) -> tuple[Values, Values]:
+        scaled = 134217729.0 * x
+        high = scaled - (scaled - x)
+        return high, x - high
+
+    product = a * b
+    (ah, al), (bh, bl) = split(a), split(b)
+    return product, al * bl - (((product - ah * bh) - al * bh) - ah * bl)
+
+
+def _two_sum(a: Values, b: Values) -> tuple[Values, Values]:
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
+
+
+def _exact_multiply_add(a: float, b: float, c: float) -> float:
+    if not (math.isfinite(a) and math.isfinite(b) and math.isfinite(c)):
+        return c if math.isfinite(a) and math.isfinite(b) else a * b + c
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    if exact == 0:
+        return a * b + c if a == 0.0 or b == 0.0 or c == 0.0 else 0.0
+    try:
+        rounded = float(exact)
+    except OverflowError:
+        rounded = math.inf
+    return math.copysign(rounded, exact)
+
+
+def _condition(value: Values) -> NDArray[np.bool_]:
+    return value != 0.0
+
+
+def _minimum(a: Values, b: Values) -> Values:
+    return np.where(np.isnan(a) | (a < b), a, b)
+
+
+def _maximum(a: Values, b: Values) -> Values:
+    return np.where(np.isnan(a) | (a > b), a, b)
+
+
+def _sign(a: Values) -> Values:
+    return np.where(a > 0.0, 1.0, np.where(a < 0.0, -1.0, a))
+
+
+def _remainder(a: Values, b: Values) -> Values:
+    def scalar(x: float, y: float) -> float:
+        try:
+            return math.remainder(x, y)
+        except ValueError:  # an infinite dividend or a zero divisor
+            return math.nan
+
+    return np.vectorize(scalar, otypes=[np.float64])(a, b)
+
+
+def _per_sample(function: Callable[[float], float]) -> Callable[[Values], Values]:
+    return np.vectorize(function, otypes=[np.float64])
+
+
+_RULES: dict[Opcode, Callable[..., Any]] = {
+    Opcode.ADD: np.add,
+    Opcode.SUBTRACT: np.subtract,
+    Opcode.MULTIPLY: np.multiply,
+    Opcode.DIVIDE: np.divide,
+    Opcode.NEGATE: np.negative,
+    Opcode.SQUARE_ROOT: np.sqrt,
+    Opcode.ABSOLUTE: np.abs,
+    Opcode.SIGN: _sign,
+    Opcode.FLOOR: np.floor,
+    Opcode.CEILING: np.ceil,
+    Opcode.MINIMUM: _minimum,
+    Opcode.MAXIMUM: _maximum,
+    Opcode.COPY_SIGN: np.copysign,
+    Opcode.MODULO: np.fmod,
+    Opcode.REMAINDER: _remainder,
+    Opcode.LESS: np.less,
+    Opcode.LESS_EQUAL: np.less_equal,
+    Opcode.EQUAL: np.equal,
+    Opcode.NOT_EQUAL: np.not_equal,
+    Opcode.NOT: lambda a: a == 0.0,
+    Opcode.AND: lambda a, b: _condition(a) & _condition(b),
+    Opcode.OR: lambda a, b: _condition(a) | _condition(b),
+    Opcode.SELECT: lambda c, a, b: np.where(_condition(c), a, b),
+    Opcode.SIN: np.sin,
+    Opcode.COS: np.cos,
+    Opcode.TAN: np.tan,
+    Opcode.ASIN: np.arcsin,
+    Opcode.ACOS: np.arccos,
+    Opcode.ATAN: np.arctan,
+    Opcode.ATAN2: np.arctan2,
+    Opcode.SINH: np.sinh,
+    Opcode.COSH: np.cosh,
+    Opcode.TANH: np.tanh,
+    Opcode.ASINH: np.arcsinh,
+    Opcode.ACOSH: np.arccosh,
+    Opcode.ATANH: np.arctanh,
+    Opcode.EXP: np.exp,
+    Opcode.EXPM1: np.expm1,
+    Opcode.LOG: np.log,
+    Opcode.LOG1P: np.log1p,
+    Opcode.POWER: np.power,
+    Opcode.HYPOT: np.hypot,
+    Opcode.ERF: _per_sample(math.erf),
+}

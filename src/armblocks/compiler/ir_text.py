@@ -1,0 +1,183 @@
+"""LLVM IR as text: a module that collects definitions, and the body of one function over one or more lanes.
+
+Text is written directly, because building IR objects costs many times the work of printing them. A
+:class:`Body` hides the number of lanes: ``body.add(a, b)`` is ``fadd double`` or ``fadd <8 x double>``. No
+fast-math flag is ever set and ``fma`` only stands where it was asked for, so the same operations give the
+same bits at every number of lanes.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+
+
+class Module:
+    """Definitions and declarations by symbol, each once."""
+
+    def __init__(self) -> None:
+        self._parts: dict[str, str] = {}
+
+    def add(self, symbol: str, text: str) -> None:
+        """Add the text that defines ``symbol``; a second text for the same symbol is left out."""
+        self._parts.setdefault(symbol, text)
+
+    def define(self, symbol: str, write: Callable[[], str]) -> None:
+        """Add what ``write`` gives, unless the symbol is there already; it may add others meanwhile."""
+        if symbol not in self._parts:
+            self._parts[symbol] = ""  # stands early, so that a definition is not asked for twice
+            self._parts[symbol] = write()
+
+    def declare(self, result: str, symbol: str, *arguments: str) -> None:
+        """Declare an external function or an intrinsic."""
+        self.add(symbol, f"declare {result} @{symbol}({', '.join(arguments)})")
+
+    @property
+    def text(self) -> str:
+        """The whole module, as LLVM reads it."""
+        return "\n\n".join(self._parts.values()) + "\n"
+
+
+def number_text(value: float) -> str:
+    """A double, exact, as LLVM writes it."""
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+
+
+class Body:
+    """Instructions of one function. Values are texts: names such as ``%v7`` or constants.
+
+    ``real`` is the type of numbers, ``word`` of 64-bit integers, ``bit`` of conditions.
+    """
+
+    def __init__(self, module: Module, lanes: int = 1) -> None:
+        self.module = module
+        self.lanes = lanes
+        self.real = self.type("double")
+        self.word = self.type("i64")
+        self.bit = self.type("i1")
+        self.lines: list[str] = []
+        self._count = 0
+
+    def type(self, scalar: str) -> str:
+        """The type of one ``scalar`` per lane."""
+        return scalar if self.lanes == 1 else f"<{self.lanes} x {scalar}>"
+
+    def do(self, instruction: str) -> None:
+        """An instruction without a result."""
+        self.lines.append(f"  {instruction}")
+
+    def let(self, instruction: str) -> str:
+        """An instruction with a result; gives its name."""
+        self._count += 1
+        name = f"%v{self._count}"
+        self.lines.append(f"  {name} = {instruction}")
+        return name
+
+    def label(self, name: str) -> None:
+        """Begin a basic block."""
+        self.lines.append(f"{name}:")
+
+    def fresh(self, stem: str) -> str:
+        """A name for a label that no other has."""
+        self._count += 1
+        return f"{stem}{self._count}"
+
+    def _splat(self, scalar: str, literal: str) -> str:
+        return literal if self.lanes == 1 else f"splat ({scalar} {literal})"
+
+    def number(self, value: float) -> str:
+        """A constant number, the same in all lanes."""
+        return self._splat("double", number_text(value))
+
+    def integer(self, value: int) -> str:
+        """A constant 64-bit integer, the same in all lanes."""
+        return self._splat("i64", str(value if value < 1 << 63 else value - (1 << 64)))
+
+    def broadcast(self, scalar: str) -> str:
+        """One double in all lanes."""
+        if self.lanes == 1:
+            return scalar
+        first = self.let(f"insertelement {self.real} poison, double {scalar}, i64 0")
+        return self.let(
+            f"shufflevector {self.real} {first}, {self.real} poison, <{self.lanes} x i32> zeroinitializer"
+        )
+
+    # Arithmetic, each rounded once.
+
+    def add(self, a: str, b: str) -> str:
+        """``a + b``."""
+        return self.let(f"fadd {self.real} {a}, {b}")
+
+    def subtract(self, a: str, b: str) -> str:
+        """``a - b``."""
+        return self.let(f"fsub {self.real} {a}, {b}")
+
+    def multiply(self, a: str, b: str) -> str:
+        """``a b``."""
+        return self.let(f"fmul {self.real} {a}, {b}")
+
+    def divide(self, a: str, b: str) -> str:
+        """``a / b``."""
+        return self.let(f"fdiv {self.real} {a}, {b}")
+
+    def negate(self, a: str) -> str:
+        """``-a``."""
+        return self.let(f"fneg {self.real} {a}")
+
+    def fma(self, a: str, b: str, c: str) -> str:
+        """``a b + c``, rounded once."""
+        return self.intrinsic("fma", a, b, c)
+
+    def intrinsic(self, name: str, *operands: str) -> str:
+        """``llvm.<name>`` of doubles."""
+        suffix = "f64" if self.lanes == 1 else f"v{self.lanes}f64"
+        symbol = f"llvm.{name}.{suffix}"
+        self.module.declare(self.real, symbol, *[self.real] * len(operands))
+        return self.let(f"call {self.real} @{symbol}({', '.join(f'{self.real} {x}' for x in operands)})")
+
+    def absolute(self, a: str) -> str:
+        """``|a|``."""
+        return self.intrinsic("fabs", a)
+
+    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
+        """Horner's rule; coefficients from the constant term upwards."""
+        result = self.number(coefficients[-1])
+        for coefficient in reversed(coefficients[:-1]):
+            result = self.fma(result, x, self.number(coefficient))
+        return result
+
+    # Conditions.
+
+    def compare(self, predicate: str, a: str, b: str) -> str:
+        """A condition by LLVM's predicate: ``olt``, ``ole``, ``oeq``, ``une``, ``uno`` …"""
+        return self.let(f"fcmp {predicate} {self.real} {a}, {b}")
+
+    def select(self, condition: str, yes: str, no: str) -> str:
+        """``yes`` where the condition holds, else ``no``."""
+        return self.let(f"select {self.bit} {condition}, {self.real} {yes}, {self.real} {no}")
+
+    def both(self, a: str, b: str) -> str:
+        """Conjunction of conditions."""
+        return self.let(f"and {self.bit} {a}, {b}")
+
+    def either(self, a: str, b: str) -> str:
+        """Disjunction of conditions."""
+        return self.let(f"or {self.bit} {a}, {b}")
+
+    # Bits.
+
+    def bits(self, a: str) -> str:
+        """The bits of a number as an integer."""
+        return self.let(f"bitcast {self.real} {a} to {self.word}")
+
+    def from_bits(self, a: str) -> str:
+        """The number that has these bits."""
+        return self.let(f"bitcast {self.word} {a} to {self.real}")
+
+    def word_op(self, operation: str, a: str, b: str) -> str:
+        """An integer operation: ``and``, ``xor``, ``add``, ``shl``, ``lshr`` …"""
+        return self.let(f"{operation} {self.word} {a}, {b}")
+
+    def word_test(self, predicate: str, a: str, b: str) -> str:
+        """An integer comparison: ``eq``, ``ne``, ``slt`` …"""
+        return self.let(f"icmp {predicate} {self.word} {a}, {b}")

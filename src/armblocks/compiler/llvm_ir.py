@@ -1,0 +1,200 @@
+"""Tapes as LLVM IR.
+
+For those who write native code around compiled equations (an integrator's loop)::
+
+    def write() -> str:
+        module = Module()
+        emit_function(module, tape, "f")      # define internal void @f(ptr in0, …, ptr out0, …)
+        module.add("loop", "define void @loop(…) { … call void @f(ptr %t, ptr %x, ptr %p, ptr %xd) … }")
+        return module.text
+
+    code = load_code(("loop", tape.digest), write)       # armblocks.compiler.native, with the disk cache
+    address = code.address("loop")
+
+Each pointer is to the flat ``double`` vector of one slot, as :class:`~armblocks.equations.Signature` lays it out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from armblocks.compiler import elementary
+from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.opcodes import COMPARISONS, Opcode
+from armblocks.compiler.tape import Tape
+
+LoadInput = Callable[[int], str]
+"""Gives the value of an input register, in all lanes."""
+
+
+def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "internal") -> None:
+    """Add ``void @name(ptr in0, …, ptr out0, …)``: one evaluation of the tape, one lane.
+
+    One pointer to flat doubles for each input slot, then one for each output slot, 8-byte aligned, in the
+    order of the signatures (``derivative``: ``t, x, p, xd``). Outputs must not overlap inputs or each other.
+    Slots of size 0 still have their pointer, which is not followed. Every output is written on each call.
+    ``linkage`` is ``internal`` for functions called within the module, or ``""`` (external) for functions
+    whose address is asked for.
+    """
+
+    def write() -> str:
+        body = Body(module)
+        arguments = [f"ptr noalias readonly %i{k}" for k in range(len(tape.input_sizes))]
+        arguments += [f"ptr noalias %o{k}" for k in range(len(tape.outputs))]
+        places = {
+            start + place: f"ptr %i{slot}, i64 {place}"
+            for slot, (start, size) in enumerate(zip(tape.input_starts, tape.input_sizes))
+            for place in range(size)
+        }
+
+        def load(register: int) -> str:
+            address = body.let(f"getelementptr inbounds double, {places[register]}")
+            return body.let(f"load double, ptr {address}, align 8")
+
+        registers = emit_operations(body, tape, load)
+        for slot, members in enumerate(tape.outputs):
+            for place, register in enumerate(members):
+                address = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {place}")
+                body.do(f"store double {registers.number(register)}, ptr {address}, align 8")
+        body.do("ret void")
+        head = f"define {linkage} void @{name}({', '.join(arguments)}) nounwind {{\nentry:\n"
+        return head + "\n".join(body.lines) + "\n}"
+
+    module.define(name, write)
+
+
+class Registers:
+    """The values of a tape's registers, as numbers or as conditions, whichever is asked for."""
+
+    def __init__(self, body: Body, tape: Tape, load: LoadInput) -> None:
+        self._body = body
+        self._tape = tape
+        self._load = load
+        self._numbers: dict[int, str] = {}
+        self._conditions: dict[int, str] = {}
+
+    def set_number(self, register: int, value: str) -> None:
+        """Write a register with a number."""
+        self._numbers[register] = value
+
+    def set_condition(self, register: int, value: str) -> None:
+        """Write a register with a condition: its number is 1.0 or 0.0."""
+        self._conditions[register] = value
+
+    def has_number(self, register: int) -> bool:
+        """Whether the register is written already."""
+        return register in self._numbers
+
+    def number(self, register: int) -> str:
+        """The register's number."""
+        value = self._numbers.get(register)
+        if value is None:
+            value = self._numbers[register] = self._make_number(register)
+        return value
+
+    def _make_number(self, register: int) -> str:
+        body, tape = self._body, self._tape
+        if register in self._conditions:
+            return body.select(self._conditions[register], body.number(1.0), body.number(0.0))
+        if register < tape.first_constant:
+            return self._load(register)
+        return body.number(tape.constants[register - tape.first_constant])
+
+    def condition(self, register: int) -> str:
+        """Whether the register is not equal to zero (a NaN is not)."""
+        value = self._conditions.get(register)
+        if value is None:
+            body = self._body
+            value = body.compare("une", self.number(register), body.number(0.0))
+            self._conditions[register] = value
+        return value
+
+
+def emit_operations(body: Body, tape: Tape, load: LoadInput) -> Registers:
+    """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read."""
+    registers = Registers(body, tape, load)
+    partners = _sine_cosine_pairs(tape)
+    for k, (opcode, operands) in enumerate(tape.operations):
+        target = tape.first_operation + k
+        if opcode in COMPARISONS:
+            registers.set_condition(target, _emit_comparison(body, registers, opcode, operands))
+        elif opcode is Opcode.SELECT:
+            condition = registers.condition(operands[0])
+            yes, no = registers.number(operands[1]), registers.number(operands[2])
+            registers.set_number(target, body.select(condition, yes, no))
+        elif target in partners:
+            if not registers.has_number(target):
+                pair = elementary.sine_cosine(body, registers.number(operands[0]))
+                for register, value in zip(partners[target], pair):
+                    registers.set_number(register, value)
+        else:
+            values = [registers.number(operand) for operand in operands]
+            registers.set_number(target, _emit_number(body, opcode, values))
+    return registers
+
+
+def _sine_cosine_pairs(tape: Tape) -> dict[int, tuple[int, int]]:
+    """Registers of sines and cosines of the same argument: both come from one reduction."""
+    found: dict[int, dict[Opcode, int]] = {}
+    for k, (opcode, operands) in enumerate(tape.operations):
+        if opcode in (Opcode.SIN, Opcode.COS):
+            found.setdefault(operands[0], {})[opcode] = tape.first_operation + k
+    pairs = [(pair[Opcode.SIN], pair[Opcode.COS]) for pair in found.values() if len(pair) == 2]
+    return {register: pair for pair in pairs for register in pair}
+
+
+_PREDICATES = {
+    Opcode.LESS: "olt",
+    Opcode.LESS_EQUAL: "ole",
+    Opcode.EQUAL: "oeq",
+    Opcode.NOT_EQUAL: "une",
+}
+
+
+def _emit_comparison(body: Body, registers: Registers, opcode: Opcode, operands: tuple[int, ...]) -> str:
+    if opcode is Opcode.NOT:
+        return body.compare("oeq", registers.number(operands[0]), body.number(0.0))
+    if opcode in (Opcode.AND, Opcode.OR):
+        left, right = (registers.condition(operand) for operand in operands)
+        return body.both(left, right) if opcode is Opcode.AND else body.either(left, right)
+    return body.compare(_PREDICATES[opcode], *(registers.number(operand) for operand in operands))
+
+
+def _emit_number(body: Body, opcode: Opcode, values: list[str]) -> str:
+    match opcode:
+        case Opcode.ADD:
+            return body.add(*values)
+        case Opcode.SUBTRACT:
+            return body.subtract(*values)
+        case Opcode.MULTIPLY:
+            return body.multiply(*values)
+        case Opcode.DIVIDE:
+            return body.divide(*values)
+        case Opcode.NEGATE:
+            return body.negate(values[0])
+        case Opcode.FMA:
+            return body.fma(*values)
+        case Opcode.FMS:
+            return body.fma(values[0], values[1], body.negate(values[2]))
+        case Opcode.FNMA:
+            return body.fma(body.negate(values[0]), values[1], values[2])
+        case Opcode.SQUARE_ROOT:
+            return body.intrinsic("sqrt", *values)
+        case Opcode.ABSOLUTE:
+            return body.absolute(*values)
+        case Opcode.FLOOR:
+            return body.intrinsic("floor", *values)
+        case Opcode.CEILING:
+            return body.intrinsic("ceil", *values)
+        case Opcode.COPY_SIGN:
+            return body.intrinsic("copysign", *values)
+        case Opcode.SIGN:
+            x, zero = values[0], body.number(0.0)
+            negative = body.select(body.compare("olt", x, zero), body.number(-1.0), x)
+            return body.select(body.compare("ogt", x, zero), body.number(1.0), negative)
+        case Opcode.MINIMUM | Opcode.MAXIMUM:
+            a, b = values
+            chosen = body.select(body.compare("olt" if opcode is Opcode.MINIMUM else "ogt", a, b), a, b)
+            return body.select(body.compare("uno", a, a), a, chosen)
+        case _:
+            return elementary.call(body, opcode, values)

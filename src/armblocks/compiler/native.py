@@ -1,0 +1,80 @@
+"""IR text to machine code in this process, through the disk cache."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from armblocks.compiler import cache
+from armblocks.compiler.target import Target, host_target
+
+if TYPE_CHECKING:
+    from llvmlite import binding as llvm
+
+_LOCK = threading.Lock()  # LLVM's global context is not for two threads at once
+
+
+class NativeCode:
+    """Loaded machine code. It stays in memory as long as this object lives."""
+
+    def __init__(self, engine: llvm.ExecutionEngine) -> None:
+        self._engine = engine
+
+    def address(self, symbol: str) -> int:
+        """Address of an external function or variable. Raises ``KeyError`` where there is none."""
+        with _LOCK:
+            address = self._engine.get_function_address(symbol) or self._engine.get_global_value_address(
+                symbol
+            )
+        if not address:
+            raise KeyError(symbol)
+        return address
+
+
+def load_code(key: Sequence[str], write: Callable[[], str]) -> NativeCode:
+    """Machine code of the module whose IR text ``write()`` gives.
+
+    ``key`` says which module it is (a variant's name, tape digests, options: all that the text depends on);
+    target and versions are added here. If the disk cache knows the key, ``write`` is not called.
+    """
+    target = host_target()
+    name = cache.object_name((*key, target.key))
+    code = cache.load_object(name)
+    if code is not None:
+        try:
+            return _link(code, target)
+        except RuntimeError:
+            pass  # an object that LLVM cannot read is made anew
+    code = compile_object(write(), target)
+    cache.store_object(name, code)
+    return _link(code, target)
+
+
+def compile_object(text: str, target: Target, *, jit: bool = True) -> bytes:
+    """Optimise IR text and give an object file for the target."""
+    from llvmlite import binding as llvm
+
+    with _LOCK:
+        machine = target.machine(jit=jit)
+        module = llvm.parse_assembly(text)
+        module.triple = target.triple
+        module.data_layout = str(machine.target_data)
+        module.verify()
+        tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+        tuning.slp_vectorization = False
+        tuning.loop_vectorization = False
+        tuning.loop_unrolling = False
+        builder = llvm.create_pass_builder(machine, tuning)
+        builder.getModulePassManager().run(module, builder)
+        return machine.emit_object(module)
+
+
+def _link(code: bytes, target: Target) -> NativeCode:
+    from llvmlite import binding as llvm
+
+    with _LOCK:
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.machine())
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+    return NativeCode(engine)

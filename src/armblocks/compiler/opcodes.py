@@ -1,0 +1,119 @@
+"""The operations of a tape: their names, how many operands they take, and what kind of work they are.
+
+Every operation works on IEEE 754 doubles and rounds to nearest. Where the sources differ, this is meant:
+
+* ``FMA a b c`` is ``a b + c`` rounded once, ``FMS`` is ``a b - c``, ``FNMA`` is ``c - a b``.
+* ``MINIMUM`` and ``MAXIMUM`` hand on a NaN of either operand (as ``numpy.minimum``; C's ``fmin`` and CasADi
+  would drop it, and a limiter would hide the first bad signal). Of two equal operands the second is given.
+* ``SIGN`` is -1, 1, or the operand itself where that is a zero or a NaN.
+* A comparison is 1.0 or 0.0; with a NaN all are 0.0 but ``NE``. A condition holds when it is not equal to zero,
+  so a NaN holds.
+* ``SELECT c a b`` is ``a`` where ``c`` holds, else ``b``; the value not chosen has no influence, be it NaN.
+* ``MODULO`` is C's ``fmod`` (sign of the dividend, exact); ``REMAINDER`` is IEEE's (nearest quotient, ties to
+  even, exact).
+* ``POWER`` follows C99: ``x**0`` and ``1**y`` are 1 even with NaN.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum, auto
+
+
+class Opcode(IntEnum):
+    """One operation. The numbers are part of the tape's digest: append only."""
+
+    ADD = auto()
+    SUBTRACT = auto()
+    MULTIPLY = auto()
+    DIVIDE = auto()
+    NEGATE = auto()
+    SQUARE_ROOT = auto()
+    FMA = auto()
+    FMS = auto()
+    FNMA = auto()
+    ABSOLUTE = auto()
+    SIGN = auto()
+    FLOOR = auto()
+    CEILING = auto()
+    MINIMUM = auto()
+    MAXIMUM = auto()
+    COPY_SIGN = auto()
+    MODULO = auto()
+    REMAINDER = auto()
+    LESS = auto()
+    LESS_EQUAL = auto()
+    EQUAL = auto()
+    NOT_EQUAL = auto()
+    NOT = auto()
+    AND = auto()
+    OR = auto()
+    SELECT = auto()
+    SIN = auto()
+    COS = auto()
+    TAN = auto()
+    ASIN = auto()
+    ACOS = auto()
+    ATAN = auto()
+    ATAN2 = auto()
+    SINH = auto()
+    COSH = auto()
+    TANH = auto()
+    ASINH = auto()
+    ACOSH = auto()
+    ATANH = auto()
+    EXP = auto()
+    EXPM1 = auto()
+    LOG = auto()
+    LOG1P = auto()
+    POWER = auto()
+    HYPOT = auto()
+    ERF = auto()
+
+    @property
+    def arity(self) -> int:
+        """Count of operands."""
+        return _ARITY.get(self, 1)
+
+
+COMMUTATIVE = frozenset(
+    {Opcode.ADD, Opcode.MULTIPLY, Opcode.EQUAL, Opcode.NOT_EQUAL, Opcode.AND, Opcode.OR, Opcode.HYPOT}
+)
+"""Operations whose two operands may change places without changing a bit of a result that is a number."""
+
+COMPARISONS = frozenset(
+    {Opcode.LESS, Opcode.LESS_EQUAL, Opcode.EQUAL, Opcode.NOT_EQUAL, Opcode.NOT, Opcode.AND, Opcode.OR}
+)
+"""Operations whose result is 1.0 or 0.0."""
+
+ELEMENTARY = frozenset(opcode for opcode in Opcode if opcode >= Opcode.SIN) | {
+    Opcode.MODULO,
+    Opcode.REMAINDER,
+}
+"""Operations that are worked out by a function of :mod:`armblocks.compiler.elementary`."""
+
+_ARITY = {
+    **dict.fromkeys((Opcode.FMA, Opcode.FMS, Opcode.FNMA, Opcode.SELECT), 3),
+    **dict.fromkeys(
+        (
+            Opcode.ADD,
+            Opcode.SUBTRACT,
+            Opcode.MULTIPLY,
+            Opcode.DIVIDE,
+            Opcode.MINIMUM,
+            Opcode.MAXIMUM,
+            Opcode.COPY_SIGN,
+            Opcode.MODULO,
+            Opcode.REMAINDER,
+            Opcode.LESS,
+            Opcode.LESS_EQUAL,
+            Opcode.EQUAL,
+            Opcode.NOT_EQUAL,
+            Opcode.AND,
+            Opcode.OR,
+            Opcode.ATAN2,
+            Opcode.POWER,
+            Opcode.HYPOT,
+        ),
+        2,
+    ),
+}

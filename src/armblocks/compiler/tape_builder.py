@@ -1,0 +1,227 @@
+"""Builds tapes: folds constants, finds common subexpressions, fuses multiply-adds, drops dead code.
+
+Only rewritings that give the same bits for every input (but the sign of a NaN) are made, with one exception
+that is made here once and for all machines: ``a b + c`` becomes one fused multiply-add where the product has
+no other use.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+
+import numpy as np
+
+from armblocks.compiler.opcodes import COMMUTATIVE, ELEMENTARY, Opcode
+from armblocks.compiler.tape import Operation, Tape
+
+_Node = tuple[Opcode, tuple[int, ...]]
+
+
+class TapeBuilder:
+    """Collects scalar operations and gives a checked, tidy :class:`Tape`.
+
+    Values are named by handles (integers) that the methods return. Handles are not registers.
+    """
+
+    def __init__(self, input_sizes: Sequence[int]) -> None:
+        self._input_sizes = tuple(input_sizes)
+        self._starts = [0, *np.cumsum(self._input_sizes).tolist()]
+        # None for an input, float for a constant, else the operation.
+        self._nodes: list[_Node | float | None] = [None] * self._starts[-1]
+        self._known: dict[_Node | bytes, int] = {}
+
+    def input(self, slot: int, place: int) -> int:
+        """The scalar at ``place`` of the flat input ``slot``."""
+        return self._starts[slot] + place
+
+    def constant(self, value: float) -> int:
+        """A number; equal bits give the same handle."""
+        return self._number(struct.pack("<d", value), float(value))
+
+    def _number(self, key: bytes | _Node, node: float | _Node) -> int:
+        handle = self._known.get(key)
+        if handle is None:
+            handle = self._known[key] = len(self._nodes)
+            self._nodes.append(node)
+        return handle
+
+    def add(self, opcode: Opcode, *operands: int) -> int:
+        """``opcode`` of the operands, simplified where that changes no bit."""
+        values = [self._nodes[operand] for operand in operands]
+        if opcode not in ELEMENTARY and all(isinstance(value, float) for value in values):
+            return self.constant(_fold(opcode, [value for value in values if isinstance(value, float)]))
+        simpler = self._simplify(opcode, operands)
+        if simpler is not None:
+            return simpler
+        if opcode in COMMUTATIVE and operands[0] > operands[1]:
+            operands = (operands[1], operands[0])
+        return self._number((opcode, operands), (opcode, operands))
+
+    def _simplify(self, opcode: Opcode, operands: tuple[int, ...]) -> int | None:
+        rules = {
+            Opcode.ADD: self._simplify_add,
+            Opcode.SUBTRACT: self._simplify_subtract,
+            Opcode.MULTIPLY: self._simplify_multiply,
+            Opcode.DIVIDE: self._simplify_divide,
+            Opcode.NEGATE: self._simplify_negate,
+            Opcode.SELECT: self._simplify_select,
+        }
+        rule = rules.get(opcode)
+        return rule(*operands) if rule else None
+
+    def _is(self, handle: int, opcode: Opcode) -> tuple[int, ...] | None:
+        node = self._nodes[handle]
+        return node[1] if isinstance(node, tuple) and node[0] is opcode else None
+
+    def _value(self, handle: int) -> float | None:
+        node = self._nodes[handle]
+        return node if isinstance(node, float) else None
+
+    def _simplify_add(self, a: int, b: int) -> int | None:
+        for x, y in ((a, b), (b, a)):
+            number = self._value(y)
+            if number == 0.0 and math.copysign(1.0, number) < 0.0:  # x + -0 is x; x + 0 is not when x is -0
+                return x
+            if negated := self._is(y, Opcode.NEGATE):
+                return self.add(Opcode.SUBTRACT, x, negated[0])
+        merged = self._merge_branches(a, b)
+        return self._merge_branches(b, a) if merged is None else merged
+
+    def _merge_branches(self, a: int, b: int) -> int | None:
+        """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0)."""
+        yes, no = self._is(a, Opcode.SELECT), self._is(b, Opcode.SELECT)
+        if yes is None or no is None or self._value(yes[2]) != 0.0 or self._value(no[2]) != 0.0:
+            return None
+        if self._is(no[0], Opcode.NOT) == (yes[0],):
+            return self.add(Opcode.SELECT, yes[0], yes[1], no[1])
+        return None
+
+    def _simplify_subtract(self, a: int, b: int) -> int | None:
+        number = self._value(b)
+        if number == 0.0 and math.copysign(1.0, number) > 0.0:
+            return a
+        if negated := self._is(b, Opcode.NEGATE):
+            return self.add(Opcode.ADD, a, negated[0])
+        return None
+
+    def _simplify_multiply(self, a: int, b: int) -> int | None:
+        for x, y in ((a, b), (b, a)):
+            number = self._value(y)
+            if number == 1.0:
+                return x
+            if number == -1.0:
+                return self.add(Opcode.NEGATE, x)
+            negated = self._is(x, Opcode.NEGATE)
+            if number is not None and negated:
+                return self.add(Opcode.MULTIPLY, negated[0], self.constant(-number))
+        left, right = self._is(a, Opcode.NEGATE), self._is(b, Opcode.NEGATE)
+        return self.add(Opcode.MULTIPLY, left[0], right[0]) if left and right else None
+
+    def _simplify_divide(self, a: int, b: int) -> int | None:
+        number = self._value(b)
+        if number is None or number == 0.0 or not math.isfinite(number):
+            return None
+        if number == 1.0:
+            return a
+        mantissa, exponent = math.frexp(number)
+        # The reciprocal of a power of two is exact, if it and the number are normal.
+        if abs(mantissa) == 0.5 and abs(exponent) < 1000:
+            return self.add(Opcode.MULTIPLY, a, self.constant(1.0 / number))
+        return None
+
+    def _simplify_negate(self, a: int) -> int | None:
+        if negated := self._is(a, Opcode.NEGATE):
+            return negated[0]
+        product = self._is(a, Opcode.MULTIPLY)
+        for x, y in ((product[0], product[1]), (product[1], product[0])) if product else ():
+            number = self._value(y)
+            if number is not None:
+                return self.add(Opcode.MULTIPLY, x, self.constant(-number))
+        return None
+
+    def _simplify_select(self, condition: int, yes: int, no: int) -> int | None:
+        number = self._value(condition)
+        if number is not None:
+            return yes if number != 0.0 else no
+        if yes == no:
+            return yes
+        if inverse := self._is(condition, Opcode.NOT):
+            return self.add(Opcode.SELECT, inverse[0], no, yes)
+        return None
+
+    def build(self, outputs: Sequence[Sequence[int]]) -> Tape:
+        """The tape that gives these handles, one sequence per output slot."""
+        nodes = self._fuse(outputs)
+        needed = _reachable(nodes, [handle for slot in outputs for handle in slot])
+        constants = [handle for handle in needed if isinstance(nodes[handle], float)]
+        computed = [handle for handle in needed if isinstance(nodes[handle], tuple)]
+        register = {handle: handle for handle in range(self._starts[-1])}
+        for handle in (*constants, *computed):
+            register[handle] = len(register)
+        operations: list[Operation] = []
+        for handle in computed:
+            node = nodes[handle]
+            assert isinstance(node, tuple)
+            operations.append(Operation(node[0], tuple(register[operand] for operand in node[1])))
+        numbers = [nodes[handle] for handle in constants]
+        return Tape(
+            input_sizes=self._input_sizes,
+            constants=tuple(number for number in numbers if isinstance(number, float)),
+            operations=tuple(operations),
+            outputs=tuple(tuple(register[handle] for handle in slot) for slot in outputs),
+        )
+
+    def _fuse(self, outputs: Sequence[Sequence[int]]) -> list[_Node | float | None]:
+        """Join each product of a single use with the sum that uses it."""
+        nodes = list(self._nodes)
+        wanted = [handle for slot in outputs for handle in slot]
+        uses = [0] * len(nodes)
+        for handle in wanted:
+            uses[handle] += 1
+        for handle in _reachable(nodes, wanted):
+            node = nodes[handle]
+            for operand in node[1] if isinstance(node, tuple) else ():
+                uses[operand] += 1
+
+        def product(handle: int) -> tuple[int, ...] | None:
+            node = nodes[handle]
+            single = uses[handle] == 1 and isinstance(node, tuple) and node[0] is Opcode.MULTIPLY
+            return node[1] if single and isinstance(node, tuple) else None
+
+        for handle, node in enumerate(nodes):
+            if not isinstance(node, tuple) or node[0] not in (Opcode.ADD, Opcode.SUBTRACT):
+                continue
+            a, b = node[1]
+            # Of two products the later one is fused: the earlier is ready sooner.
+            left, right = product(a), product(b)
+            if left and right:
+                left, right = (left, None) if a > b else (None, right)
+            if node[0] is Opcode.ADD and (left or right):
+                nodes[handle] = (Opcode.FMA, (*left, b)) if left else (Opcode.FMA, (*(right or ()), a))
+            elif left:
+                nodes[handle] = (Opcode.FMS, (*left, b))
+            elif right:
+                nodes[handle] = (Opcode.FNMA, (*right, a))
+        return nodes
+
+
+def _reachable(nodes: Sequence[_Node | float | None], wanted: Sequence[int]) -> list[int]:
+    """Handles that the wanted ones need, in order, without the inputs."""
+    used = bytearray(len(nodes))
+    for handle in wanted:
+        used[handle] = 1
+    for handle in range(len(nodes) - 1, -1, -1):
+        node = nodes[handle]
+        if used[handle] and isinstance(node, tuple):
+            for operand in node[1]:
+                used[operand] = 1
+    return [handle for handle, node in enumerate(nodes) if used[handle] and node is not None]
+
+
+def _fold(opcode: Opcode, values: list[float]) -> float:
+    from armblocks.compiler.interpret import evaluate
+
+    with np.errstate(all="ignore"):
+        return float(evaluate(opcode, [np.array([value]) for value in values])[0])
