@@ -1,0 +1,76 @@
+"""A pinhole camera with a shifted lens, framed so that given points fill a panel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+
+AZIMUTH = -58.0
+"""Degrees: the camera stands between +x and -y, as in textbooks' drawings of arms."""
+ELEVATION = 20.0
+"""Degrees above the horizon."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Camera:
+    """``axes`` rows: right, up, towards the viewer, world frame; ``eye`` m; px = scale X / depth + shift."""
+
+    axes: _Array
+    eye: _Array
+    scale: float
+    shift: tuple[float, float]
+
+    @classmethod
+    def framing(
+        cls,
+        points: _Array,
+        width: float,
+        height: float,
+        *,
+        margin: float = 12.0,
+        azimuth: float = AZIMUTH,
+        elevation: float = ELEVATION,
+        distance: float = 4.2,
+    ) -> Camera:
+        """The camera that shows ``points`` (N, 3) m as large as a panel of px less a margin allows.
+
+        It stands ``distance`` times the points' extent away: the perspective of a long lens.
+        """
+        a, e = math.radians(azimuth), math.radians(elevation)
+        back = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
+        right = np.array([-math.sin(a), math.cos(a), 0.0])
+        axes = np.stack([right, np.cross(back, right), back])
+        low, high = points.min(axis=0), points.max(axis=0)
+        extent = max(float(np.linalg.norm(high - low)), 1e-9)
+        eye = (low + high) / 2 + distance * extent * back
+        plain = cls(axes=axes, eye=eye, scale=1.0, shift=(0.0, 0.0))
+        x, y, _ = plain.project(points)
+        scale = min(
+            (width - 2 * margin) / max(float(np.ptp(x)), 1e-9),
+            (height - 2 * margin) / max(float(np.ptp(y)), 1e-9),
+        )
+        shift = (
+            width / 2 - scale * float(x.min() + x.max()) / 2,
+            height / 2 - scale * float(y.min() + y.max()) / 2,
+        )
+        return cls(axes=axes, eye=eye, scale=scale, shift=shift)
+
+    def project(self, points: _Array) -> tuple[_Array, _Array, _Array]:
+        """Px to the right, px downwards, and 1/depth (1/m, larger is nearer) of points (..., 3)."""
+        local = (points - self.eye) @ self.axes.T
+        nearness = -1.0 / local[..., 2]
+        return (
+            self.scale * local[..., 0] * nearness + self.shift[0],
+            -self.scale * local[..., 1] * nearness + self.shift[1],
+            nearness,
+        )
+
+    def flat(self, points: _Array) -> _Array:
+        """Px (..., 2) of points (..., 3)."""
+        x, y, _ = self.project(points)
+        return np.stack([x, y], axis=-1)

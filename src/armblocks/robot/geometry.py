@@ -1,0 +1,287 @@
+"""What a robot looks like: the links' own shapes, or castings made from the kinematics.
+
+A link without ``geometry`` gets a body that follows its joint axes. From the joint that carries the link the
+body runs along that axis to the common normal of the two axes, along the normal, and along the next axis to
+the next joint: for a standard D-H row these are d and a, so that the drawing is the table made visible.
+Each joint that turns gets a motor drum, each that slides a rail and a carriage, the tip a flange.
+
+The sizes are a matter of looks alone; nothing here enters the dynamics.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.robot.link import Link
+from armblocks.robot.robot import Robot
+from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Pose, Shape, Sphere
+from armblocks.robot.triangles import TriangleMesh, triangles
+
+_Array = NDArray[np.float64]
+
+_BASE_RADIUS = 0.06  # of the reach: the drum of the first joint
+_TAPER = 0.82  # each joint's drum against the one before
+_SMALLEST = 0.45  # of the first drum: wrists stay visible
+_NEGLIGIBLE = 0.02  # of a drum's radius: shorter pieces are not drawn
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Body:
+    """One mesh and the frame it moves with: ``row`` of ``link_poses`` (0 the base, then the links)."""
+
+    row: int
+    mesh: TriangleMesh
+
+
+def robot_bodies(robot: Robot) -> tuple[Body, ...]:
+    """Everything that is drawn of a robot, each mesh in the frame of its row of ``link_poses``."""
+    return tuple(
+        Body(row=row, mesh=triangles(shape))
+        for row, shapes in enumerate(robot_shapes(robot))
+        for shape in shapes
+    )
+
+
+@lru_cache(maxsize=32)
+def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
+    """The shapes of base, every link, and tool: as many rows as ``link_poses`` has."""
+    plan = _Plan.of(robot)
+    rows: list[list[Shape]] = [_base_shapes(robot, plan)]
+    for link in robot.links:
+        made = _link_shapes(robot, link, plan)
+        rows.append(list(link.geometry) if link.geometry is not None else made)
+    rows.append([])
+    # The rail that a sliding joint runs on belongs to what carries the joint.
+    row_of = {link.name: row for row, link in enumerate(robot.links, start=1)}
+    for link in robot.links:
+        carrier = row_of[link.parent] if link.parent is not None else 0
+        if link.joint.slide and link.geometry is None:
+            rows[carrier].append(_rail(link, plan))
+    return tuple(tuple(shapes) for shapes in rows)
+
+
+@lru_cache(maxsize=32)
+def reach(robot: Robot) -> float:
+    """An upper bound of the distance from base to tip with sliding joints at rest, m; at least 0.1."""
+    length: dict[str, float] = {}
+    for link in robot.links:
+        own = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
+        if link.joint.slide and link.joint.limits.position:
+            own += max(abs(value + link.joint.offset) for value in link.joint.limits.position)
+        length[link.name] = own + (length[link.parent] if link.parent is not None else 0.0)
+    return max(0.1, *length.values()) + math.hypot(*robot.tool.translation)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Sizes that links must agree on: the drum radius of every joint by link name, and who carries whom."""
+
+    radius: dict[str, float]
+    children: dict[str | None, list[Link]]
+    reach: float
+
+    @classmethod
+    def of(cls, robot: Robot) -> _Plan:
+        size = reach(robot)
+        first = _BASE_RADIUS * size
+        children: dict[str | None, list[Link]] = {}
+        depth: dict[str | None, int] = {None: 0}
+        radius: dict[str, float] = {}
+        for link in robot.links:
+            children.setdefault(link.parent, []).append(link)
+            depth[link.name] = depth[link.parent] + (1 if link.joint.moves else 0)
+            joints_before = depth[link.parent] if link.joint.moves else max(depth[link.parent] - 1, 0)
+            radius[link.name] = first * max(_TAPER**joints_before, _SMALLEST)
+        return cls(radius, children, size)
+
+
+def _unit(vector: _Array) -> _Array:
+    return vector / max(float(np.linalg.norm(vector)), 1e-300)
+
+
+def _aligned(origin: _Array, z: _Array, x_hint: _Array | None = None) -> Pose:
+    """A frame at ``origin`` with its z axis along ``z`` and x as near to ``x_hint`` as that allows."""
+    z = _unit(z)
+    hint = np.zeros(3) if x_hint is None else x_hint - (x_hint @ z) * z
+    if np.linalg.norm(hint) < 1e-6:
+        hint = np.eye(3)[int(np.argmin(np.abs(z)))]
+        hint = hint - (hint @ z) * z
+    x = _unit(hint)
+    T = np.eye(4)
+    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, np.cross(z, x), z, origin
+    a, b, c, d = ((float(r[0]), float(r[1]), float(r[2]), float(r[3])) for r in T)
+    return (a, b, c, d)
+
+
+def _body_path(start: _Array, start_axis: _Array, end: _Array, end_axis: _Array) -> list[_Array]:
+    """Corner points from joint to joint: along the first axis, the common normal, the second axis."""
+    across = np.cross(start_axis, end_axis)
+    between = end - start
+    square = float(across @ across)
+    if square < 1e-9:  # parallel axes: the normal may stand anywhere; go along the first axis first
+        foot = start + (between @ start_axis) * start_axis
+        return [start, foot, end, end]
+    s = float(np.cross(between, end_axis) @ across) / square
+    t = float(np.cross(between, start_axis) @ across) / square
+    return [start, start + s * start_axis, end + t * end_axis, end]
+
+
+def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
+    """The casting of one link, with the drum of the joint that carries it."""
+    T = link.after.inverse().matrix
+    start, axis = T[:3, 3], T[:3, :3] @ np.array(link.joint.axis)
+    r = plan.radius[link.name]
+    shapes: list[Shape] = []
+    if link.joint.turn:
+        shapes += _drum(start, axis, r)
+    elif link.joint.slide:
+        side = 1.7 * r
+        shapes.append(Box(size=(side, side, 1.3 * side), pose=_aligned(start, axis)))
+    children = plan.children.get(link.name, [])
+    for child in children:
+        end = np.array(child.before.translation)
+        end_axis = child.before.R @ np.array(child.joint.axis)
+        shapes += _casting(start, axis, r, end, end_axis, plan.radius[child.name])
+    if not children:
+        shapes += _tip(robot, link, start, axis, r)
+    return shapes
+
+
+def _drum(centre: _Array, axis: _Array, r: float) -> list[Shape]:
+    """A motor drum on a joint axis: painted collar, graphite drum, steel cap on both ends."""
+    pose = _aligned(centre, axis)
+    return [
+        Cylinder(radius=r, length=1.25 * r, bevel=0.08 * r, pose=pose),
+        Cylinder(radius=0.86 * r, length=2.0 * r, bevel=0.14 * r, material=Material.JOINT, pose=pose),
+        Cylinder(radius=0.38 * r, length=2.12 * r, bevel=0.05 * r, material=Material.FLANGE, pose=pose),
+    ]
+
+
+def _casting(
+    start: _Array, start_axis: _Array, r0: float, end: _Array, end_axis: _Array, r1: float
+) -> list[Shape]:
+    """Tapered housings along the body path, a rounded elbow at each corner."""
+    corners = _body_path(start, start_axis, end, end_axis)
+    lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(corners)]
+    total = sum(lengths)
+    shapes: list[Shape] = []
+    done = 0.0
+    for index, (a, b, length) in enumerate(zip(corners, corners[1:], lengths)):
+        if length <= _NEGLIGIBLE * r1:
+            continue
+        w0 = r0 + (r1 - r0) * done / total
+        done += length
+        w1 = r0 + (r1 - r0) * done / total
+        along_axis = index != 1
+        thick0, thick1 = 0.74 * w0, 0.74 * w1
+        shapes.append(
+            Housing(
+                start=(0.62 * w0, 0.9 * w0) if not along_axis else (thick0, thick0),
+                end=(0.62 * w1, 0.86 * w1) if not along_axis else (thick1, thick1),
+                length=length,
+                roundness=1.0 if along_axis else 0.55,
+                pose=_aligned(a, b - a, start_axis),
+            )
+        )
+        if done < total - _NEGLIGIBLE * r1:
+            shapes.append(Sphere(radius=0.8 * w1, pose=_aligned(b, b - a)))
+    return shapes
+
+
+def _tip(robot: Robot, link: Link, start: _Array, axis: _Array, r: float) -> list[Shape]:
+    """The last casting of a branch with its flange, and the tool's shaft if this is the robot's tip."""
+    end = np.zeros(3)
+    outward = np.array([0.0, 0.0, 1.0])
+    shapes = _casting(start, axis, r, end, outward, 0.8 * r)
+    if np.linalg.norm(end - start) < r:
+        # All axes meet in the wrist: the flange would be hidden in it, so it stands off a little.
+        shapes.append(
+            Housing(
+                start=(0.6 * r, 0.6 * r),
+                end=(0.5 * r, 0.5 * r),
+                length=1.5 * r,
+                roundness=1.0,
+                material=Material.JOINT,
+                pose=_aligned(end, outward),
+            )
+        )
+        end = end + 1.5 * r * outward
+    # Where the last body already runs along the flange's axis the drum closes it, elsewhere it is a hub.
+    shapes += [
+        Cylinder(
+            radius=0.72 * r,
+            length=0.5 * r,
+            bevel=0.08 * r,
+            material=Material.JOINT,
+            pose=_aligned(end, outward),
+        ),
+        Cylinder(
+            radius=0.56 * r,
+            length=0.72 * r,
+            bevel=0.05 * r,
+            material=Material.FLANGE,
+            pose=_aligned(end, outward),
+        ),
+    ]
+    tool = np.array(robot.tool.translation)
+    length = float(np.linalg.norm(tool - end))
+    if link is robot.links[-1] and np.linalg.norm(tool) > 0 and length > 0:
+        shapes.append(
+            Housing(
+                start=(0.26 * r, 0.26 * r),
+                end=(0.14 * r, 0.14 * r),
+                length=length,
+                roundness=1.0,
+                material=Material.FLANGE,
+                pose=_aligned(end, tool - end),
+            )
+        )
+    return shapes
+
+
+def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
+    """A foot under each joint that stands on the base, and a beam to those that stand aside."""
+    shapes: list[Shape] = []
+    for link in plan.children.get(None, []):
+        r = plan.radius[link.name]
+        foot = np.array(link.before.translation)
+        axis = link.before.R @ np.array(link.joint.axis)
+        if np.linalg.norm(foot) > r:
+            shapes += _casting(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.1 * r, foot, axis, r)
+        upright = np.array([0.0, 0.0, 1.0])
+        shapes.append(
+            Housing(
+                start=(1.45 * r, 1.45 * r),
+                end=(1.12 * r, 1.12 * r),
+                length=0.75 * r,
+                roundness=1.0,
+                material=Material.BASE,
+                pose=_aligned(-1.0 * r * upright, upright),
+            )
+        )
+        shapes.append(
+            Cylinder(
+                radius=1.6 * r,
+                length=0.16 * r,
+                bevel=0.04 * r,
+                material=Material.BASE,
+                pose=_aligned(-1.08 * r * upright, upright),
+            )
+        )
+    return shapes
+
+
+def _rail(link: Link, plan: _Plan) -> Shape:
+    """The guide of a sliding joint over its whole range, in the frame of what carries the joint."""
+    r = plan.radius[link.name]
+    low, high = link.joint.limits.position or (0.0, 0.3 * plan.reach)
+    low, high = low + link.joint.offset - 1.2 * r, high + link.joint.offset + 1.2 * r
+    axis = link.before.R @ np.array(link.joint.axis)
+    centre = np.array(link.before.translation) + axis * (low + high) / 2
+    return Box(size=(0.9 * r, 0.9 * r, high - low), material=Material.JOINT, pose=_aligned(centre, axis))
