@@ -1,0 +1,231 @@
+"""From the characters of a script to tokens.
+
+MATLAB's own difficulties are settled here: the quote that is a transpose after an operand and a string
+elsewhere, line continuation, block comments, newlines that end a statement outside brackets and a row
+inside them, and command syntax (``clear L``). One tolerance goes beyond MATLAB, for statements that were
+broken over lines on a printed page: a line that cannot end where it ends (after ``=`` or an operator) goes
+on, and a line that starts with ``=`` belongs to the one before. MATLAB rejects both, so no script that
+MATLAB accepts is read differently.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import re
+from dataclasses import dataclass
+
+from armblocks.formats.matlab.source import Place, Source
+
+
+class Kind(enum.Enum):
+    """What a token is."""
+
+    NUMBER = "number"
+    NAME = "name"
+    STRING = "string"
+    OPERATOR = "operator"
+    ROW = "end of row"
+    """A newline right inside ``[ ]`` or ``{ }``."""
+    END = "end of statement"
+    COMMAND = "command"
+    EOF = "end of file"
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """One token; ``spaced`` says whether blanks stand before it, which matters inside matrices."""
+
+    kind: Kind
+    text: str
+    line: int
+    spaced: bool = False
+    number: float = 0.0
+
+
+COMMANDS = ("clear", "clearvars", "clc", "close", "format", "more")
+"""Words that MATLAB scripts use in command syntax; all but the first two do nothing here."""
+
+_NUMBER = re.compile(r"(?:[0-9]+(?:\.(?![*/\\^'])[0-9]*)?|\.[0-9]+)(?:[eEdD][+-]?[0-9]+)?")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_LOGIC = ("==", "~=", "!=", "<=", ">=", "&&", "||", "<", ">", "&", "|", "~", "!")
+_OPERATORS = (*_LOGIC, ".*", "./", ".\\", ".^", ".'", *"=+-*/\\^'()[]{},;:.@")
+_UNFINISHED = frozenset(("=", "+", "-", "*", "/", "\\", "^", ".*", "./", ".\\", ".^", ",", "(", ":"))
+"""Operators after which no statement can end."""
+_CLOSING = {"(": ")", "[": "]", "{": "}"}
+
+
+def tokenize(source: Source) -> list[Token]:
+    """All tokens of a script, with an END after every statement and an EOF at the end.
+
+    Raises ``FormatError`` at characters, numbers and strings that MATLAB does not know or that are not
+    supported, and at brackets that do not match.
+    """
+    return _Lexer(source).run()
+
+
+class _Lexer:
+    """Walks over the lines once; ``brackets`` holds the open brackets and their lines."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.tokens: list[Token] = []
+        self.brackets: list[tuple[str, int]] = []
+        self.comment_starts: list[int] = []
+
+    def run(self) -> list[Token]:
+        for number, text in enumerate(self.source.lines, start=1):
+            if self._block_comment(number, text):
+                continue
+            if not self._line(number, text):
+                self._newline(number)
+        if self.comment_starts:
+            raise self._at(self.comment_starts[-1]).error(
+                "the block comment is never closed", allowed="%{ … %}, each on a line of its own"
+            )
+        if self.brackets:
+            bracket, line = self.brackets[-1]
+            raise self._at(line).error(
+                f"'{bracket}' is never closed", allowed="brackets in pairs", fix=f"add '{_CLOSING[bracket]}'"
+            )
+        last = len(self.source.lines)
+        self.tokens += [Token(Kind.END, "\n", last), Token(Kind.EOF, "", last)]
+        return self.tokens
+
+    def _at(self, line: int) -> Place:
+        return self.source.place(line)
+
+    def _block_comment(self, number: int, text: str) -> bool:
+        """Whether the line belongs to a block comment ``%{ … %}``; they nest."""
+        word = text.strip()
+        if word == "%{":
+            self.comment_starts.append(number)
+            return True
+        if self.comment_starts:
+            if word == "%}":
+                self.comment_starts.pop()
+            return True
+        return False
+
+    def _line(self, number: int, text: str) -> bool:
+        """Read one line; true where it ends in a continuation ``...``."""
+        position = 0
+        spaced = True
+        while position < len(text):
+            rest = text[position]
+            if rest in " \t\f\v\u00a0":
+                position, spaced = position + 1, True
+                continue
+            if rest == "%":
+                return False
+            if text.startswith("...", position):
+                return True
+            position = self._token(number, text, position, spaced)
+            spaced = False
+        return False
+
+    def _token(self, number: int, text: str, position: int, spaced: bool) -> int:
+        """Read one token and return where the next one starts."""
+        character = text[position]
+        if (found := _NUMBER.match(text, position)) is not None:
+            return self._number(number, text, found, spaced)
+        if (found := _NAME.match(text, position)) is not None:
+            if found.group() in COMMANDS and self._starts_statement():
+                after = text[found.end() :].lstrip()
+                if not after.startswith("(") and not re.match(r"=(?!=)", after):
+                    return self._command(number, text, position)
+            self.tokens.append(Token(Kind.NAME, found.group(), number, spaced))
+            return found.end()
+        if character == '"' or (character == "'" and not self._is_transpose(spaced)):
+            return self._string(number, text, position, spaced)
+        for operator in _OPERATORS:
+            if text.startswith(operator, position):
+                self._operator(number, operator, spaced)
+                return position + len(operator)
+        raise self._at(number).error(f"the character {character!r} means nothing in MATLAB outside strings")
+
+    def _number(self, line: int, text: str, found: re.Match[str], spaced: bool) -> int:
+        after = text[found.end() : found.end() + 1]
+        if after.isalnum() or after == "_":
+            word = re.match(r"[\w.]+", text[found.start() :])
+            raise self._at(line).error(
+                f"'{word.group() if word else after}' is not a number",
+                allowed="numbers such as 12, .5, 1.8e-3",
+            )
+        value = float(found.group().translate(str.maketrans("dD", "ee")))
+        if math.isinf(value):
+            raise self._at(line).error(
+                f"the number {found.group()} is too large", allowed="magnitudes below 1.8e308"
+            )
+        self.tokens.append(Token(Kind.NUMBER, found.group(), line, spaced, value))
+        return found.end()
+
+    def _string(self, line: int, text: str, position: int, spaced: bool) -> int:
+        quote = text[position]
+        found = re.compile(f"{quote}((?:[^{quote}]|{quote}{quote})*){quote}").match(text, position)
+        if found is None:
+            raise self._at(line).error(
+                f"the string that {quote} starts is not closed on its line", allowed="'text' or \"text\""
+            )
+        self.tokens.append(Token(Kind.STRING, found.group(1).replace(quote * 2, quote), line, spaced))
+        return found.end()
+
+    def _command(self, line: int, text: str, position: int) -> int:
+        found = re.compile(r"[^;,%]*").match(text, position)
+        end = found.end() if found is not None else len(text)
+        self.tokens.append(Token(Kind.COMMAND, text[position:end].strip(), line))
+        return end
+
+    def _operator(self, line: int, operator: str, spaced: bool) -> None:
+        if operator in _LOGIC:
+            raise self._at(line).error(f"comparison and logic ('{operator}') are not supported")
+        if operator == "@":
+            raise self._at(line).error("function handles ('@') are not supported")
+        if operator in _CLOSING:
+            self.brackets.append((operator, line))
+        elif operator in (")", "]", "}"):
+            if not self.brackets or _CLOSING[self.brackets[-1][0]] != operator:
+                raise self._at(line).error(
+                    f"'{operator}' closes no bracket", allowed="brackets in pairs", fix="remove or match it"
+                )
+            self.brackets.pop()
+        elif operator in (";", ",") and not self.brackets:
+            self.tokens.append(Token(Kind.END, operator, line))
+            return
+        elif operator == "=" and self._starts_statement():
+            self._undo_newline()
+        self.tokens.append(Token(Kind.OPERATOR, operator, line, spaced))
+
+    def _newline(self, line: int) -> None:
+        last = self.tokens[-1] if self.tokens else None
+        if self.brackets and self.brackets[-1][0] in ("[", "{"):
+            self.tokens.append(Token(Kind.ROW, "\n", line))
+        elif last is not None and last.kind is Kind.OPERATOR and last.text in _UNFINISHED:
+            return  # the line cannot end here: it was broken on a printed page
+        elif self.brackets:
+            bracket, start = self.brackets[-1]
+            raise self._at(start).error(
+                f"'{bracket}' is not closed on its line",
+                allowed="a statement over several lines continues with '...'",
+                fix=f"add '{_CLOSING[bracket]}' or '...'",
+            )
+        else:
+            self.tokens.append(Token(Kind.END, "\n", line))
+
+    def _undo_newline(self) -> None:
+        """A line starts with ``=``: take back the newlines before it, as the statement was broken there."""
+        while self.tokens and self.tokens[-1].kind is Kind.END and self.tokens[-1].text == "\n":
+            self.tokens.pop()
+
+    def _starts_statement(self) -> bool:
+        return not self.tokens or self.tokens[-1].kind is Kind.END
+
+    def _is_transpose(self, spaced: bool) -> bool:
+        if not self.tokens:
+            return False
+        last = self.tokens[-1]
+        operand = last.kind in (Kind.NUMBER, Kind.NAME) or last.text in (")", "]", "}", "'", ".'")
+        if last.kind is Kind.STRING:
+            operand = False
+        in_matrix = bool(self.brackets) and self.brackets[-1][0] in ("[", "{")
+        return operand and not (in_matrix and spaced)

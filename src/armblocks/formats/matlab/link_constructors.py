@@ -1,0 +1,167 @@
+"""``link`` of releases up to 8; ``Link``, ``Revolute``, ``Prismatic`` and their MDH twins of 9 and later.
+
+A row of more than six numbers is a legacy DYN row in both: the first five, then
+``m rx ry rz Ixx Iyy Izz Ixy Iyz Ixz [Jm [G [B [Tc+ Tc-]]]]`` with offset 0. The first five stand in another
+order: ``alpha A theta D sigma`` for ``link``, ``theta d a alpha sigma`` for ``Link``.
+
+A gear ratio that a script does not give is 1, as the toolbox's manual says. (The code of releases 9 and 10
+leaves it 0, so that the motor's inertia and friction vanish without a word.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armblocks.formats.matlab.link_fields import inertia_from, set_link_field
+from armblocks.formats.matlab.records import LinkRecord, Release
+from armblocks.formats.matlab.source import Place
+from armblocks.formats.matlab.values import Array, Value, kind_of, text_of
+
+_COLUMNS = {
+    Release.UP_TO_8: ("alpha", "a", "theta", "d", "sigma", "offset"),
+    Release.FROM_9: ("theta", "d", "a", "alpha", "sigma", "offset"),
+}
+_SHORTEST_DYN, _LONGEST_DYN = 15, 20
+
+
+def link_from_row(
+    place: Place, release: Release, row: Sequence[float], *, modified: bool = False
+) -> LinkRecord:
+    """A link from 4 to 6 D-H numbers, or from a DYN row of 15 to 20. Raises ``FormatError``."""
+    columns = _COLUMNS[release]
+    count = len(row)
+    if not (4 <= count <= 6 or _SHORTEST_DYN <= count <= _LONGEST_DYN) or count == _LONGEST_DYN - 1:
+        order = " ".join(columns)
+        raise place.error(
+            f"a row of {count} numbers describes no link",
+            allowed=f"4 to 6 numbers {order}, or a legacy row with m r I Jm G B Tc behind the first 5: "
+            f"{_SHORTEST_DYN} to 18 or {_LONGEST_DYN} numbers",
+        )
+    link = LinkRecord(place=place, release=release, modified=modified)
+    kinematic = count if count <= 6 else 5
+    for name, number in zip(columns, row[:kinematic]):
+        set_link_field(place, link, name, np.array([[number]]))
+    if count <= 6:
+        return link
+    link.mass = 0.0
+    for name, part in (("m", row[5:6]), ("r", row[6:9])):
+        set_link_field(place, link, name, np.array([part]))
+    link.inertia = inertia_from(place, np.array([row[9:15]]))
+    for name, part in (("Jm", row[15:16]), ("G", row[16:17]), ("B", row[17:18]), ("Tc", row[18:20])):
+        if part:
+            set_link_field(place, link, name, np.array([part]))
+    return link
+
+
+def rows_of(array: Array) -> list[list[float]]:
+    """The rows of a D-H matrix as plain numbers."""
+    return [[float(number) for number in row] for row in array]
+
+
+def is_modified(place: Place, word: str) -> bool:
+    """The convention that a word names: the toolbox compares its first three letters."""
+    if word[:3] not in ("sta", "mod"):
+        raise place.error(f"'{word}' is no D-H convention", allowed="'standard' or 'modified'")
+    return word.startswith("mod")
+
+
+def make_link(place: Place, arguments: list[Value]) -> LinkRecord:
+    """``link([alpha A theta D sigma offset], convention)`` of releases up to 8."""
+    if len(arguments) == 1 and isinstance(arguments[0], LinkRecord):
+        return arguments[0].assigned()
+    if not 1 <= len(arguments) <= 2:
+        raise place.error(
+            f"link is called with {len(arguments)} arguments", allowed="link(row), link(row, convention)"
+        )
+    row = arguments[0]
+    if not isinstance(row, np.ndarray) or row.shape[0] != 1:
+        raise place.error(f"link is called with {kind_of(row)}", allowed="a row [alpha A theta D sigma]")
+    modified = len(arguments) == 2 and is_modified(place, text_of(place, arguments[1], "the convention"))
+    return link_from_row(place, Release.UP_TO_8, rows_of(row)[0], modified=modified)
+
+
+def _new_link(
+    place: Place,
+    arguments: list[Value],
+    *,
+    sigma: int | None = None,
+    modified: bool = False,
+    name: str = "Link",
+) -> LinkRecord:
+    """A link of releases 9 and later, from a row or from names and values.
+
+    Without a word on the joint, a given ``d`` makes it revolute and a given ``theta`` prismatic.
+    """
+    if sigma is None and arguments and isinstance(arguments[0], LinkRecord) and len(arguments) == 1:
+        return replace(arguments[0], place=place)
+    if sigma is None and arguments and isinstance(arguments[0], np.ndarray):
+        if arguments[0].shape[0] != 1 or len(arguments) > 2:
+            raise place.error(
+                f"{name} is called with {kind_of(arguments[0])} and {len(arguments) - 1} more",
+                allowed="Link([theta d a alpha sigma offset], convention)",
+            )
+        if len(arguments) == 2:
+            modified = is_modified(place, text_of(place, arguments[1], "the convention"))
+        return link_from_row(place, Release.FROM_9, rows_of(arguments[0])[0], modified=modified)
+    link = LinkRecord(place=place, release=Release.FROM_9, modified=modified, sigma=sigma or 0)
+    position, given = 0, set[str]()
+    while position < len(arguments):
+        key = text_of(place, arguments[position], f"argument {position + 1} of {name}")
+        position += 1
+        if key in ("revolute", "prismatic") and sigma is None:
+            given.add(key)
+            link.sigma = int(key == "prismatic")
+        elif key in ("standard", "modified"):
+            link.modified = key == "modified"
+        elif key in _KEYS:
+            if position == len(arguments):
+                raise place.error(f"'{key}' of {name} has no value", allowed=f"{name}('{key}', value)")
+            set_link_field(place, link, key, arguments[position])
+            given.add(key)
+            position += 1
+        else:
+            raise place.error(
+                f"{name} does not know '{key}'",
+                allowed=", ".join((*_KEYS, "revolute", "prismatic", "modified")),
+            )
+    _settle_joint(place, link, given, fixed=sigma is not None, name=name)
+    return link
+
+
+_KEYS = ("theta", "d", "a", "alpha", "sigma", "offset", "qlim", "m", "r", "I", "Jm", "G", "B", "Tc")
+
+
+def _settle_joint(place: Place, link: LinkRecord, given: set[str], *, fixed: bool, name: str) -> None:
+    """Which of d and theta is the joint's variable; both given is a contradiction."""
+    unstated = not fixed and not given & {"sigma", "revolute", "prismatic"}
+    if unstated and {"d", "theta"} <= given:
+        raise place.error(
+            f"{name} is given both 'd' and 'theta'",
+            allowed="'d' of a revolute joint or 'theta' of a prismatic one: the other is the joint variable",
+        )
+    if unstated:
+        link.sigma = int("theta" in given)
+    variable = "d" if link.sigma else "theta"
+    if variable in given and (fixed or not unstated):
+        raise place.error(
+            f"'{variable}' is the variable of this joint and cannot be given",
+            allowed="'theta' of a prismatic, 'd' of a revolute joint",
+            fix=f"remove '{variable}', or give it as 'offset'",
+        )
+
+
+CONSTRUCTORS: dict[str, Callable[[Place, list[Value]], LinkRecord]] = {
+    "link": make_link,
+    "Link": _new_link,
+    "Revolute": lambda place, arguments: _new_link(place, arguments, sigma=0, name="Revolute"),
+    "Prismatic": lambda place, arguments: _new_link(place, arguments, sigma=1, name="Prismatic"),
+    "RevoluteMDH": lambda place, arguments: _new_link(
+        place, arguments, sigma=0, modified=True, name="RevoluteMDH"
+    ),
+    "PrismaticMDH": lambda place, arguments: _new_link(
+        place, arguments, sigma=1, modified=True, name="PrismaticMDH"
+    ),
+}

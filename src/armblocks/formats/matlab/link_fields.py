@@ -1,0 +1,192 @@
+"""The fields of links: what a script may assign to them, in which shapes, and what it reads back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from armblocks.errors import ArmblocksError
+from armblocks.formats.matlab.records import LinkRecord
+from armblocks.formats.matlab.source import Place
+from armblocks.formats.matlab.values import Array, Value, array_of, empty, kind_of, number_of, scalar
+from armblocks.robot import inertia_matrix
+from armblocks.spatial import Vector3
+
+ASSIGNABLE = "alpha, a (A), theta, d (D), sigma, offset, mdh, m, r, I, Jm, G, B, Tc, qlim"
+
+VECTORS = frozenset(("r", "I", "Tc", "qlim"))
+"""Fields that take a row of numbers."""
+
+
+def set_link_field(place: Place, link: LinkRecord, name: str, value: Value) -> None:
+    """``link.name = value``. Raises ``FormatError`` for an unknown field or a value that it cannot hold."""
+    setter = _SETTERS.get(name)
+    if setter is None:
+        raise place.error(f"a link has no field '{name}'", allowed=ASSIGNABLE)
+    setter(place, link, value)
+
+
+def link_field(place: Place, link: LinkRecord, name: str) -> Value:
+    """The value of ``link.name``; ``[]`` where the script has not set it."""
+    getter = _GETTERS.get(name)
+    if getter is None:
+        raise place.error(f"a link has no field or method '{name}' here", allowed=ASSIGNABLE)
+    return getter(link)
+
+
+def finite_number(place: Place, value: Value, what: str) -> float:
+    """A value that must be one finite number."""
+    number = number_of(place, value, what)
+    if not math.isfinite(number):
+        raise place.error(f"{what} is {number}", allowed="a finite number")
+    return number
+
+
+def numbers(place: Place, value: Value, what: str, count: int) -> list[float]:
+    """A value that must be a row or column of ``count`` finite numbers."""
+    array = array_of(place, value, what)
+    if array.size != count or 1 not in array.shape:
+        raise place.error(f"{what} is {kind_of(array)}", allowed=f"{count} numbers")
+    if not np.isfinite(array).all():
+        raise place.error(f"{what} holds numbers that are not finite", allowed="finite numbers")
+    return [float(number) for number in array.ravel()]
+
+
+def inertia_from(place: Place, value: Value) -> tuple[Vector3, Vector3, Vector3]:
+    """``I`` as the toolbox takes it: 3x3, or Ixx Iyy Izz, or Ixx Iyy Izz Ixy Iyz Ixz."""
+    array = array_of(place, value, "I")
+    allowed = "a symmetric 3x3 matrix, [Ixx Iyy Izz], or [Ixx Iyy Izz Ixy Iyz Ixz]"
+    if array.shape != (3, 3) and (1 not in array.shape or array.size not in (3, 6)):
+        raise place.error(f"I is {kind_of(array)}", allowed=allowed)
+    if not np.isfinite(array).all():
+        raise place.error("I holds numbers that are not finite", allowed=allowed)
+    try:
+        return inertia_matrix(array if array.shape == (3, 3) else array.ravel())
+    except ArmblocksError as error:
+        raise place.error(f"I is refused: {error.what}", allowed=allowed) from None
+
+
+def coulomb_from(place: Place, value: Value) -> tuple[float, float]:
+    """``Tc``: one number t stands for [t -t]."""
+    array = array_of(place, value, "Tc")
+    if array.size == 1:
+        t = finite_number(place, array, "Tc")
+        return t, -t
+    if array.size != 2:
+        raise place.error(f"Tc is {kind_of(array)}", allowed="a number, or [Tc+ Tc-]")
+    plus, minus = numbers(place, array, "Tc", 2)
+    if plus < minus:
+        raise place.error(
+            f"Tc has {plus:g} before {minus:g}", allowed="[Tc+ Tc-] with Tc+ above Tc-", fix="swap the two"
+        )
+    return plus, minus
+
+
+def _set_number(
+    attribute: str, what: str, *, least: float = -math.inf
+) -> Callable[[Place, LinkRecord, Value], None]:
+    def assign(place: Place, link: LinkRecord, value: Value) -> None:
+        number = finite_number(place, value, what)
+        if number < least:
+            raise place.error(f"{what} is {number:g}", allowed=f"{least:g} or more")
+        setattr(link, attribute, number)
+
+    return assign
+
+
+def _set_sigma(place: Place, link: LinkRecord, value: Value) -> None:
+    if value in ("R", "P") if isinstance(value, str) else False:
+        link.sigma = int(value == "P")
+    elif isinstance(value, str):
+        raise place.error(
+            f"sigma is '{value}'", allowed="0 or 'R' (revolute), any other number or 'P' (prismatic)"
+        )
+    else:
+        link.sigma = int(finite_number(place, value, "sigma") != 0)
+
+
+def _set_modified(place: Place, link: LinkRecord, value: Value) -> None:
+    link.modified = finite_number(place, value, "mdh") != 0
+
+
+def _set_centre(place: Place, link: LinkRecord, value: Value) -> None:
+    x, y, z = numbers(place, value, "r", 3)
+    link.centre_of_mass = (x, y, z)
+
+
+def _set_inertia(place: Place, link: LinkRecord, value: Value) -> None:
+    link.inertia = inertia_from(place, value)
+
+
+def _set_gear(place: Place, link: LinkRecord, value: Value) -> None:
+    ratio = finite_number(place, value, "G")
+    if ratio == 0:
+        raise place.error("G is 0, so the motor cannot move the joint", allowed="any other number")
+    link.gear_ratio = ratio
+
+
+def _set_coulomb(place: Place, link: LinkRecord, value: Value) -> None:
+    link.coulomb_friction = coulomb_from(place, value)
+
+
+def _set_limits(place: Place, link: LinkRecord, value: Value) -> None:
+    array = array_of(place, value, "qlim")
+    if array.size == 0 or (array.size == 2 and array.ravel().tolist() == [-math.inf, math.inf]):
+        link.qlim = None
+        return
+    low, high = numbers(place, array, "qlim", 2)
+    if low > high:
+        raise place.error(f"qlim goes from {low:g} to {high:g}", allowed="the lower limit first")
+    link.qlim = (low, high)
+
+
+_SETTERS: dict[str, Callable[[Place, LinkRecord, Value], None]] = {
+    "alpha": _set_number("alpha", "alpha"),
+    "a": _set_number("a", "a"),
+    "A": _set_number("a", "A"),
+    "theta": _set_number("theta", "theta"),
+    "d": _set_number("d", "d"),
+    "D": _set_number("d", "D"),
+    "sigma": _set_sigma,
+    "offset": _set_number("offset", "offset"),
+    "mdh": _set_modified,
+    "m": _set_number("mass", "m", least=0.0),
+    "r": _set_centre,
+    "I": _set_inertia,
+    "Jm": _set_number("motor_inertia", "Jm", least=0.0),
+    "G": _set_gear,
+    "B": _set_number("viscous_friction", "B"),
+    "Tc": _set_coulomb,
+    "qlim": _set_limits,
+}
+
+
+def _row(values: tuple[float, ...] | None) -> Array:
+    return empty() if values is None else np.array([values])
+
+
+def _optional(value: float | None) -> Array:
+    return empty() if value is None else scalar(value)
+
+
+_GETTERS: dict[str, Callable[[LinkRecord], Value]] = {
+    "alpha": lambda link: scalar(link.alpha),
+    "a": lambda link: scalar(link.a),
+    "A": lambda link: scalar(link.a),
+    "theta": lambda link: scalar(link.theta),
+    "d": lambda link: scalar(link.d),
+    "D": lambda link: scalar(link.d),
+    "sigma": lambda link: scalar(float(link.sigma)),
+    "offset": lambda link: scalar(link.offset),
+    "mdh": lambda link: scalar(float(link.modified)),
+    "m": lambda link: _optional(link.mass),
+    "r": lambda link: _row(link.centre_of_mass),
+    "I": lambda link: empty() if link.inertia is None else np.array(link.inertia),
+    "Jm": lambda link: _optional(link.motor_inertia),
+    "G": lambda link: _optional(link.gear_ratio),
+    "B": lambda link: _optional(link.viscous_friction),
+    "Tc": lambda link: _row(link.coulomb_friction),
+    "qlim": lambda link: _row(link.qlim),
+}

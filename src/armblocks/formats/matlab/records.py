@@ -1,0 +1,69 @@
+"""Links and robots while a script is still changing them: the only mutable robots there are."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field, replace
+
+from armblocks.formats.matlab.source import Place
+from armblocks.spatial import Matrix3, Transform, Vector3
+
+
+class Release(enum.Enum):
+    """Which language of the toolbox an object comes from."""
+
+    UP_TO_8 = "up to 8"
+    """``link``, ``robot``: values, copied when assigned."""
+    FROM_9 = "9 and later"
+    """``Link``, ``SerialLink``: handles, shared when assigned."""
+
+
+@dataclass(kw_only=True)
+class LinkRecord:
+    """A link as scripts see it; ``None`` where a script says nothing. Units as in ``Link`` and ``Motor``.
+
+    ``place`` is where it was made, for messages about it.
+    """
+
+    place: Place
+    release: Release
+    alpha: float = 0.0
+    a: float = 0.0
+    theta: float = 0.0
+    d: float = 0.0
+    sigma: int = 0
+    offset: float = 0.0
+    modified: bool = False
+    mass: float | None = None
+    centre_of_mass: Vector3 | None = None
+    inertia: Matrix3 | None = None
+    motor_inertia: float | None = None
+    gear_ratio: float | None = None
+    viscous_friction: float | None = None
+    coulomb_friction: tuple[float, float] | None = None
+    qlim: tuple[float, float] | None = None
+
+    def assigned(self) -> LinkRecord:
+        """What another variable gets."""
+        return replace(self) if self.release is Release.UP_TO_8 else self
+
+
+@dataclass(kw_only=True)
+class RobotRecord:
+    """A robot as scripts see it. ``gravity`` has the toolbox's sign: it points up."""
+
+    place: Place
+    release: Release
+    links: list[LinkRecord]
+    name: str = "noname"
+    manufacturer: str = ""
+    comment: str = ""
+    gravity: Vector3 = (0.0, 0.0, 9.81)
+    base: Transform = field(default_factory=Transform)
+    tool: Transform = field(default_factory=Transform)
+
+    def assigned(self) -> RobotRecord:
+        """What another variable gets."""
+        if self.release is Release.FROM_9:
+            return self
+        return replace(self, links=[link.assigned() for link in self.links])

@@ -1,0 +1,281 @@
+"""``robot`` of releases up to 8, ``SerialLink`` of 9 and later, their fields, and the finished ``Robot``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from armblocks.errors import ArmblocksError
+from armblocks.formats.matlab.link_constructors import is_modified, link_from_row, rows_of
+from armblocks.formats.matlab.link_fields import finite_number, numbers, set_link_field
+from armblocks.formats.matlab.records import LinkRecord, Release, RobotRecord
+from armblocks.formats.matlab.source import Place
+from armblocks.formats.matlab.values import (
+    MOST_LINKS,
+    Array,
+    Cell,
+    LinkArray,
+    Value,
+    array_of,
+    kind_of,
+    scalar,
+    text_of,
+)
+from armblocks.robot import (
+    DhConvention,
+    DhRow,
+    FrictionModel,
+    JointLimits,
+    Link,
+    Motor,
+    Robot,
+    link_from_dh,
+    serial_chain,
+)
+from armblocks.spatial import Transform
+
+ASSIGNABLE = "name, manuf, manufacturer, comment, gravity, base, tool, offset, qlim, links, plotopt"
+_DISPLAY_ONLY = ("plotopt", "lineopt", "shadowopt", "plotopt3d", "config", "configs", "ikineType", "faceopt")
+"""Fields and options that say how a robot is drawn or labelled: accepted, as they change no number."""
+
+
+def make_robot(place: Place, arguments: list[Value], variable: str) -> RobotRecord:
+    """``robot(L, name, manuf, comment)`` of releases up to 8; ``L`` a cell array of links or a D-H matrix.
+
+    ``variable`` is the name of the first argument's variable: a robot made from a matrix is called so.
+    """
+    if not 1 <= len(arguments) <= 4:
+        raise place.error(
+            f"robot is called with {len(arguments)} arguments", allowed="robot(L, name, manuf, comment)"
+        )
+    first, *words = arguments
+    match first:
+        case RobotRecord():
+            made = first.assigned()
+        case Cell():
+            links = [_link_of(place, element, i) for i, element in enumerate(first.elements, start=1)]
+            made = RobotRecord(
+                place=place, release=Release.UP_TO_8, links=[link.assigned() for link in links]
+            )
+        case _ if isinstance(first, np.ndarray) and first.size:
+            links = _links_of_matrix(place, Release.UP_TO_8, first, modified=False)
+            made = RobotRecord(place=place, release=Release.UP_TO_8, links=links, name=variable or "noname")
+        case _:
+            raise place.error(
+                f"robot is called with {kind_of(first)}",
+                allowed="a cell array of links, L{1} = link(…), or a D-H matrix",
+                fix="for an array of links, [L1 L2], use SerialLink",
+            )
+    for field, word in zip(("name", "manuf", "comment"), words):
+        set_robot_field(place, made, field, word)
+    _check_convention(place, made)
+    return made
+
+
+def make_serial_link(place: Place, arguments: list[Value]) -> RobotRecord:
+    """``SerialLink(links or D-H matrix, 'name', …)`` of releases 9 and later."""
+    if not arguments:
+        raise place.error("SerialLink is called without links", allowed="SerialLink(links, 'name', text, …)")
+    first, *options = arguments
+    modified = False
+    pairs: list[tuple[str, Value]] = []
+    position = 0
+    while position < len(options):
+        key = text_of(place, options[position], f"argument {position + 2} of SerialLink")
+        position += 1
+        if key in ("modified", "standard"):
+            modified = is_modified(place, key)
+            continue
+        if position == len(options):
+            raise place.error(f"'{key}' of SerialLink has no value", allowed=f"'{key}', value")
+        pairs.append((key, options[position]))
+        position += 1
+    links: list[LinkRecord] = []
+    match first:
+        case RobotRecord():
+            links = list(first.links)
+        case LinkRecord():
+            links = [first]
+        case LinkArray():
+            links = [_link_of(place, link, i) for i, link in enumerate(first.links, start=1)]
+        case Cell():
+            links = [_link_of(place, element, i) for i, element in enumerate(first.elements, start=1)]
+        case _ if isinstance(first, np.ndarray) and first.size:
+            links = _links_of_matrix(place, Release.FROM_9, first, modified=modified)
+        case _:
+            raise place.error(f"SerialLink is called with {kind_of(first)}", allowed="links, or a D-H matrix")
+    made = RobotRecord(place=place, release=Release.FROM_9, links=links)
+    if isinstance(first, RobotRecord):
+        for field in ("name", "manufacturer", "comment", "gravity", "base", "tool"):
+            setattr(made, field, getattr(first, field))
+    for key, value in pairs:
+        set_robot_field(place, made, key, value)
+    _check_convention(place, made)
+    return made
+
+
+def _links_of_matrix(place: Place, release: Release, matrix: Array, *, modified: bool) -> list[LinkRecord]:
+    if matrix.shape[0] > MOST_LINKS:
+        raise place.error(f"a robot of {matrix.shape[0]} links", allowed=f"at most {MOST_LINKS}")
+    return [link_from_row(place, release, row, modified=modified) for row in rows_of(matrix)]
+
+
+def _link_of(place: Place, element: Value | None, number: int) -> LinkRecord:
+    if not isinstance(element, LinkRecord):
+        raise place.error(
+            f"element {number} of the links is {kind_of(element)}",
+            allowed="links",
+            fix=f"define link {number} first",
+        )
+    return element
+
+
+def _check_convention(place: Place, made: RobotRecord) -> None:
+    if not made.links:
+        raise place.error("the robot has no links", allowed="1 link or more")
+    if len({link.modified for link in made.links}) > 1:
+        raise place.error(
+            "standard and modified D-H links are mixed in one robot", allowed="one convention for all links"
+        )
+
+
+def set_robot_field(place: Place, robot: RobotRecord, name: str, value: Value) -> None:
+    """``robot.name = value``. Raises ``FormatError`` for an unknown field or a value that it cannot hold."""
+    match name:
+        case "name" | "comment":
+            setattr(robot, name, text_of(place, value, name))
+        case "manuf" | "manufacturer":
+            robot.manufacturer = text_of(place, value, name)
+        case "gravity":
+            x, y, z = numbers(place, value, "gravity", 3)
+            robot.gravity = (x, y, z)
+        case "base" | "tool":
+            setattr(robot, name, _transform(place, value, name))
+        case "links" | "link":
+            _set_links(place, robot, value)
+        case "offset" | "qlim":
+            _set_joint_rows(place, robot, name, value)
+        case _ if name in _DISPLAY_ONLY:
+            pass
+        case _:
+            raise place.error(f"a robot has no field '{name}'", allowed=ASSIGNABLE)
+
+
+def robot_field(place: Place, robot: RobotRecord, name: str) -> Value:
+    """The value of ``robot.name``."""
+    getter = _GETTERS.get(name)
+    if getter is None:
+        raise place.error(f"a robot has no field or method '{name}' here", allowed=f"n, {ASSIGNABLE}")
+    return getter(robot)
+
+
+_GETTERS: dict[str, Callable[[RobotRecord], Value]] = {
+    "n": lambda robot: scalar(float(len(robot.links))),
+    "name": lambda robot: robot.name,
+    "manuf": lambda robot: robot.manufacturer,
+    "manufacturer": lambda robot: robot.manufacturer,
+    "comment": lambda robot: robot.comment,
+    "gravity": lambda robot: np.array(robot.gravity).reshape(3, 1),
+    "base": lambda robot: robot.base.matrix,
+    "tool": lambda robot: robot.tool.matrix,
+    "links": lambda robot: LinkArray(list(robot.links)),
+    "link": lambda robot: Cell(list(robot.links)),
+}
+
+
+def _transform(place: Place, value: Value, name: str) -> Transform:
+    matrix = array_of(place, value, name)
+    try:
+        return Transform.from_matrix(matrix)
+    except ArmblocksError as error:
+        raise place.error(f"{name} is refused: {error.what}", allowed=error.allowed, fix=error.fix) from None
+
+
+def _set_links(place: Place, robot: RobotRecord, value: Value) -> None:
+    elements = (
+        value.links if isinstance(value, LinkArray) else value.elements if isinstance(value, Cell) else None
+    )
+    if elements is None:
+        raise place.error(f"the links of a robot are {kind_of(value)}", allowed="links")
+    robot.links = [_link_of(place, element, i) for i, element in enumerate(elements, start=1)]
+
+
+def _set_joint_rows(place: Place, robot: RobotRecord, name: str, value: Value) -> None:
+    """``offset`` (n numbers) or ``qlim`` (n rows of two) for all links at once."""
+    if robot.release is Release.UP_TO_8:
+        raise place.error(
+            f"releases up to 8 ignore an assignment to '{name}' of a robot",
+            allowed=f"the links' own {name}",
+            fix=f"write L{{i}}.{name} = … before robot(L, …)",
+        )
+    n = len(robot.links)
+    if name == "offset":
+        for link, number in zip(robot.links, numbers(place, value, "offset", n)):
+            link.offset = finite_number(place, scalar(number), "offset")
+        return
+    array = array_of(place, value, "qlim")
+    if array.shape != (n, 2):
+        raise place.error(f"qlim is {kind_of(array)}", allowed=f"a {n}x2 matrix")
+    for link, row in zip(robot.links, array):
+        set_link_field(place, link, "qlim", row.reshape(1, 2))
+
+
+def finished_robot(record: RobotRecord, friction_model: FrictionModel) -> Robot:
+    """The frozen robot that a script has built. Links are named ``link1``, ``link2`` … from the base on.
+
+    Raises ``FormatError`` at the line that made the robot.
+    """
+    _check_convention(record.place, record)
+    try:
+        links = [_finished_link(i, link) for i, link in enumerate(record.links, start=1)]
+        gx, gy, gz = record.gravity
+        return Robot(
+            name=record.name,
+            links=serial_chain(links),
+            manufacturer=record.manufacturer,
+            comment=record.comment,
+            base=record.base,
+            tool=record.tool,
+            gravity=(-gx, -gy, -gz),
+            friction_model=friction_model,
+            source=record.place.source.name,
+        )
+    except ArmblocksError as error:
+        raise record.place.error(str(error).rstrip("."), allowed=error.allowed, fix=error.fix) from error
+
+
+def _finished_link(number: int, link: LinkRecord) -> Link:
+    zero = (0.0, 0.0, 0.0)
+    convention = DhConvention.MODIFIED if link.modified else DhConvention.STANDARD
+    dh = DhRow(
+        alpha=link.alpha,
+        a=link.a,
+        d=link.d,
+        theta=link.theta,
+        sigma=link.sigma,
+        offset=link.offset,
+        convention=convention,
+    )
+    return link_from_dh(
+        f"link{number}",
+        dh,
+        limits=JointLimits(position=link.qlim),
+        mass=link.mass or 0.0,
+        centre_of_mass=link.centre_of_mass or zero,
+        inertia=link.inertia or (zero, zero, zero),
+        motor=_motor(link),
+    )
+
+
+def _motor(link: LinkRecord) -> Motor | None:
+    """The motor, where the script says anything about one."""
+    said = (link.motor_inertia, link.gear_ratio, link.viscous_friction, link.coulomb_friction)
+    if all(part is None for part in said):
+        return None
+    return Motor(
+        inertia=link.motor_inertia or 0.0,
+        gear_ratio=1.0 if link.gear_ratio is None else link.gear_ratio,
+        viscous_friction=link.viscous_friction or 0.0,
+        coulomb_friction=link.coulomb_friction or (0.0, 0.0),
+    )

@@ -1,0 +1,23 @@
+"""What a robot file format is to the rest: a name, suffixes, and a reader."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from armblocks.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotFormat:
+    """One file format of robots.
+
+    ``suffixes`` in lower case with the dot; ``most_bytes`` the largest file that is read; ``read`` gets a
+    file's bytes and the name under which messages speak of it, and returns its robots by the names that the
+    file gives them. It raises ``FormatError``.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    most_bytes: int
+    read: Callable[[bytes, str], Mapping[str, Robot]]
