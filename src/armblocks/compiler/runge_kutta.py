@@ -15,7 +15,8 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.ir_writer import INTRINSICS, IrWriter, literal
+from armblocks.compiler.ir_routine import Routine
+from armblocks.compiler.ir_text import Module, number_text as literal
 
 REVISION = 1
 """Part of every cache key: raise it whenever the emitted loop changes."""
@@ -74,24 +75,27 @@ def workspace_size(tableau: ButcherTableau, states: int) -> int:
     return Real.END + states * (2 + tableau.rows)
 
 
-def emit_integrator(tableau: ButcherTableau, states: int, symbol: str, derivative: str) -> str:
-    """LLVM IR of ``i64 symbol(reals, counts, p, samples, ends, clamps, out, max_steps)``.
+def emit_integrator(
+    module: Module, tableau: ButcherTableau, states: int, symbol: str, derivative: str
+) -> None:
+    """Add ``i64 symbol(reals, counts, p, samples, ends, clamps, out, max_steps)`` to a module.
 
-    ``derivative`` names a function ``void (double t, ptr x, ptr p, ptr xd)`` of the same module. ``samples``
+    ``derivative`` names a function ``void (ptr t, ptr x, ptr p, ptr xd)`` of the same module. ``samples``
     are the instants to record and ``out`` their states, ``(N, n)``. ``ends`` are the ends of the segments
     between breakpoints and ``clamps`` the latest time at which each segment may evaluate its derivative.
+    The integers and all other pointers are ``int64`` and ``float64``.
     """
-    return INTRINSICS + _Loop(tableau, states, derivative).emit(symbol)
+    module.define(symbol, lambda: _Loop(module, tableau, states, derivative).emit(symbol))
 
 
 class _Loop:
     """Writes the loop for one method and one number of states."""
 
-    def __init__(self, tableau: ButcherTableau, states: int, derivative: str) -> None:
+    def __init__(self, module: Module, tableau: ButcherTableau, states: int, derivative: str) -> None:
         self.tableau = tableau
         self.n = states
         self.derivative = derivative
-        self.w = IrWriter()
+        self.w = Routine(module)
         self.x = Real.END
         self.y = Real.END + states
 
@@ -102,7 +106,7 @@ class _Loop:
         return Real.END + (2 + row) * self.n
 
     def element(self, place: int, index: str) -> str:
-        return self.w.at("%reals", index if place == 0 else self.w.sum_integers(index, place))
+        return self.w.at("%reals", index if place == 0 else self.w.word_op("add", index, str(place)))
 
     def read(self, place: int, index: str) -> str:
         return self.w.get(self.element(place, index))
@@ -112,7 +116,8 @@ class _Loop:
         w = self.w
         time = w.minimum(time, w.get(self.clamp))
         x, xd = w.at("%reals", state), w.at("%reals", self.K(row))
-        w.line(f"call void @{self.derivative}(double {time}, ptr {x}, ptr %p, ptr {xd})")
+        w.put(time, self.evaluation_time)
+        w.do(f"call void @{self.derivative}(ptr {self.evaluation_time}, ptr {x}, ptr %p, ptr {xd})")
         w.increase(self.evaluations)
 
     def combination(self, weights: tuple[float, ...], index: str) -> str | None:
@@ -123,7 +128,9 @@ class _Loop:
                 continue
             k = self.read(self.K(row), index)
             total = (
-                self.w.multiply(literal(weight), k) if total is None else self.w.fma(literal(weight), k, total)
+                self.w.multiply(literal(weight), k)
+                if total is None
+                else self.w.fma(literal(weight), k, total)
             )
         return total
 
@@ -139,7 +146,7 @@ class _Loop:
 
     def total(self, term: Callable[[str, str], str]) -> str:
         """``sum_i``: ``term(index, sum so far)`` gives the next sum."""
-        slot = self.w.slot("double", literal(0.0))
+        slot = self.w.variable("double", literal(0.0))
         self.w.for_each(self.n, lambda index: self.w.put(term(index, self.w.get(slot)), slot))
         return self.w.get(slot)
 
@@ -150,7 +157,7 @@ class _Loop:
             e = element(index)
             return self.w.fma(e, e, total)
 
-        return self.w.sqrt(self.w.divide(self.total(term), literal(float(self.n))))
+        return self.w.square_root(self.w.divide(self.total(term), literal(float(self.n))))
 
     def all_finite(self, *places: int) -> str:
         """Whether every element of the vectors is finite: ``0 v`` is NaN for an infinity or a NaN."""
@@ -170,9 +177,8 @@ class _Loop:
         """
         w = self.w
         one = 1023 << 52
-        bits = w.value(f"bitcast double {a} to i64")
-        guess = w.value(f"sub i64 {one + one // k}, {w.value(f'udiv i64 {bits}, {k}')}")
-        y = w.value(f"bitcast i64 {guess} to double")
+        bits = w.bits(a)
+        y = w.from_bits(w.word_op("sub", str(one + one // k), w.word_op("udiv", bits, str(k))))
         coefficients = [1.0]
         for m in range(6):
             coefficients.append(coefficients[-1] * (1 / k + m) / (m + 1))
@@ -195,14 +201,14 @@ class _Loop:
     def emit(self, symbol: str) -> str:
         w = self.w
         self.load_workspace()
-        self.start, self.step, self.finish = w.label("start"), w.label("step"), w.label("finish")
-        w.branch(w.value(f"icmp eq i64 {w.get(self.started, 'i64')}, 0"), self.start, self.step)
+        self.start, self.step, self.finish = w.fresh("start"), w.fresh("step"), w.fresh("finish")
+        w.branch(w.word_test("eq", w.get(self.started, "i64"), "0"), self.start, self.step)
         w.place(self.start)
         self.emit_start()
         w.place(self.step)
-        paused = w.label("paused")
-        going = w.label("going")
-        w.branch(w.compare_integers("sge", w.get(self.taken, "i64"), "%max_steps"), paused, going)
+        paused = w.fresh("paused")
+        going = w.fresh("going")
+        w.branch(w.word_test("sge", w.get(self.taken, "i64"), "%max_steps"), paused, going)
         w.place(paused)
         self.leave(Status.PAUSED)
         w.place(going)
@@ -213,22 +219,24 @@ class _Loop:
         self.emit_accepted()
         w.place(self.finish)
         self.store_workspace()
-        w.line(f"ret i64 {w.get(self.status, 'i64')}")
-        arguments = "ptr noalias %reals, ptr noalias %counts, ptr noalias %p, ptr noalias %samples, ptr noalias %ends"
+        w.do(f"ret i64 {w.get(self.status, 'i64')}")
+        arguments = (
+            "ptr noalias %reals, ptr noalias %counts, ptr noalias %p, ptr noalias %samples, ptr noalias %ends"
+        )
         return w.text(
             f"define i64 @{symbol}({arguments}, ptr noalias %clamps, ptr noalias %out, i64 %max_steps)"
         )
 
     def load_workspace(self) -> None:
         w = self.w
-        self.time = w.slot("double", w.get(w.at("%reals", Real.TIME)))
-        self.length = w.slot("double", w.get(w.at("%reals", Real.STEP)))
-        self.tried = w.slot("double", w.get(w.at("%reals", Real.TRIED)))
+        self.time = w.variable("double", w.get(w.at("%reals", Real.TIME)))
+        self.length = w.variable("double", w.get(w.at("%reals", Real.STEP)))
+        self.tried = w.variable("double", w.get(w.at("%reals", Real.TRIED)))
         self.rtol = w.get(w.at("%reals", Real.RTOL))
         self.atol = w.get(w.at("%reals", Real.ATOL))
         self.max_step = w.get(w.at("%reals", Real.MAX_STEP))
         self.sample, self.segment, self.started, self.grid, self.accepted, self.rejected, self.evaluations = (
-            w.slot("i64", w.get(w.at("%counts", place, "i64"), "i64"))
+            w.variable("i64", w.get(w.at("%counts", place, "i64"), "i64"))
             for place in (
                 Count.SAMPLE,
                 Count.SEGMENT,
@@ -242,12 +250,13 @@ class _Loop:
         self.samples = w.get(w.at("%counts", Count.SAMPLES, "i64"), "i64")
         self.segments = w.get(w.at("%counts", Count.SEGMENTS, "i64"), "i64")
         segment = w.get(self.segment, "i64")
-        self.end = w.slot("double", w.get(w.at("%ends", segment)))
-        self.clamp = w.slot("double", w.get(w.at("%clamps", segment)))
-        self.taken = w.slot("i64", "0")
-        self.status = w.slot("i64", str(int(Status.DONE)))
-        self.h = w.slot("double", literal(0.0))
-        self.new_time = w.slot("double", literal(0.0))
+        self.end = w.variable("double", w.get(w.at("%ends", segment)))
+        self.clamp = w.variable("double", w.get(w.at("%clamps", segment)))
+        self.taken = w.variable("i64", "0")
+        self.status = w.variable("i64", str(int(Status.DONE)))
+        self.evaluation_time = w.variable("double", literal(0.0))
+        self.h = w.variable("double", literal(0.0))
+        self.new_time = w.variable("double", literal(0.0))
 
     def store_workspace(self) -> None:
         w = self.w
@@ -270,7 +279,7 @@ class _Loop:
 
     def leave_unless(self, condition: str, status: Status) -> None:
         w = self.w
-        failed, on = w.label("failed"), w.label("on")
+        failed, on = w.fresh("failed"), w.fresh("on")
         w.branch(condition, on, failed)
         w.place(failed)
         self.leave(status)
@@ -293,9 +302,7 @@ class _Loop:
         order = self.tableau.error_order
 
         def weighted(place: int) -> Callable[[str], str]:
-            return lambda i: w.divide(
-                self.read(place, i), self.scale(w.absolute(self.read(self.x, i)))
-            )
+            return lambda i: w.divide(self.read(place, i), self.scale(w.absolute(self.read(self.x, i))))
 
         def change(i: str) -> str:
             difference = w.subtract(self.read(self.K(1), i), self.read(self.K(0), i))
@@ -303,10 +310,8 @@ class _Loop:
 
         interval = w.subtract(w.get(self.end), time)
         d0, d1 = self.mean_square(weighted(self.x)), self.mean_square(weighted(self.K(0)))
-        small = w.value(
-            f"or i1 {w.compare('olt', d0, literal(1e-5))}, {w.compare('olt', d1, literal(1e-5))}"
-        )
-        h0 = w.either(small, literal(1e-6), w.divide(w.multiply(literal(0.01), d0), d1))
+        small = w.let(f"or i1 {w.compare('olt', d0, literal(1e-5))}, {w.compare('olt', d1, literal(1e-5))}")
+        h0 = w.select(small, literal(1e-6), w.divide(w.multiply(literal(0.01), d0), d1))
         h0 = w.minimum(h0, interval)
         self.move((1.0,), h0)
         self.evaluate(w.add(time, h0), self.y, 1)
@@ -315,7 +320,7 @@ class _Loop:
         flat = w.compare("ole", steepest, literal(1e-15))
         # Kept inside the range of inverse_root; beyond it the other bounds decide anyway.
         bounded = w.maximum(w.minimum(w.multiply(literal(100.0), steepest), literal(1e300)), literal(1e-300))
-        h1 = w.either(
+        h1 = w.select(
             flat,
             w.maximum(w.multiply(h0, literal(1e-3)), literal(1e-6)),
             self.inverse_root(bounded, order + 1),
@@ -337,14 +342,14 @@ class _Loop:
         """Try steps until the error is small enough; falls through once one is."""
         w = self.w
         time = w.get(self.time)
-        bits = w.value(f"bitcast double {time} to i64")
-        following = w.value(f"bitcast i64 {w.sum_integers(bits, 1)} to double")
+        bits = w.bits(time)
+        following = w.from_bits(w.word_op("add", bits, "1"))
         shortest = w.multiply(literal(10.0), w.subtract(following, time))
         w.put(w.minimum(w.maximum(w.get(self.length), shortest), self.max_step), self.length)
-        growth = w.slot("double", literal(GROW))
+        growth = w.variable("double", literal(GROW))
         w.put(literal(GROW), growth)
         attempt, rejected, again, too_small, accepted = (
-            w.label(stem) for stem in ("attempt", "rejected", "again", "small", "accepted")
+            w.fresh(stem) for stem in ("attempt", "rejected", "again", "small", "accepted")
         )
         w.place(attempt)
         end = w.get(self.end)
@@ -355,7 +360,7 @@ class _Loop:
         self.emit_stages(time, h)
         norm = self.error_norm(h)
         good = w.compare("olt", norm, literal(1.0))
-        good = w.value(f"and i1 {good}, {self.all_finite(self.y)}")
+        good = w.both(good, self.all_finite(self.y))
         # 1e-30 stands for an exact zero: the factor is at its upper bound long before.
         bounded = w.minimum(w.maximum(norm, literal(1e-30)), literal(1e30))
         ideal = w.multiply(literal(SAFETY), self.inverse_root(bounded, self.tableau.error_order + 1))
@@ -365,7 +370,7 @@ class _Loop:
         w.put(literal(1.0), growth)
         # A NaN compares false and takes the strongest reduction; so does an infinite new state.
         failing = w.compare("oge", norm, literal(1.0))
-        shrunk = w.multiply(h, w.either(failing, w.maximum(ideal, literal(SHRINK)), literal(SHRINK)))
+        shrunk = w.multiply(h, w.select(failing, w.maximum(ideal, literal(SHRINK)), literal(SHRINK)))
         w.put(shrunk, self.length)
         w.branch(w.compare("olt", shrunk, shortest), too_small, again)
         w.place(too_small)
@@ -402,17 +407,17 @@ class _Loop:
             return self.total(term)
 
         e5, e3 = square(error), square(stretched)
-        denominator = w.sqrt(w.multiply(w.fma(literal(0.01), e3, e5), literal(float(self.n))))
+        denominator = w.square_root(w.multiply(w.fma(literal(0.01), e3, e5), literal(float(self.n))))
         norm = w.divide(w.multiply(h, e5), denominator)
-        return w.either(w.compare("oeq", denominator, literal(0.0)), literal(0.0), norm)
+        return w.select(w.compare("oeq", denominator, literal(0.0)), literal(0.0), norm)
 
     def emit_fixed_step(self) -> None:
         """One step to the next grid instant, which is ``k STEP`` and never a sum, or to the segment's end."""
         w = self.w
         time, step, end = w.get(self.time), w.get(self.length), w.get(self.end)
-        search, following, found = w.label("search"), w.label("following"), w.label("found")
+        search, following, found = w.fresh("search"), w.fresh("following"), w.fresh("found")
         w.place(search)
-        instant = w.multiply(w.value(f"sitofp i64 {w.get(self.grid, 'i64')} to double"), step)
+        instant = w.multiply(w.let(f"sitofp i64 {w.get(self.grid, 'i64')} to double"), step)
         w.branch(w.compare("ole", instant, time), following, found)
         w.place(following)
         w.increase(self.grid)
@@ -420,7 +425,7 @@ class _Loop:
         w.place(found)
         # An instant a rounding error before the end is the end: no step of 1e-16 s.
         last = w.compare("oge", w.fma(step, literal(1e-9), instant), end)
-        w.put(w.either(last, end, instant), self.new_time)
+        w.put(w.select(last, end, instant), self.new_time)
         h = w.subtract(w.get(self.new_time), time)
         w.put(h, self.h)
         w.put(h, self.tried)
@@ -431,16 +436,16 @@ class _Loop:
         """Write every sample instant not after ``until``; at ``until`` itself the state at ``exact``."""
         w = self.w
         turn, check, write, inside, on_point, written, done = (
-            w.label(stem) for stem in ("turn", "check", "write", "inside", "point", "written", "done")
+            w.fresh(stem) for stem in ("turn", "check", "write", "inside", "point", "written", "done")
         )
         w.place(turn)
         sample = w.get(self.sample, "i64")
-        w.branch(w.compare_integers("slt", sample, self.samples), check, done)
+        w.branch(w.word_test("slt", sample, self.samples), check, done)
         w.place(check)
         instant = w.get(w.at("%samples", sample))
         w.branch(w.compare("ole", instant, until), write, done)
         w.place(write)
-        self.row = w.at("%out", w.value(f"mul nsw i64 {sample}, {self.n}"))
+        self.row = w.at("%out", w.word_op("mul", sample, str(self.n)))
         w.branch(w.compare("olt", instant, until), inside, on_point)
         w.place(inside)
         between(instant)
@@ -459,8 +464,8 @@ class _Loop:
 
         def between(instant: str) -> None:
             if tableau.extra_nodes:
-                needed, ready = w.label("extra"), w.label("ready")
-                w.branch(w.compare_integers("eq", w.get(extra_done, "i64"), "0"), needed, ready)
+                needed, ready = w.fresh("extra"), w.fresh("ready")
+                w.branch(w.word_test("eq", w.get(extra_done, "i64"), "0"), needed, ready)
                 w.place(needed)
                 for k, node in enumerate(tableau.extra_nodes):
                     self.move(tableau.extra_matrix[k], h)
@@ -493,7 +498,7 @@ class _Loop:
         """Samples of the step, then the new point becomes the old one; at a segment's end, restart."""
         w = self.w
         time, h, new_time = w.get(self.time), w.get(self.h), w.get(self.new_time)
-        extra_done = w.slot("i64", "0")
+        extra_done = w.variable("i64", "0")
         w.put("0", extra_done, "i64")
         self.emit_samples(new_time, self.emit_interpolation(time, h, extra_done), exact=self.y)
 
@@ -505,13 +510,13 @@ class _Loop:
         w.put(new_time, self.time)
         w.increase(self.accepted)
         w.increase(self.taken)
-        at_end, more, complete = w.label("end"), w.label("more"), w.label("complete")
+        at_end, more, complete = w.fresh("end"), w.fresh("more"), w.fresh("complete")
         w.branch(w.compare("oge", new_time, w.get(self.end)), at_end, self.step)
         w.place(at_end)
         w.increase(self.segment)
         w.put("0", self.started, "i64")
         segment = w.get(self.segment, "i64")
-        w.branch(w.compare_integers("slt", segment, self.segments), more, complete)
+        w.branch(w.word_test("slt", segment, self.segments), more, complete)
         w.place(complete)
         self.leave(Status.DONE)
         w.place(more)

@@ -1,0 +1,169 @@
+"""Results as tables and files: the only place that knows pandas, pyarrow and SciPy's MAT files.
+
+======== ================================================================ =========================
+suffix   holds                                                            how the run went
+======== ================================================================ =========================
+.csv     one line an instant, ``time`` then one column a scalar           cannot be said
+.parquet the same columns, doubles                                        key ``armblocks`` (JSON)
+.npz     ``time`` and one ``(N, *shape)`` array a signal, by its path     array ``run`` (JSON)
+.mat     ``time`` and a structure a block with a field a port             structure ``run``
+======== ================================================================ =========================
+
+A file is written beside its place, synchronised to disk and renamed, so it is there completely or not at all.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armblocks.errors import FormatError, UnknownNameError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from armblocks.simulation.result import SimulationResult
+
+
+def to_dataframe(result: SimulationResult) -> pd.DataFrame:
+    """Index ``time`` in s, one column for each scalar; ``attrs`` holds how the run went."""
+    import pandas as pd
+
+    index = pd.Index(result.time, name="time")
+    frame = pd.DataFrame(result.signals.T, index=index, columns=list(result.columns()))
+    frame.attrs.update(_description(result))
+    return frame
+
+
+def save(result: SimulationResult, path: str | PathLike[str]) -> None:
+    """Write ``path`` in the format of its suffix, all or nothing. See the module for the formats."""
+    place = Path(path)
+    write = _WRITERS.get(place.suffix.lower())
+    if write is None:
+        raise UnknownNameError("file type", place.suffix or place.name, list(_WRITERS), where=str(place))
+    _write_whole(place, write(result))
+
+
+def _description(result: SimulationResult) -> dict[str, Any]:
+    parameters = {name: value.tolist() for name, value in result.parameters.items()}
+    return {
+        "name": result.name,
+        "run": asdict(result.run),
+        "units": dict(result.units),
+        "parameters": parameters,
+    }
+
+
+def _csv(result: SimulationResult) -> bytes:
+    return to_dataframe(result).to_csv().encode()
+
+
+def _parquet(result: SimulationResult) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    names = ["time", *result.columns()]
+    metadata = {"armblocks": json.dumps(_description(result))}
+    arrays = [pa.array(result.time), *(pa.array(np.ascontiguousarray(row)) for row in result.signals)]
+    buffer = io.BytesIO()
+    pq.write_table(pa.table(arrays, names=names, metadata=metadata), buffer)
+    return buffer.getvalue()
+
+
+def _npz(result: SimulationResult) -> bytes:
+    buffer = io.BytesIO()
+    arrays = {name: result[name] for name in result.names}
+    description = np.array(json.dumps(_description(result)))
+    np.savez_compressed(buffer, allow_pickle=False, time=result.time, run=description, **arrays)
+    return buffer.getvalue()
+
+
+def _mat(result: SimulationResult) -> bytes:
+    from scipy.io import savemat
+
+    contents: dict[str, Any] = {"time": result.time}
+    blocks: dict[str, str] = {}
+    paths: list[list[str]] = []
+    for name in result.names:
+        block, _, port = name.rpartition("/")
+        if block not in blocks:
+            blocks[block] = _identifier(block, {*contents, "run", "paths"})
+            contents[blocks[block]] = {}
+        fields: dict[str, Any] = contents[blocks[block]]
+        field = _identifier(port, set(fields))
+        fields[field] = result[name]
+        paths.append([name, f"{blocks[block]}.{field}", result.units[name]])
+    contents["run"] = {"name": result.name, **asdict(result.run)}
+    contents["paths"] = np.array(paths, dtype=object).reshape(len(paths), 3)
+    buffer = io.BytesIO()
+    savemat(buffer, contents, long_field_names=True, oned_as="column")
+    return buffer.getvalue()
+
+
+def _identifier(name: str, taken: set[str]) -> str:
+    """A MATLAB name (letters, digits, underscores, at most 63) near ``name`` that is not taken."""
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)[:56]
+    if not plain or not plain[0].isalpha():
+        plain = f"x{plain}"
+    candidate, number = plain, 2
+    while candidate in taken:
+        candidate, number = f"{plain}_{number}", number + 1
+    return candidate
+
+
+_WRITERS: dict[str, Callable[[SimulationResult], bytes]] = {
+    ".csv": _csv,
+    ".parquet": _parquet,
+    ".npz": _npz,
+    ".mat": _mat,
+}
+
+
+def _write_whole(place: Path, data: bytes) -> None:
+    """Write beside ``place``, synchronise, rename: a reader sees the old file or the new one."""
+    temporary: str | None = None
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        # mkstemp makes files that only their owner may read; a result is an ordinary file.
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(place)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise FormatError(
+            f"cannot be written: {error.strerror or error}",
+            where=str(place),
+            allowed="a file in an existing folder that you may write to, on a disk with room",
+            fix="choose another place or change the folder's permissions",
+        ) from error
+    _synchronise_folder(place.parent)
+
+
+def _synchronise_folder(folder: Path) -> None:
+    """Make the rename itself last; systems that cannot open a folder do without."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(handle)
+    except OSError:
+        pass
+    finally:
+        os.close(handle)

@@ -1,0 +1,170 @@
+"""What a run will do, worked out and checked before its first step: integrator, instants, tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.system import CompiledSystem
+from armblocks.equations import SimulationOptions
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.simulation.tableaux import DEFAULT, RK4, find_tableau
+
+Array = NDArray[np.float64]
+
+DEFAULT_INSTANTS = 1000
+"""Intervals that are recorded where nobody says a sample time: 10 s in steps of 10 ms."""
+MOST_INSTANTS = 20_000_000
+SMALLEST_RTOL = 1e-13
+"""Below it the rounding of doubles decides, not the method."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """One run, settled. ``tableau`` is ``None`` where there are no states and so nothing to integrate."""
+
+    tableau: ButcherTableau | None
+    reason: str
+    instants: Array
+    step: float
+    max_step: float
+
+
+def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
+    """Settle every open choice of ``options``. Raises ``InputError`` for values that cannot be run."""
+    stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
+    step = options.step
+    if step is not None:
+        step = _number("step", step, "a time in s above 0, at most the stop time", above=0.0)
+        if stop > 0.0 and step > stop:
+            raise InputError(
+                f"step is {step:g} s",
+                where=system.name,
+                allowed=f"above 0, at most the stop time {stop:g} s",
+                fix="choose a smaller step",
+            )
+    tableau, reason = _choose(system, options)
+    sample_time = _sample_time(options, stop, None if tableau is None or tableau.adaptive else step)
+    rtol, atol = options.rtol, options.atol
+    if not SMALLEST_RTOL <= rtol <= 1.0:
+        raise InputError(
+            f"rtol is {rtol!r}",
+            where=system.name,
+            allowed=f"{SMALLEST_RTOL:g} to 1: doubles carry 16 digits",
+            fix="1e-6 is a good start, 1e-10 is tight",
+        )
+    _number("atol", atol, "a number above 0, in the units of the states", above=0.0)
+    max_step = math.inf
+    if options.max_step is not None:
+        max_step = _number("max_step", options.max_step, "a time in s above 0", above=0.0)
+    return Plan(
+        tableau=tableau,
+        reason=reason,
+        instants=sample_instants(stop, sample_time),
+        step=step if step is not None else sample_time,
+        max_step=max_step,
+    )
+
+
+def _number(
+    name: str, value: object, allowed: str, least: float | None = None, above: float | None = None
+) -> float:
+    good = isinstance(value, int | float | np.integer | np.floating) and math.isfinite(value)
+    if good and (least is None or value >= least) and (above is None or value > above):
+        return float(value)
+    raise InputError(f"{name} is {value!r}", allowed=allowed, fix=f"give another {name}")
+
+
+def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[ButcherTableau | None, str]:
+    automatic = options.solver.casefold() == "auto"
+    named = None if automatic else find_tableau(options.solver)
+    if system.states.size == 0:
+        return None, "none needed: the system has no states, every instant is evaluated directly"
+    if named is None and options.step is not None:
+        return RK4, "a step was given, so a fixed-step method of order 4"
+    if named is None:
+        return DEFAULT, "auto: adaptive and explicit, order 5, for systems that are not stiff"
+    if named.adaptive and options.step is not None:
+        raise InputError(
+            f"solver {named.name} chooses its own steps, and step is {options.step:g} s",
+            where=system.name,
+            allowed="step with a fixed-step solver: euler, heun, rk3, rk4, rk5",
+            fix="use max_step to bound the steps, or solver='rk4'",
+        )
+    return named, f"asked for: {named.title}"
+
+
+def _sample_time(options: SimulationOptions, stop: float, fixed_step: float | None) -> float:
+    """As asked; else the fixed step, or the multiple of it that gives at most 10 000 rows; else stop / 1000."""
+    if options.sample_time is not None:
+        sample_time = _number("sample_time", options.sample_time, "a time in s above 0", above=0.0)
+    elif fixed_step is not None and stop > 0.0:
+        sample_time = fixed_step * max(1, math.ceil(stop / fixed_step / 10_000 * (1.0 - 1e-9)))
+    else:
+        sample_time = stop / DEFAULT_INSTANTS if stop > 0.0 else 1.0
+    if stop / sample_time > MOST_INSTANTS:
+        raise InputError(
+            f"a sample time of {sample_time:g} s over {stop:g} s records {stop / sample_time:.3g} instants",
+            allowed=f"at most {MOST_INSTANTS}",
+            fix="choose a larger sample_time: it has no effect on the accuracy of the steps",
+        )
+    return sample_time
+
+
+def sample_instants(stop: float, sample_time: float) -> Array:
+    """``k sample_time`` for ``k = 0, 1, …`` below ``stop``, and ``stop`` itself, ``(N,)`` s.
+
+    Each is one product, never a sum, so no error grows. An instant within a billionth of a sample time of the
+    stop time is the stop time.
+    """
+    last = math.ceil(stop / sample_time - 1e-9)
+    instants = np.arange(last + 1) * sample_time
+    instants[-1] = stop
+    return instants
+
+
+def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
+    """The flat parameters ``(np,)``: the system's own values, changed where ``given`` names others.
+
+    ``given`` is a mapping from ``block.parameter`` to a value of its shape (a number fills it), or the whole flat
+    vector. Raises ``UnknownNameError`` and ``InputError``.
+    """
+    if given is None:
+        return system.parameter_values
+    layout = system.parameters
+    if isinstance(given, Mapping):
+        p = system.parameter_values.copy()
+        for name, value in given.items():
+            if name not in layout.ranges:
+                raise UnknownNameError("parameter", name, layout.names, where=system.name)
+            slot = layout[name]
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape not in ((), slot.shape):
+                raise InputError(
+                    f"parameter '{name}' got a value of shape {array.shape}",
+                    where=system.name,
+                    allowed=f"shape {slot.shape}, or one number for all of it",
+                )
+            p[layout.ranges[name]] = np.broadcast_to(array, slot.shape).ravel()
+    else:
+        p = np.array(given, dtype=np.float64)
+        if p.shape != (layout.size,):
+            raise InputError(
+                f"the parameter vector has shape {p.shape}",
+                where=system.name,
+                allowed=f"({layout.size},): one number for each of {', '.join(layout.names) or 'none'}",
+            )
+    if not np.isfinite(p).all():
+        bad = next(slot.name for slot in layout if not np.isfinite(p[layout.ranges[slot.name]]).all())
+        raise InputError(
+            f"parameter '{bad}' is {p[layout.ranges[bad]].tolist()}",
+            where=system.name,
+            allowed="finite numbers",
+            fix="NaN and infinities cannot be simulated",
+        )
+    return p

@@ -1,0 +1,141 @@
+"""What a run gives: time, every signal by its path, and how the run went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.equations import Signature
+from armblocks.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunReport:
+    """How a run went.
+
+    ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
+    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``wall_time`` s
+    of the whole run; ``real_time_factor`` simulated seconds per second. ``complete``: whether the stop
+    time was reached; ``message``: what a person should know (why it stopped, stiffness), else empty.
+    """
+
+    solver: str
+    reason: str
+    steps: int = 0
+    rejected: int = 0
+    evaluations: int = 0
+    wall_time: float = 0.0
+    real_time_factor: float = 0.0
+    complete: bool = True
+    message: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SimulationResult:
+    """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
+
+    ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
+    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used.
+    """
+
+    name: str
+    time: Array
+    signals_layout: Signature
+    signals: Array
+    states_layout: Signature
+    states: Array
+    parameters_layout: Signature
+    parameter_values: Array
+    aliases: Mapping[str, str]
+    run: RunReport
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths of all signals, ``block/port``, in evaluation order."""
+        return self.signals_layout.names
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of every signal, ``""`` where it has none."""
+        return {slot.name: slot.unit for slot in self.signals_layout}
+
+    @property
+    def parameters(self) -> Mapping[str, Array]:
+        """Every tunable parameter, ``block.parameter``, as the run used it."""
+        return self.parameters_layout.unpack(self.parameter_values)
+
+    def resolve(self, name: str) -> str:
+        """The signal's path: ``name`` itself, a block with one output, or an input port and what drives it.
+
+        Raises ``UnknownNameError`` with the nearest name.
+        """
+        if name in self.signals_layout.ranges:
+            return name
+        if name in self.aliases:
+            return self.aliases[name]
+        raise UnknownNameError("signal", name, [*self.names, *self.aliases], where=self.name)
+
+    def __getitem__(self, name: str) -> Array:
+        path = self.resolve(name)
+        place = self.signals_layout.ranges[path]
+        return self.signals[place].T.reshape(self.time.size, *self.signals_layout[path].shape)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals_layout.ranges or name in self.aliases
+
+    def columns(self) -> tuple[str, ...]:
+        """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[0]``, ``fkine/T[0,3]``."""
+        names: list[str] = []
+        for slot in self.signals_layout:
+            if not slot.shape:
+                names.append(slot.name)
+                continue
+            names += [f"{slot.name}[{','.join(map(str, index))}]" for index in np.ndindex(*slot.shape)]
+        return tuple(names)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`."""
+        from armblocks.simulation.export import to_dataframe
+
+        return to_dataframe(self)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a file by its suffix: ``.csv``, ``.parquet``, ``.npz`` or ``.mat``; all of it or nothing.
+
+        Raises ``UnknownNameError`` for another suffix and ``FormatError`` where the file cannot be written.
+        """
+        from armblocks.simulation.export import save
+
+        save(self, path)
+
+    def __repr__(self) -> str:
+        report = self.run
+        end = f"{self.time[-1]:g} s" if self.time.size else "nothing"
+        solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
+        head = (
+            f"{self.name}: {self.time.size} instants to {end}, {len(self.names)} signals, {solver}, "
+            f"{report.wall_time:.3g} s ({report.real_time_factor:.3g} x real time)"
+        )
+        lines = [f"<SimulationResult {head}{'' if report.complete else ', INCOMPLETE'}>"]
+        if report.message:
+            lines.append(f"  {report.message}")
+        width = max((len(name) for name in self.names), default=0)
+        for slot in self.signals_layout:
+            shape = "x".join(map(str, slot.shape)) or "scalar"
+            lines.append(f"  {slot.name:<{width}}  {shape:<6} {slot.unit}".rstrip())
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from armblocks.simulation.notebook_view import result_html
+
+        return result_html(self)

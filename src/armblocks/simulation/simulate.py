@@ -1,0 +1,184 @@
+"""Run a compiled system: plan, integrate in native chunks, evaluate the signals, say how it went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.compiler.native_integrator import Integration
+from armblocks.compiler.runge_kutta import Status
+from armblocks.compiler.system import CompiledSystem
+from armblocks.equations import SimulationOptions
+from armblocks.errors import SimulationError
+from armblocks.simulation.diagnosis import first_bad_signal, integration_failure, stiffness_hint
+from armblocks.simulation.plan import Plan, make_plan, parameter_vector
+from armblocks.simulation.result import RunReport, SimulationResult
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, float, float], None]
+"""Called with the simulated time (s), the fraction of the whole (0 to 1) and the real-time factor."""
+
+CHUNK_SECONDS = 0.04
+"""Wall time between two looks at Ctrl-C and the progress, roughly."""
+PROGRESS_SECONDS = 0.06
+
+
+def simulate(
+    compiled: CompiledSystem,
+    options: SimulationOptions,
+    parameters: Mapping[str, ArrayLike] | ArrayLike | None = None,
+    progress: Progress | None = None,
+) -> SimulationResult:
+    """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
+
+    ``parameters`` changes tunable parameters: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
+    ``progress(time, fraction, real_time_factor)`` is called at most some 16 times a second and at the end.
+
+    With ``solver="auto"`` a system without states is evaluated directly at all instants, any other is
+    integrated by Dormand-Prince 5(4), or by RK4 where ``step`` is given. Without a ``sample_time`` the stop time
+    is cut into 1000 (10 s in steps of 10 ms); with a fixed step, every step is recorded up to 10 000 rows.
+
+    Ctrl-C ends the run early: what is there is returned, with ``run.complete`` false.
+
+    Raises ``InputError`` and ``UnknownNameError`` for options and parameters that cannot be run, and
+    ``SimulationError`` where a signal or a derivative is not finite or the step becomes too small; its
+    ``partial`` is the result up to the last good instant.
+    """
+    begun = perf_counter()
+    p = parameter_vector(compiled, parameters)
+    plan = make_plan(compiled, options)
+    return _Run(compiled, options, plan, p, begun, progress).result()
+
+
+class _Run:
+    """One run in progress."""
+
+    def __init__(
+        self,
+        compiled: CompiledSystem,
+        options: SimulationOptions,
+        plan: Plan,
+        p: Array,
+        begun: float,
+        progress: Progress | None,
+    ) -> None:
+        self.compiled = compiled
+        self.options = options
+        self.plan = plan
+        self.p = p
+        self.begun = begun
+        self.progress = progress
+        self.integration: Integration | None = None
+        self.message = ""
+        self.complete = True
+        self.shown = begun
+
+    def result(self) -> SimulationResult:
+        instants = self.plan.instants
+        failure: SimulationError | None = None
+        if self.plan.tableau is None:
+            states = np.empty((instants.size, 0))
+        else:
+            integration = self.integrate()
+            states = integration.states[: integration.recorded]
+            instants = instants[: integration.recorded]
+            if integration.status not in (Status.DONE, Status.PAUSED):
+                failure = integration_failure(self.compiled, integration, self.p)
+            self.note_stiffness(integration)
+        signals = self.compiled.evaluate_signals(instants, states, self.p)
+        bad = first_bad_signal(self.compiled, instants, signals)
+        if bad is not None:
+            failure, good = bad
+            instants, states, signals = instants[:good], states[:good], signals[:, :good]
+        if failure is not None:
+            self.complete = False
+            self.message = " ".join(part for part in (failure.what + ".", self.message) if part)
+            failure.partial = self.make_result(instants, states, signals)
+            raise failure
+        if self.progress is not None and self.complete:
+            self.show(float(instants[-1]))
+        return self.make_result(instants, states, signals)
+
+    def integrate(self) -> Integration:
+        """Take all steps, in chunks, until the end, a failure or Ctrl-C."""
+        compiled, options, plan = self.compiled, self.options, self.plan
+        assert plan.tableau is not None
+        x0 = compiled.initial_states(self.p)
+        if not np.isfinite(x0).all():
+            bad = next(
+                s.name for s in compiled.states if not np.isfinite(x0[compiled.states.ranges[s.name]]).all()
+            )
+            raise SimulationError(
+                f"the initial value of state '{bad}' is {x0[compiled.states.ranges[bad]].tolist()}",
+                where=compiled.name,
+                allowed="finite numbers",
+                fix="change the block's initial value",
+            )
+        integration = compiled.integrator(plan.tableau).begin(
+            x0,
+            self.p,
+            plan.instants,
+            compiled.breakpoints(self.p),
+            step=plan.step,
+            rtol=options.rtol,
+            atol=options.atol,
+            max_step=plan.max_step,
+        )
+        self.integration = integration
+        steps = 1000
+        try:
+            while integration.status is Status.PAUSED:
+                started = perf_counter()
+                integration.advance(steps)
+                now = perf_counter()
+                # Twice as many steps at most: a chunk never outgrows what the last one took by much.
+                steps = max(100, int(steps * min(2.0, CHUNK_SECONDS / max(now - started, 1e-6))))
+                if self.progress is not None and now - self.shown >= PROGRESS_SECONDS:
+                    self.show(integration.time)
+        except KeyboardInterrupt:
+            self.complete = False
+            self.message = f"stopped by Ctrl-C at {integration.time:g} s of {options.stop_time:g} s"
+        return integration
+
+    def show(self, time: float) -> None:
+        """Tell the progress."""
+        self.shown = perf_counter()
+        stop = self.options.stop_time
+        assert self.progress is not None
+        self.progress(time, time / stop if stop > 0.0 else 1.0, time / (self.shown - self.begun))
+
+    def note_stiffness(self, integration: Integration) -> None:
+        hint = stiffness_hint(self.compiled, integration, self.p)
+        if hint:
+            self.message = f"{self.message}. {hint}" if self.message else hint
+
+    def make_result(self, instants: Array, states: Array, signals: Array) -> SimulationResult:
+        compiled, plan, integration = self.compiled, self.plan, self.integration
+        wall_time = perf_counter() - self.begun
+        reached = float(instants[-1]) if instants.size else 0.0
+        report = RunReport(
+            solver="none" if plan.tableau is None else plan.tableau.name,
+            reason=plan.reason,
+            steps=0 if integration is None else integration.accepted,
+            rejected=0 if integration is None else integration.rejected,
+            evaluations=0 if integration is None else integration.evaluations,
+            wall_time=wall_time,
+            real_time_factor=reached / wall_time,
+            complete=self.complete,
+            message=self.message,
+        )
+        return SimulationResult(
+            name=compiled.name,
+            time=instants,
+            signals_layout=compiled.signals_layout,
+            signals=signals,
+            states_layout=compiled.states,
+            states=states,
+            parameters_layout=compiled.parameters,
+            parameter_values=self.p,
+            aliases=compiled.aliases,
+            run=report,
+        )
