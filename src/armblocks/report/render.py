@@ -6,7 +6,7 @@ pixels, and the nearest fragment of each pixel is shaded. Passes are numbered in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,10 +40,26 @@ _SKY, _GROUND = 0.40, 0.17
 
 @dataclass(frozen=True, eq=False)
 class Rendering:
-    """``pixels`` (rows, columns, 4) uint8 straight alpha; ``nearness`` 1/depth seen there, or 0."""
+    """The pixels that a set of bodies covers, as a window of the panel.
+
+    ``pixels`` (rows, columns, 4) uint8, straight alpha; ``nearness`` (rows, columns) 1/depth of what is seen
+    there, or 0; ``left`` and ``top``: the window's first column and row; ``scale``: pixels per px.
+    """
 
     pixels: NDArray[np.uint8]
     nearness: _Array
+    left: int
+    top: int
+    scale: float
+
+    def nearness_at(self, x: _Array, y: _Array) -> _Array:
+        """1/depth of the bodies at points of the panel (px), 0 where there is none."""
+        column = np.floor(x * self.scale).astype(np.intp) - self.left
+        row = np.floor(y * self.scale).astype(np.intp) - self.top
+        rows, columns = self.nearness.shape
+        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        found = self.nearness[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+        return np.where(inside, found, 0.0)
 
 
 def render(
@@ -54,16 +70,18 @@ def render(
     Lambert shading with a key and a fill light and a sky dome, a Blinn highlight, dark lines where a body
     ends before another; after Foley et al., *Computer Graphics*, chapter 16.
     """
-    factor = scale * SUPERSAMPLES
-    columns, rows = round(width * scale) * SUPERSAMPLES, round(height * scale) * SUPERSAMPLES
     corners = np.concatenate([mesh.corners for mesh in meshes])
-    normals = np.concatenate([mesh.normals for mesh in meshes])
+    normals = np.concatenate([mesh.normals for mesh in meshes]) @ camera.axes.T
     counts = [len(mesh.corners) for mesh in meshes]
     material = np.repeat([_MATERIALS.index(mesh.material) for mesh in meshes], counts)
 
-    # Pass 1: project, drop what faces away.
+    # Pass 1: project, drop what faces away, and keep to the window that the bodies cover.
     x, y, nearness = camera.project(corners)
-    x, y = x * factor, y * factor
+    x, y = x * scale, y * scale
+    left, right = _extent(x, round(width * scale))
+    top, bottom = _extent(y, round(height * scale))
+    columns, rows = (right - left) * SUPERSAMPLES, (bottom - top) * SUPERSAMPLES
+    x, y = (x - left) * SUPERSAMPLES, (y - top) * SUPERSAMPLES
     doubled_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     seen = doubled_area < -1e-9  # y runs downwards: anticlockwise is negative
     x, y, nearness, doubled_area = x[seen], y[seen], nearness[seen], doubled_area[seen]
@@ -71,36 +89,50 @@ def render(
 
     # Pass 2: fragments, and the nearest of each pixel.
     triangle, column, row = _fragments(x, y, columns, rows)
-    weights = _barycentric(x, y, doubled_area, triangle, column, row)
-    depth = np.einsum("ij,ij->i", weights, nearness[triangle])
     pixel = row * columns + column
+    depth = _linear_in_pixels(x, y, doubled_area, nearness)(triangle, column, row)
     nearest = np.zeros(rows * columns)
     np.maximum.at(nearest, pixel, depth)
-    visible = depth == nearest[pixel]
-    triangle, pixel, weights = triangle[visible], pixel[visible], weights[visible]
+    visible = np.flatnonzero(depth == nearest[pixel])
+    triangle, column, row, pixel = triangle[visible], column[visible], row[visible], pixel[visible]
 
     # Pass 3: shade, in camera axes.
-    normal = np.einsum("ij,ijk->ik", weights, normals[triangle]) @ camera.axes.T
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    colour = _shade(normal, material[triangle])
-    image = np.zeros((rows * columns, 4))
-    image[pixel, :3] = colour
-    image[pixel, 3] = 1.0
-    facing = np.zeros((rows * columns, 3))
-    facing[pixel] = normal
+    normal = np.stack(
+        [_linear_in_pixels(x, y, doubled_area, normals[:, :, k])(triangle, column, row) for k in range(3)]
+    )
+    normal /= np.sqrt(np.einsum("ij,ij->j", normal, normal)) + 1e-12
+    linear = np.zeros((4, rows * columns))
+    linear[:3, pixel] = _shade(normal, material[triangle])
+    linear[3, pixel] = 1.0
+    facing = np.zeros((3, rows * columns))
+    facing[:, pixel] = normal
     nearest = nearest.reshape(rows, columns)
-    image = image.reshape(rows, columns, 4)
-    image[..., :3] *= _outlines(nearest, facing.reshape(rows, columns, 3))[..., None]
+    linear[:3] *= _outlines(nearest, facing.reshape(3, rows, columns)).ravel()
 
     # Pass 4: average the supersamples (colours weighted by coverage) and encode.
-    blocks = image.reshape(rows // SUPERSAMPLES, SUPERSAMPLES, columns // SUPERSAMPLES, SUPERSAMPLES, 4)
-    averaged = blocks.mean(axis=(1, 3))
-    alpha = averaged[..., 3:]
-    linear = averaged[..., :3] / np.maximum(alpha, 1e-9)
-    encoded = np.concatenate([_to_srgb(linear), alpha], axis=-1)
-    return Rendering(
-        pixels=np.rint(encoded * 255).astype(np.uint8), nearness=nearest[::SUPERSAMPLES, ::SUPERSAMPLES]
-    )
+    n = SUPERSAMPLES
+    planes = linear.reshape(4, rows, columns)
+    averaged = _block_means(planes, n)
+    alpha = averaged[3]
+    pixels = np.empty((rows // n, columns // n, 4), dtype=np.uint8)
+    for k in range(3):
+        pixels[..., k] = _SRGB[np.rint(averaged[k] / np.maximum(alpha, 1e-9) * _SRGB_STEPS).astype(np.intp)]
+    pixels[..., 3] = np.rint(alpha * 255)
+    return Rendering(pixels=pixels, nearness=nearest[::n, ::n], left=left, top=top, scale=scale)
+
+
+def _block_means(planes: _Array, n: int) -> _Array:
+    """Means over n x n blocks of the last two axes."""
+    total = planes[:, ::n, ::n].copy()
+    for k in range(1, n * n):
+        total += planes[:, k // n :: n, k % n :: n]
+    return total / n**2
+
+
+def _extent(values: _Array, limit: int) -> tuple[int, int]:
+    """First pixel and the one after the last of what is seen along one side of the panel; at least one."""
+    low = min(max(int(np.floor(values.min())) - 1, 0), limit - 1)
+    return low, max(min(int(np.ceil(values.max())) + 1, limit), low + 1)
 
 
 def shadow(
@@ -190,47 +222,50 @@ def _ranges(first: _Index, counts: _Index) -> tuple[_Index, _Index]:
     return owner, np.arange(len(owner)) - begin[owner] + first[owner]
 
 
-def _barycentric(
-    x: _Array, y: _Array, doubled_area: _Array, triangle: _Index, column: _Index, row: _Index
-) -> _Array:
-    px, py = column + 0.5, row + 0.5
-    # The weights are linear in the pixel: gradients once a triangle, then two multiply-adds a fragment.
-    gx1, gy1 = (y[:, 2] - y[:, 0]) / doubled_area, -(x[:, 2] - x[:, 0]) / doubled_area
-    gx2, gy2 = -(y[:, 1] - y[:, 0]) / doubled_area, (x[:, 1] - x[:, 0]) / doubled_area
-    dx, dy = px - x[triangle, 0], py - y[triangle, 0]
-    w1 = gx1[triangle] * dx + gy1[triangle] * dy
-    w2 = gx2[triangle] * dx + gy2[triangle] * dy
-    return np.stack([1 - w1 - w2, w1, w2], axis=1)
+def _linear_in_pixels(
+    x: _Array, y: _Array, doubled_area: _Array, values: _Array
+) -> Callable[[_Index, _Index, _Index], _Array]:
+    """Interpolation of corner values (F, 3): a plane for each triangle, evaluated at pixel centres."""
+    d1, d2 = values[:, 1] - values[:, 0], values[:, 2] - values[:, 0]
+    gx = (d1 * (y[:, 2] - y[:, 0]) - d2 * (y[:, 1] - y[:, 0])) / doubled_area
+    gy = (d2 * (x[:, 1] - x[:, 0]) - d1 * (x[:, 2] - x[:, 0])) / doubled_area
+    at_origin = values[:, 0] + gx * (0.5 - x[:, 0]) + gy * (0.5 - y[:, 0])
+
+    def evaluate(triangle: _Index, column: _Index, row: _Index) -> _Array:
+        return at_origin[triangle] + gx[triangle] * column + gy[triangle] * row
+
+    return evaluate
 
 
 def _shade(normal: _Array, material: _Index) -> _Array:
-    """Linear colours (P, 3) of surface points with unit normals in camera axes."""
-    base = np.array([_to_linear(rgb(_FINISH[m][0])) for m in _MATERIALS])[material]
-    gloss = np.array([_FINISH[m][1] for m in _MATERIALS])[material]
-    sharpness = np.array([_FINISH[m][2] for m in _MATERIALS])[material]
+    """Linear colours (3, P) of surface points with unit normals (3, P) in camera axes."""
     key, fill = _KEY / np.linalg.norm(_KEY), _FILL / np.linalg.norm(_FILL)
-    dome = _GROUND + (_SKY - _GROUND) * (0.5 + 0.5 * normal[:, 1])
-    light = (
-        dome + _KEY_STRENGTH * np.maximum(normal @ key, 0.0) + _FILL_STRENGTH * np.maximum(normal @ fill, 0.0)
-    )
     halfway = key + np.array([0.0, 0.0, 1.0])
     halfway /= np.linalg.norm(halfway)
-    highlight = gloss * np.maximum(normal @ halfway, 0.0) ** sharpness
+    light = _GROUND + (_SKY - _GROUND) * (0.5 + 0.5 * normal[1])
+    light += _KEY_STRENGTH * np.maximum(key @ normal, 0.0)
+    light += _FILL_STRENGTH * np.maximum(fill @ normal, 0.0)
     # Dark bodies keep a rim of light, so that graphite stands off a dark ground.
-    rim = 0.10 * (1.0 - np.clip(normal[:, 2], 0.0, 1.0)) ** 3
-    return np.clip(base * light[:, None] + (highlight + rim)[:, None], 0.0, 1.0)
+    white = 0.10 * (1.0 - np.clip(normal[2], 0.0, 1.0)) ** 3
+    white += _GLOSS[material] * np.exp(_SHARPNESS[material] * np.log(np.maximum(halfway @ normal, 1e-6)))
+    return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)
 
 
 def _outlines(nearness: _Array, facing: _Array) -> _Array:
     """A factor (rows, columns) below 1 where depth or direction jumps between neighbouring pixels."""
     factor = np.ones_like(nearness)
-    for axis in (0, 1):
-        other = np.roll(nearness, -1, axis=axis)
-        both = (nearness > 0) & (other > 0)
-        jump = both & (np.abs(other - nearness) > 0.006 * nearness)
-        bend = both & (np.einsum("ijk,ijk->ij", facing, np.roll(facing, -1, axis=axis)) < 0.55)
-        factor[jump] *= 0.45
-        factor[bend & ~jump] *= 0.72
+    views = (
+        (factor[:-1], nearness[:-1], nearness[1:], facing[:, :-1], facing[:, 1:]),
+        (factor[:, :-1], nearness[:, :-1], nearness[:, 1:], facing[:, :, :-1], facing[:, :, 1:]),
+    )
+    for target, here, there, facing_here, facing_there in views:
+        both = (here > 0) & (there > 0)
+        jump = both & (np.abs(there - here) > 0.006 * here)
+        aligned = facing_here[0] * facing_there[0]
+        aligned += facing_here[1] * facing_there[1]
+        aligned += facing_here[2] * facing_there[2]
+        target[both & (aligned < 0.55)] *= 0.72
+        target[jump] *= 0.6
     return factor
 
 
@@ -245,5 +280,18 @@ def _to_linear(colour: tuple[float, float, float]) -> _Array:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
-def _to_srgb(linear: _Array) -> _Array:
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+_GLOSS = np.array([_FINISH[m][1] for m in _MATERIALS])
+_SHARPNESS = np.array([_FINISH[m][2] for m in _MATERIALS])
+_BASE = np.stack([_to_linear(rgb(_FINISH[m][0])) for m in _MATERIALS], axis=1)
+
+_SRGB_STEPS = 4095
+"""Linear light in twelve bits: finer than eight bits of sRGB everywhere."""
+
+
+def _srgb_table() -> NDArray[np.uint8]:
+    linear = np.arange(_SRGB_STEPS + 1) / _SRGB_STEPS
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.rint(encoded * 255).astype(np.uint8)
+
+
+_SRGB = _srgb_table()

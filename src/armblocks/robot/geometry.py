@@ -11,6 +11,7 @@ The sizes are a matter of looks alone; nothing here enters the dynamics.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -22,6 +23,7 @@ from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Pose, Shape, Sphere
 from armblocks.robot.triangles import TriangleMesh, triangles
+from armblocks.spatial import Transform
 
 _Array = NDArray[np.float64]
 
@@ -78,12 +80,30 @@ def reach(robot: Robot) -> float:
     return max(0.1, *length.values()) + math.hypot(*robot.tool.translation)
 
 
+def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
+    """Poses of base, every link and tool in the world at joint coordinates ``q``, (L+2, 4, 4), rad and m.
+
+    The rows of ``dynamics.trace_link_poses``, worked out link by link for a drawing that has no compiled
+    signal to read. ``q`` is not checked.
+    """
+    frames: dict[str | None, Transform] = {None: robot.base}
+    coordinates = iter(q)
+    for link in robot.links:
+        frames[link.name] = frames[link.parent] @ link.pose(
+            float(next(coordinates)) if link.joint.moves else 0.0
+        )
+    tip = frames[robot.links[-1].name] @ robot.tool
+    rows = [robot.base, *(frames[link.name] for link in robot.links), tip]
+    return np.stack([row.matrix for row in rows])
+
+
 @dataclass(frozen=True, eq=False)
 class _Plan:
     """Sizes that links must agree on: the drum radius of every joint by link name, and who carries whom."""
 
     radius: dict[str, float]
     children: dict[str | None, list[Link]]
+    links: dict[str, Link]
     reach: float
 
     @classmethod
@@ -98,7 +118,17 @@ class _Plan:
             depth[link.name] = depth[link.parent] + (1 if link.joint.moves else 0)
             joints_before = depth[link.parent] if link.joint.moves else max(depth[link.parent] - 1, 0)
             radius[link.name] = first * max(_TAPER**joints_before, _SMALLEST)
-        return cls(radius, children, size)
+        return cls(radius, children, {link.name: link for link in robot.links}, size)
+
+    def shares_centre(self, link: Link) -> bool:
+        """Whether the link's joint turns about another axis through the centre of its carrier's joint."""
+        parent = self.links.get(link.parent) if link.parent is not None else None
+        if parent is None or not (parent.joint.turn and link.joint.turn):
+            return False
+        T = parent.after.inverse()
+        gap = np.array(link.before.translation) - T.p
+        across = (T.R @ np.array(parent.joint.axis)) @ (link.before.R @ np.array(link.joint.axis))
+        return float(np.linalg.norm(gap)) < 0.5 * self.radius[link.name] and abs(float(across)) < 0.5
 
 
 def _unit(vector: _Array) -> _Array:
@@ -139,7 +169,9 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     r = plan.radius[link.name]
     shapes: list[Shape] = []
     if link.joint.turn:
-        shapes += _drum(start, axis, r)
+        # Where two joints share their centre (shoulder, wrist) the inner drum pierces the outer collar.
+        inside = plan.shares_centre(link)
+        shapes += _drum(start, axis, r, length=2.15 * plan.radius[link.parent or ""] if inside else 2.0 * r)
     elif link.joint.slide:
         side = 1.7 * r
         shapes.append(Box(size=(side, side, 1.3 * side), pose=_aligned(start, axis)))
@@ -153,13 +185,13 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     return shapes
 
 
-def _drum(centre: _Array, axis: _Array, r: float) -> list[Shape]:
+def _drum(centre: _Array, axis: _Array, r: float, *, length: float) -> list[Shape]:
     """A motor drum on a joint axis: painted collar, graphite drum, steel cap on both ends."""
     pose = _aligned(centre, axis)
     return [
         Cylinder(radius=r, length=1.25 * r, bevel=0.08 * r, pose=pose),
-        Cylinder(radius=0.86 * r, length=2.0 * r, bevel=0.14 * r, material=Material.JOINT, pose=pose),
-        Cylinder(radius=0.38 * r, length=2.12 * r, bevel=0.05 * r, material=Material.FLANGE, pose=pose),
+        Cylinder(radius=0.86 * r, length=length, bevel=0.14 * r, material=Material.JOINT, pose=pose),
+        Cylinder(radius=0.38 * r, length=1.06 * length, bevel=0.05 * r, material=Material.FLANGE, pose=pose),
     ]
 
 
@@ -281,7 +313,8 @@ def _rail(link: Link, plan: _Plan) -> Shape:
     """The guide of a sliding joint over its whole range, in the frame of what carries the joint."""
     r = plan.radius[link.name]
     low, high = link.joint.limits.position or (0.0, 0.3 * plan.reach)
-    low, high = low + link.joint.offset - 1.2 * r, high + link.joint.offset + 1.2 * r
+    # From where the joint stands, whatever its range: a rail is fixed to something.
+    low, high = min(low + link.joint.offset, 0.0) - 1.2 * r, high + link.joint.offset + 1.2 * r
     axis = link.before.R @ np.array(link.joint.axis)
     centre = np.array(link.before.translation) + axis * (low + high) / 2
     return Box(size=(0.9 * r, 0.9 * r, high - low), material=Material.JOINT, pose=_aligned(centre, axis))

@@ -1,0 +1,62 @@
+"""Numbers for people: ticks, steps, SI prefixes, typographic minus."""
+
+from __future__ import annotations
+
+import math
+
+MINUS = "\u2212"
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+
+
+def nice_step(rough: float) -> float:
+    """The step of 1, 2 or 5 times a power of ten that is nearest above ``rough``."""
+    if not (rough > 0 and math.isfinite(rough)):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(rough))
+    for factor in (1.0, 2.0, 5.0):
+        if factor * power >= rough * (1 - 1e-9):
+            return factor * power
+    return 10.0 * power
+
+
+def nice_ticks(low: float, high: float, count: int) -> list[float]:
+    """About ``count`` round values within ``low`` .. ``high``."""
+    step = nice_step((high - low) / max(count, 1))
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    return [k * step + 0.0 for k in range(first, last + 1)]
+
+
+def axis_number(value: float) -> str:
+    """A tick label: up to six significant digits, no trailing zeros, thin groups for long numbers."""
+    if not math.isfinite(value):
+        return "not a number" if math.isnan(value) else ("∞" if value > 0 else MINUS + "∞")
+    text = f"{value:.6g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        return f"{mantissa}e{int(exponent)}".replace("-", MINUS)
+    whole, _, fraction = text.partition(".")
+    digits = whole.lstrip("-")
+    if len(digits) > 4:
+        groups: list[str] = []
+        while digits:
+            groups.insert(0, digits[-3:])
+            digits = digits[:-3]
+        whole = ("-" if value < 0 else "") + "\u202f".join(groups)
+    return (whole + ("." + fraction if fraction else "")).replace("-", MINUS)
+
+
+def table_number(value: float, digits: int = 4) -> str:
+    """A number for a table: ``digits`` significant digits, trailing zeros kept off, zero as 0."""
+    if value == 0 or not math.isfinite(value):
+        return axis_number(value)
+    return axis_number(float(f"{value:.{digits}g}"))
+
+
+def si_prefix(largest: float) -> tuple[float, str]:
+    """Factor and prefix that bring magnitudes up to ``largest`` into 1 .. 1000: ``(1e-3, "k")`` for 5000."""
+    if not (largest > 0 and math.isfinite(largest)):
+        return 1.0, ""
+    power = 3 * math.floor(math.log10(largest * (1 + 1e-12)) / 3)
+    power = min(max(power, -12), 12)
+    return 10.0**-power, _PREFIXES[power]
