@@ -66,9 +66,9 @@ class Block(ABC):
         """One sentence for people: the docstring's first line."""
         return (cls.__doc__ or "").strip().splitlines()[0]
 
-    def value(self, parameter: str) -> Value:
+    def parameter_value(self, name: str) -> Value:
         """The checked value of one parameter."""
-        return getattr(self, parameter)
+        return getattr(self, name)
 
     def check(self) -> None:  # noqa: B027 - optional, most blocks have nothing to add
         """Raise ``InputError`` where parameters contradict each other; each alone is already checked."""

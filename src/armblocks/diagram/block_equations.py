@@ -116,8 +116,10 @@ def block_equations(block: Block, input_shapes: Shapes) -> BlockEquations:
     return _trace(
         _Structure(
             kind=type(block),
-            fixed=tuple(block.value(rule.name) for rule in rules if not rule.tunable),
-            tunable_shapes=tuple(shape_of(block.value(rule.name)) for rule in rules if rule.tunable),
+            fixed=tuple(block.parameter_value(rule.name) for rule in rules if not rule.tunable),
+            tunable_shapes=tuple(
+                shape_of(block.parameter_value(rule.name)) for rule in rules if rule.tunable
+            ),
             input_shapes=tuple(input_shapes.items()),
             block=block,
         )
@@ -127,7 +129,7 @@ def block_equations(block: Block, input_shapes: Shapes) -> BlockEquations:
 def tunable_slots(block: Block) -> tuple[Slot, ...]:
     """The tunable parameters of a block, in order."""
     return tuple(
-        Slot(rule.name, shape_of(block.value(rule.name)), rule.unit)
+        Slot(rule.name, shape_of(block.parameter_value(rule.name)), rule.unit)
         for rule in block.parameters()
         if rule.tunable
     )

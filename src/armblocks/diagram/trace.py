@@ -126,7 +126,9 @@ class _Tracing:
                 else self.states[f"{node.block}/{state}"]
                 for state in group.states
             ]
-            inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
+            inputs = [
+                self.value(self.network.input(node.block, port, order)) for port in group.inputs
+            ]
             columns.append(vertcat(*states, *inputs, SX(0, 1)))
         (flat,) = group.rate(node.order).call([self.t, self.parameters[node.block], *columns], True, False)
         parts = _split(flat, [slot.size for slot in group.slots])
@@ -190,7 +192,7 @@ def _signal_values(
 
 def _parameter_values(diagram: Diagram) -> dict[str, Any]:
     return {
-        f"{name}.{rule.name}": block.value(rule.name)
+        f"{name}.{rule.name}": block.parameter_value(rule.name)
         for name, block in diagram.blocks.items()
         for rule in block.parameters()
         if rule.tunable

@@ -1,0 +1,244 @@
+"""Blocks with continuous states, and the exact time derivative."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, dot, mtimes, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    broadcast,
+    integral_unit,
+    parameter,
+    rate_unit,
+    shape_of,
+)
+from armblocks.equations import Shape
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integrator(Block):
+    """The integral over time: y' = u, y(0) = initial."""
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "Integrator"
+
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the rate"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the integral"),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the integral"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": integral_unit(inputs["u"])}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivative(Block):
+    """The exact rate of change: y = du/dt, worked out from the equations of what feeds it.
+
+    Nothing is filtered or differenced. Where the input jumps (Step), the jump is ignored and the rate on
+    its right side is given.
+    """
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "Derivative"
+    time_derivatives: ClassVar[Mapping[str, str]] = {"y": "u"}
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is differentiated"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its rate of change"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": rate_unit(inputs["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PID(Block):
+    """Proportional, integral and filtered derivative action: y = (P + I/s + D N s/(s + N)) u.
+
+    The form is that of Simulink's PID Controller (parallel). States: ``integral`` (integral' = I u) and
+    ``filter`` (filter' = N (D u - filter)), both 0 at the start unless said otherwise.
+    """
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "PID Controller"
+
+    P: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="proportional gain")
+    I: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="integral gain", unit="1/s")  # noqa: E741
+    D: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="derivative gain", unit="s")
+    N: ArrayLike = parameter(
+        100.0, kind=ParameterKind.ARRAY, doc="bandwidth of the derivative's filter", unit="rad/s", above=0.0
+    )
+    initial_integral: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="integral action at t = 0")
+    initial_filter: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="filter state at t = 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the error"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the control action"),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self._shape(inputs)
+        return (
+            State("integral", shape, "the integral action"),
+            State("filter", shape, "the filtered D u"),
+        )
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": self._shape(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        rate = p["N"] * (p["D"] * u["u"] - x["filter"])
+        return {"y": p["P"] * u["u"] + x["integral"] + rate}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"integral": p["I"] * u["u"], "filter": p["N"] * (p["D"] * u["u"] - x["filter"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"integral": p["initial_integral"], "filter": p["initial_filter"]}
+
+    def _shape(self, inputs: Shapes) -> Shape:
+        names = [rule.name for rule in self.parameters()]
+        return broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateSpace(Block):
+    """A linear system: x' = A x + B u, y = C x + D u, x(0) = initial.
+
+    D belongs to the structure (it is not tunable), so that a zero in it leaves the output free of the input
+    and the block may stand in a loop.
+    """
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "State-Space"
+
+    A: ArrayLike = parameter(((-1.0,),), dimensions=(2,), doc="the system matrix (n, n)", unit="1/s")
+    B: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the input matrix (n, m)")
+    C: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the output matrix (k, n)")
+    D: ArrayLike = parameter(((0.0,),), dimensions=(2,), doc="the feedthrough (k, m)", tunable=False)
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="the state (n,) at t = 0, or one number for all"
+    )
+
+    def check(self) -> None:
+        A, B, C, D = (shape_of(self.parameter_value(name)) for name in "ABCD")
+        if A[0] != A[1] or B[0] != A[0] or C[1] != A[0] or (C[0], B[1]) != D:
+            raise InputError(
+                f"A is {A}, B is {B}, C is {C}, D is {D}",
+                where="StateSpace",
+                allowed="A (n, n), B (n, m), C (k, n), D (k, m)",
+                fix="make the four matrices fit each other",
+            )
+        if shape_of(self.initial) not in ((), A[:1]):
+            raise InputError(
+                f"initial has shape {shape_of(self.initial)}", where="StateSpace", allowed=f"() or {A[:1]}"
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=shape_of(self.B)[1:]),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output", shape=shape_of(self.C)[:1]),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", shape_of(self.A)[:1], "the state of the system"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        D = SX([list(row) for row in self.D])
+        return {"y": mtimes(p["C"], x["x"]) + mtimes(D, u["u"])}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": mtimes(p["A"], x["x"]) + mtimes(p["B"], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransferFunction(Block):
+    """A rational transfer function: y = (b0 s^m + … + bm) / (a0 s^n + … + an) u, at rest at the start.
+
+    Coefficients stand from the highest power to the lowest, as in MATLAB. Its state is the controllable
+    canonical form's: x1 = u filtered by 1/denominator, differentiated n - 1 times, … xn.
+    """
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "Transfer Fcn"
+
+    numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, highest power first")
+    denominator: ArrayLike = parameter((1.0, 1.0), dimensions=(1,), doc="a0 … an, highest power first")
+
+    def check(self) -> None:
+        (b,), a = shape_of(self.numerator), tuple[float, ...](self.parameter_value("denominator"))
+        if a[0] == 0.0 or len(a) < 2 or b > len(a):
+            raise InputError(
+                f"the denominator is {list(a)} and the numerator has {b} coefficients",
+                where="TransferFunction",
+                allowed="a0 not zero, at least two a, and no more b than a",
+                fix="leave out leading zeros; a system with more zeros than poles cannot be simulated",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output", shape=()),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (self._degree,), "the canonical state"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        n, a = self._degree, p["denominator"] / p["denominator"][0]
+        b = vertcat(SX.zeros(n + 1 - p["numerator"].numel()), p["numerator"]) / p["denominator"][0]
+        # y = b0 u + sum (b_i - b0 a_i) x_i; a strictly proper system has no b0, so nothing feeds through.
+        return {"y": b[0] * u["u"] + dot(b[1:] - b[0] * a[1:], x["x"])}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        a = p["denominator"] / p["denominator"][0]
+        first = u["u"] - dot(a[1:], x["x"])
+        return {"x": vertcat(first, x["x"][: self._degree - 1])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    def _degree(self) -> int:
+        return shape_of(self.denominator)[0] - 1

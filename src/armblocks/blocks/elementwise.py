@@ -1,0 +1,26 @@
+"""What the elementwise blocks of all families share: numbered ports, and shapes and units that spread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from armblocks.diagram import Block, Port, broadcast, shape_of
+from armblocks.equations import Shape
+
+
+def numbered_ports(letter: str, count: int, doc: str) -> tuple[Port, ...]:
+    """Ports ``u1, u2, …``; a single one is just ``u``."""
+    if count == 1:
+        return (Port(letter, doc),)
+    return tuple(Port(f"{letter}{k}", f"{doc} {k}") for k in range(1, count + 1))
+
+
+def parameters_shape(block: Block, *names: str) -> Shape:
+    """The common shape of array parameters; scalars spread. Raises ``InputError`` where they disagree."""
+    return broadcast({name: shape_of(block.parameter_value(name)) for name in names})
+
+
+def common_unit(units: Mapping[str, str]) -> str:
+    """The unit that all have, or ``""``."""
+    found = set(units.values())
+    return found.pop() if len(found) == 1 else ""

@@ -1,0 +1,305 @@
+"""Blocks that calculate: their outputs follow from their inputs at the same instant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import ClassVar
+
+import casadi
+from casadi import SX, atan2, fmax, fmin, mtimes
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import common_unit, numbered_ports
+from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gain(Block):
+    """Every element times a number of its own, or all times one: y = gain * u."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Gain"
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is multiplied"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the product"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "gain": shape_of(self.gain)})}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["gain"] * u["u"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatrixGain(Block):
+    """A vector times a matrix: y = gain u, with gain (m, n), u (n,), y (m,)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Matrix Gain"
+
+    gain: ArrayLike = parameter(((1.0,),), kind=ParameterKind.ARRAY, dimensions=(2,), doc="the matrix (m, n)")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the vector", shape=shape_of(self.gain)[1:]),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "matrix times vector", shape=shape_of(self.gain)[:1]),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": mtimes(p["gain"], u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sum(Block):
+    """The sum of all inputs, each with its sign: for signs "+-" y = u1 - u2."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Sum"
+
+    signs: str = parameter("++", doc="one + or - for each input, such as +-")
+
+    def check(self) -> None:
+        if not self.signs or set(self.signs) - set("+-"):
+            raise InputError(
+                f"the value is '{self.signs}'", where="Sum.signs", allowed="+ and -, at least one"
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", len(self.signs), "term")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the sum"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        terms = [value if sign == "+" else -value for sign, value in zip(self.signs, u.values())]
+        return {"y": reduce(lambda left, right: left + right, terms)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Product(Block):
+    """The product of all inputs, element by element: for operators "*/" y = u1 / u2."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Product"
+
+    operators: str = parameter("**", doc="one * or / for each input, such as */")
+
+    def check(self) -> None:
+        if not self.operators or set(self.operators) - set("*/"):
+            raise InputError(
+                f"the value is '{self.operators}'", where="Product.operators", allowed="* and /, at least one"
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", len(self.operators), "factor")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the product"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        first, *others = zip(self.operators, u.values())
+        product = first[1] if first[0] == "*" else 1.0 / first[1]
+        for operator, value in others:
+            product = product * value if operator == "*" else product / value
+        return {"y": product}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatrixProduct(Block):
+    """The matrix product of two inputs: y = A B, where A (m, n) and B (n, k) or (n,)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Matrix Multiply"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("A", "the left matrix"), Port("B", "the right matrix or vector"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the product"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        A, B = inputs["A"], inputs["B"]
+        if len(A) != 2 or len(B) not in (1, 2) or A[1] != B[0]:
+            raise InputError(
+                f"'A' has shape {A} and 'B' has shape {B}",
+                allowed="A (m, n) with B (n, k) or (n,)",
+                fix="change the width of one of the signals",
+            )
+        return {"y": (A[0], *B[1:])}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": mtimes(u["A"], u["B"])}
+
+
+_FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
+    "abs": casadi.fabs,
+    "ceil": casadi.ceil,
+    "exp": casadi.exp,
+    "floor": casadi.floor,
+    "log": casadi.log,
+    "log10": casadi.log10,
+    "negate": lambda u: -u,
+    "reciprocal": lambda u: 1.0 / u,
+    "sign": casadi.sign,
+    "sqrt": casadi.sqrt,
+    "square": lambda u: u * u,
+}
+
+_TRIGONOMETRY: Mapping[str, Callable[[SX], SX]] = {
+    name: getattr(casadi, name)
+    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MathFunction(Block):
+    """An elementary function of every element: y = f(u), with f one of abs, exp, log, sqrt, square, …"""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Math Function"
+
+    function: str = parameter("exp", choices=tuple(_FUNCTIONS), doc="the function f")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the argument"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value of the function"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _FUNCTIONS[self.function](u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trigonometry(Block):
+    """A trigonometric function of every element: y = f(u), angles in rad."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Trigonometric Function"
+
+    function: str = parameter("sin", choices=tuple(_TRIGONOMETRY), doc="the function f")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the argument"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value of the function"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _TRIGONOMETRY[self.function](u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Atan2(Block):
+    """The angle of the point (x, y) from the x axis, in all four quadrants: angle = atan2(y, x)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Atan2"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "coordinate along y"), Port("x", "coordinate along x"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("angle", "angle, -pi to pi", "rad"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"angle": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"angle": atan2(u["y"], u["x"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Power(Block):
+    """Base to the power of the exponent, element by element: y = base ^ exponent."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Power"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("base", "the base"), Port("exponent", "the exponent"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the power"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["base"] ** u["exponent"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MinMax(Block):
+    """The least or the greatest of the inputs, element by element: y = min(u1, u2, …) or max."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "MinMax"
+
+    function: str = parameter("min", choices=("min", "max"), doc="which one")
+    inputs: int = parameter(2, minimum=1, doc="how many inputs")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "candidate")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the least or the greatest"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": reduce(fmin if self.function == "min" else fmax, u.values())}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saturation(Block):
+    """The input held between two limits: y = min(max(u, lower), upper)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Saturation"
+
+    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
+    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is limited"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the limited signal"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shapes = {"lower": shape_of(self.lower), "upper": shape_of(self.upper)}
+        return {"y": broadcast({**inputs, **shapes})}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": fmin(fmax(u["u"], p["lower"]), p["upper"])}
