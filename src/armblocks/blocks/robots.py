@@ -5,6 +5,7 @@ Their equations are those of :mod:`armblocks.dynamics`, with the robot's numbers
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -42,6 +43,7 @@ class JTraj(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "jtraj"
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
 
     q0: ArrayLike = parameter((0.0,) * 6, dimensions=(1,), doc="joint coordinates at t = 0", unit="rad")
     qf: ArrayLike = parameter(
@@ -223,6 +225,7 @@ class ForwardDynamics(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Robot"
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     q0: ArrayLike = parameter(

@@ -42,6 +42,11 @@ class Block(ABC):
     """Output ports that are the exact time derivative of an input: output name to input name.
 
     They have no equation: the tracing differentiates what feeds the input."""
+    output_rates: ClassVar[Mapping[str, str]] = {}
+    """Outputs whose exact time derivative is another output: ``{"q": "qd"}``.
+
+    A Derivative block behind ``q`` then gives ``qd`` itself, to the last bit: a joint that stands still has
+    the speed 0, and not 1e-17, which Coulomb friction would see."""
 
     def __post_init__(self) -> None:
         for rule in self.parameters():

@@ -48,7 +48,11 @@ class Network:
                     [str(entry) for entry in sorted(passed)], where=f"diagram '{self.diagram.name}'"
                 )
             passed.add(ref)
-        return self._slot(ref.block, SlotKind.OUTPUT, ref.port, order)
+        rates = self.diagram.blocks[ref.block].output_rates
+        port = ref.port
+        while order and port in rates:
+            port, order = rates[port], order - 1
+        return self._slot(ref.block, SlotKind.OUTPUT, port, order)
 
     def input(self, block: str, port: str, order: int = 0) -> Value:
         """Where the value that feeds an input port is found."""

@@ -126,9 +126,7 @@ class _Tracing:
                 else self.states[f"{node.block}/{state}"]
                 for state in group.states
             ]
-            inputs = [
-                self.value(self.network.input(node.block, port, order)) for port in group.inputs
-            ]
+            inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
             columns.append(vertcat(*states, *inputs, SX(0, 1)))
         (flat,) = group.rate(node.order).call([self.t, self.parameters[node.block], *columns], True, False)
         parts = _split(flat, [slot.size for slot in group.slots])
