@@ -1,0 +1,35 @@
+"""How Sphinx builds these pages, and the pages that are written from the code itself."""
+
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from generated_pages import write_generated_pages  # noqa: E402
+
+project = "armblocks"
+author = "The armblocks developers"
+copyright = "The armblocks developers"
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["_build"]
+
+html_theme = "furo"
+html_title = "armblocks"
+html_show_sourcelink = False
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+autodoc_default_options = {"members": True, "show-inheritance": False}
+add_module_names = False
+
+
+def setup(app: object) -> None:
+    """Write the generated pages before Sphinx looks for sources."""
+    write_generated_pages(HERE / "reference")

@@ -1,0 +1,87 @@
+"""Pages that are written from the code: the blocks of the library, the shipped robots and examples."""
+
+from __future__ import annotations
+
+import inspect
+import warnings
+from pathlib import Path
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Parameter
+from armblocks.simulation.tableaux import TABLEAUX
+
+
+def write_generated_pages(folder: Path) -> None:
+    """Write the pages into ``folder``; a page whose text is unchanged is left alone."""
+    folder.mkdir(exist_ok=True)
+    pages = {"blocks.md": blocks_page(), "shipped.md": shipped_page(), "solver-table.txt": solver_table()}
+    for name, text in pages.items():
+        path = folder / name
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def blocks_page() -> str:
+    """Every block of the library by family: what it does and what its parameters mean."""
+    lines = [
+        "# Blocks",
+        "",
+        f"The library has {len(BLOCKS)} blocks. A parameter marked *tunable* can be given another value for",
+        "each run without compiling again.",
+    ]
+    for family, kinds in BLOCKS.by_family().items():
+        lines += ["", f"## {family.capitalize()}"]
+        for kind in kinds:
+            lines += block_section(kind)
+    return "\n".join(lines) + "\n"
+
+
+def block_section(kind: type[Block]) -> list[str]:
+    """Heading, docstring and parameter table of one block."""
+    title = kind.type_name() if kind.title == kind.type_name() else f"{kind.type_name()} ({kind.title})"
+    lines = ["", f"### {title}", "", "```{eval-rst}", inspect.cleandoc(kind.__doc__ or ""), "```"]
+    if kind.parameters():
+        lines += ["", "| parameter | unit | default | tunable | meaning |", "|---|---|---|---|---|"]
+        lines += [parameter_row(rule) for rule in kind.parameters()]
+    return lines
+
+
+def parameter_row(rule: Parameter) -> str:
+    """One row of a block's parameter table."""
+    default = "" if rule.required else f"`{rule.default}`"
+    cells = (f"`{rule.name}`", rule.unit, default, "yes" if rule.tunable else "", rule.doc)
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def shipped_page() -> str:
+    """The shipped robots and examples, one line each."""
+    lines = [
+        "# Shipped robots and examples",
+        "",
+        "## Robots",
+        "",
+        "| name | joints | what it is |",
+        "|---|---|---|",
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ab.errors.InertiaWarning)
+        for name in ab.list_robots():
+            robot = ab.load_robot(name).robot
+            about = "; ".join(text for text in (robot.manufacturer, robot.comment, robot.source) if text)
+            lines.append(f"| `{name}` | {robot.joint_letters} | {about} |")
+        lines += ["", "## Examples", "", "| name | blocks | what it is |", "|---|---|---|"]
+        for name in ab.list_examples():
+            diagram = ab.load_diagram(name)
+            lines.append(f"| `{name}` | {len(diagram.blocks)} | |")
+    return "\n".join(lines) + "\n"
+
+
+def solver_table() -> str:
+    """Every explicit integrator."""
+    lines = ["| name | also known as | order | step | method |", "|---|---|---|---|---|"]
+    for tableau in TABLEAUX:
+        aliases = ", ".join(f"`{alias}`" for alias in tableau.aliases)
+        step = "adaptive" if tableau.adaptive else "fixed"
+        lines.append(f"| `{tableau.name}` | {aliases} | {tableau.order} | {step} | {tableau.title} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,85 @@
+"""``armblocks bench``: what this machine makes of a robot's kernels, in some seconds."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from armblocks.cli.terminal import STRONG, results_console, table
+
+if TYPE_CHECKING:
+    from armblocks import Arm
+
+METHODS: dict[str, tuple[str, ...]] = {
+    "fkine": ("q",),
+    "jacob0": ("q",),
+    "gravload": ("q",),
+    "inertia": ("q",),
+    "coriolis": ("q", "qd"),
+    "rne": ("q", "qd", "qdd"),
+    "accel": ("q", "qd", "tau"),
+}
+"""What is measured, with the inputs of each."""
+
+_REPEATS = 5
+"""The least of the repeats is told: what the machine can do, not what else it was doing."""
+
+
+def bench(
+    robot: Annotated[str, typer.Option(help="A shipped robot's name, or a robot file.")] = "puma560",
+    samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Size of the batch.")] = 100_000,
+    threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads of the last column.")] = 2,
+) -> None:
+    """Time the kernels of one robot here: single calls, a batch on one thread and on several."""
+    import armblocks as ab
+
+    arm = ab.load_robot(robot)
+    console = results_console()
+    console.print(
+        f"{arm.name}, {arm.n} joints; batches of {samples:,}; {os.cpu_count()} processors; "
+        f"the least of {_REPEATS} repeats, ns per evaluation",
+        style=STRONG,
+        markup=False,
+    )
+    columns = ("one call", "batch", f"{threads} threads", "multiplies", "adds", "divisions", "functions")
+    rows = table(("method", "left"), *((name, "right") for name in columns))
+    for method, inputs in METHODS.items():
+        rows.add_row(method, *_row(arm, method, len(inputs), samples, threads))
+    console.print(rows)
+
+
+def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list[str]:
+    generator = np.random.default_rng(0)
+    batch = [generator.uniform(-1.0, 1.0, (samples, arm.n)) for _ in range(inputs)]
+    single = [np.ascontiguousarray(values[0]) for values in batch]
+    call = getattr(arm, method)
+    out = call(*batch)
+    count = arm.operation_count(method)
+    calls = 2000
+
+    def many_single_calls() -> None:
+        for _ in range(calls):
+            call(*single)
+
+    times = (
+        _least(many_single_calls) / calls,
+        _least(lambda: call(*batch, out=out)) / samples,
+        _least(lambda: call(*batch, out=out, threads=threads)) / samples,
+    )
+    counts = (count.multiplies, count.adds, count.divisions, count.functions)
+    return [*(f"{seconds * 1e9:,.1f}" for seconds in times), *(str(number) for number in counts)]
+
+
+def _least(work: Callable[[], object]) -> float:
+    """Seconds of the quickest of some repeats."""
+    best = float("inf")
+    for _ in range(_REPEATS):
+        start = time.perf_counter()
+        work()
+        best = min(best, time.perf_counter() - start)
+    return best

@@ -1,0 +1,75 @@
+"""The entry point of the command line: commands, and what becomes of errors, warnings and Ctrl-C.
+
+Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 the input was refused (a message, no
+traceback), 130 interrupted with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from armblocks.cli import bench, listing, run, show
+from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
+from armblocks.errors import ArmblocksError
+
+REFUSED = 2
+INTERRUPTED = 130
+
+
+class Commands(TyperGroup):
+    """All commands: the one place that turns an error into a message and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that the arguments name."""
+        try:
+            with tidy_warnings(messages_console()):
+                return super().invoke(ctx)
+        except ArmblocksError as error:
+            if debugging():
+                raise
+            show_error(error)
+            raise typer.Exit(REFUSED) from None
+        except KeyboardInterrupt:
+            messages_console().print("interrupted")
+            raise typer.Exit(INTERRUPTED) from None
+
+
+app = typer.Typer(
+    name="armblocks",
+    cls=Commands,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Industrial arms and block diagrams, traced once and compiled to native code.",
+)
+app.command("run", help=run.run.__doc__)(run.run)
+app.command("show")(show.show)
+app.command("list")(listing.list_names)
+app.command("bench")(bench.bench)
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"armblocks {version('armblocks')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Say the version and stop.", callback=_say_version, is_eager=True),
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", hidden=True, envvar="ARMBLOCKS_DEBUG")] = False,
+) -> None:
+    """Options that stand before the command."""
+
+
+def main() -> None:
+    """What the installed ``armblocks`` script calls."""
+    app()

@@ -1,0 +1,53 @@
+"""How far a run is: a moving bar for a person who watches, plain lines for a file or a pipe."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn
+
+from armblocks.cli.terminal import ACCENT
+
+_LINE_EVERY = 5.0
+"""Seconds between two plain lines."""
+
+
+class RunProgress:
+    """Called during a run with the simulated time (s), the fraction done and the real-time factor."""
+
+    def __init__(self, name: str, console: Console) -> None:
+        self._name = name
+        self._console = console
+        self._told = time.perf_counter()
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> RunProgress:
+        if self._console.is_terminal:
+            self._bar = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(complete_style=ACCENT, finished_style=ACCENT),
+                TextColumn("{task.fields[where]}"),
+                console=self._console,
+                transient=True,
+            )
+            self._bar.start()
+            self._task = self._bar.add_task(self._name, total=None, where="preparing")
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def __call__(self, simulated: float, fraction: float, real_time_factor: float) -> None:
+        where = f"t = {simulated:.4g} s, {real_time_factor:.3g} x real time"
+        now = time.perf_counter()
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, total=1.0, completed=fraction, where=where)
+        elif now - self._told >= _LINE_EVERY:
+            self._told = now
+            self._console.print(f"{self._name}: {where} ({fraction:.0%})", markup=False)

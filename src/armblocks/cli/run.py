@@ -1,0 +1,103 @@
+"""``armblocks run``: simulate a diagram, tell how it went, and write its report."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from armblocks.cli.assignments import parse_assignments
+from armblocks.cli.progress import RunProgress
+from armblocks.cli.summary import print_displays, print_files, print_run
+from armblocks.cli.terminal import messages_console, results_console
+from armblocks.errors import ArmblocksError, FormatError, SimulationError
+
+
+class DataFormat(StrEnum):
+    """Files that are written on request, beside CSV and Parquet."""
+
+    NPZ = "npz"
+    MAT = "mat"
+
+
+def run(
+    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    stop_time: Annotated[
+        float | None, typer.Option(help="Simulated time, s.", show_default="the model's")
+    ] = None,
+    solver: Annotated[str | None, typer.Option(help="Integrator, such as rk45 or rk4.")] = None,
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
+    sample_time: Annotated[float | None, typer.Option(help="Spacing of the recorded instants, s.")] = None,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
+    atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the report.", show_default="MODEL-report")
+    ] = None,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
+    ] = None,
+    formats: Annotated[
+        list[DataFormat] | None, typer.Option("--format", help="Also write the data so; may be repeated.")
+    ] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    open_report: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+) -> None:
+    """Simulate a diagram and write a report: figures, numbers, data."""
+    import armblocks as ab
+
+    parameters = parse_assignments(assignments or [])
+    diagram = ab.load_diagram(model)
+    settings: dict[str, Any] = {
+        name: value
+        for name, value in {
+            "stop_time": stop_time,
+            "solver": solver,
+            "step": step,
+            "sample_time": sample_time,
+            "rtol": rtol,
+            "atol": atol,
+        }.items()
+        if value is not None
+    }
+    folder = _writable_folder(out or Path(f"{diagram.name}-report"))
+    failure: ArmblocksError | None = None
+    with RunProgress(diagram.name, messages_console()) as progress:
+        try:
+            result = ab.simulate(diagram, parameters=parameters, progress=progress, **settings)
+        except SimulationError as error:
+            if not isinstance(error.partial, ab.SimulationResult):
+                raise
+            failure, result = error, error.partial
+    ab.write_report(folder, diagram, result)
+    for extra in formats or []:
+        path = folder / f"data.{extra.value}"
+        result.save(path)
+    console = results_console()
+    print_run(result, console)
+    print_displays(diagram, result, console)
+    print_files(folder, console)
+    if open_report:
+        typer.launch(str(folder / "report.html"))
+    if failure is not None:
+        raise failure
+    if not result.run.complete:
+        raise KeyboardInterrupt
+
+
+def _writable_folder(folder: Path) -> Path:
+    """The folder, made if absent; refused before the run rather than after it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".armblocks-probe"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise FormatError(
+            f"the folder cannot be written ({error.strerror or error})",
+            where=str(folder),
+            fix="give another folder with --out",
+        ) from error
+    return folder

@@ -1,0 +1,185 @@
+"""``armblocks show``: a robot's tables, as the toolbox prints them and the paper's Table 2 has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from armblocks.cli.terminal import STRONG, results_console, table
+
+if TYPE_CHECKING:
+    from armblocks.robot import Link, Robot
+    from armblocks.spatial import Transform
+
+_DEGREE = float(np.pi / 180.0)
+
+
+def show(
+    robot: Annotated[str, typer.Argument(help="A shipped robot's name, or the path of a robot file.")],
+) -> None:
+    """Print a robot's D-H table, dynamics, limits, gravity, base and tool."""
+    import armblocks as ab
+
+    print_robot(ab.load_robot(robot).robot, results_console())
+
+
+def print_robot(robot: Robot, console: Console) -> None:
+    """All tables of one robot."""
+    _print_heading(robot, console)
+    _print_kinematics(robot, console)
+    _print_links(robot, console, "Dynamics, link side (about the centre of mass, link axes)", _DYNAMICS)
+    if any(link.motor is not None for link in robot.links):
+        note = f"Motors, before the gear (friction model: {robot.friction_model.value})"
+        _print_links(robot, console, note, _MOTORS)
+    _print_limits(robot, console)
+    _print_frames(robot, console)
+
+
+def _print_heading(robot: Robot, console: Console) -> None:
+    conventions = {link.dh.convention.value for link in robot.links if link.dh is not None}
+    short = {"standard": ", stdDH", "modified": ", modDH"}
+    rows = short[conventions.pop()] if len(conventions) == 1 else ""
+    heading = f"{robot.name} ({robot.n} axis, {robot.joint_letters}{rows})"
+    console.print(heading, style=STRONG, markup=False)
+    notes = [text for text in (robot.manufacturer, robot.comment) if text]
+    if notes:
+        console.print(f" {'; '.join(notes)};", markup=False)
+
+
+def _print_kinematics(robot: Robot, console: Console) -> None:
+    """The toolbox's own table where every moving link has a D-H row, else parents, axes and poses."""
+    if any(link.dh is None for link in robot.links):
+        _print_tree(robot, console)
+        return
+    console.print("\n".join(dh_lines(robot)), markup=False, soft_wrap=True)
+    console.print("theta and alpha in rad, d and a in m")
+
+
+def dh_lines(robot: Robot) -> list[str]:
+    """The D-H table as releases 9 and 10 of the toolbox print it, line by line."""
+    rule = "+---+" + "-----------+" * 5
+    heading = "| j |" + "".join(f"{name:>10} |" for name in ("theta", "d", "a", "alpha", "offset"))
+    lines = [rule, heading, rule]
+    for index, link in enumerate(robot.moving_links, start=1):
+        row = link.dh
+        if row is None:
+            continue
+        variable = f"q{index}"
+        theta, d = (f"{row.theta:.4g}", variable) if row.sigma else (variable, f"{row.d:.4g}")
+        cells = (theta, d, f"{row.a:.4g}", f"{row.alpha:.4g}", f"{row.offset:.4g}")
+        lines.append(f"|{index:3d}|" + "".join(f"{cell:>11}|" for cell in cells))
+    return [*lines, rule]
+
+
+def _print_tree(robot: Robot, console: Console) -> None:
+    columns = [
+        ("link", "left"),
+        ("parent", "left"),
+        ("joint", "left"),
+        ("axis", "left"),
+        ("at q = 0: x, y, z m", "left"),
+    ]
+    poses = table(*columns)
+    for link in robot.links:
+        x, y, z = link.pose(0.0).translation
+        axis = "" if not link.joint.moves else " ".join(f"{part:.3g}" for part in link.joint.axis)
+        kind = type(link.joint).__name__.lower()
+        poses.add_row(link.name, link.parent or "(base)", kind, axis, f"{x:.5g}, {y:.5g}, {z:.5g}")
+    console.print(poses)
+
+
+Row = tuple[str, str, Callable[["Link"], float]]
+
+
+def _motor(attribute: str) -> Callable[[Link], float]:
+    return lambda link: float("nan") if link.motor is None else float(getattr(link.motor, attribute))
+
+
+_DYNAMICS: Sequence[Row] = (
+    ("m", "kg", lambda link: link.mass),
+    *((f"r {axis}", "m", lambda link, i=i: link.centre_of_mass[i]) for i, axis in enumerate("xyz")),
+    *(
+        (f"I {name}", "kg m²", lambda link, i=i, j=j: link.inertia[i][j])
+        for name, (i, j) in zip(
+            ("xx", "yy", "zz", "xy", "yz", "xz"), ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+        )
+    ),
+)
+
+_MOTORS: Sequence[Row] = (
+    ("Jm", "kg m²", _motor("inertia")),
+    ("G", "", _motor("gear_ratio")),
+    ("B", "N m s/rad", _motor("viscous_friction")),
+    ("Tc+", "N m", lambda link: float("nan") if link.motor is None else link.motor.coulomb_friction[0]),
+    ("Tc-", "N m", lambda link: float("nan") if link.motor is None else link.motor.coulomb_friction[1]),
+)
+
+
+def _print_links(robot: Robot, console: Console, title: str, rows: Sequence[Row]) -> None:
+    """One column a link, as many side by side as the terminal has room for."""
+    width = max([10, *(len(link.name) + 2 for link in robot.links)])
+    fitting = max(1, (console.width - 18) // width)
+    for start in range(0, len(robot.links), fitting):
+        links = robot.links[start : start + fitting]
+        numbers = table(("", "left"), ("", "left"), *((link.name, "right") for link in links))
+        for name, unit, read in rows:
+            numbers.add_row(name, unit, *(_number(read(link)) for link in links))
+        console.print()
+        console.print(title, style=STRONG)
+        console.print(numbers)
+
+
+def _print_limits(robot: Robot, console: Console) -> None:
+    if all(joint.limits == type(joint.limits)() for joint in robot.joints):
+        return
+    limits = table(
+        ("joint", "left"), ("lowest", "right"), ("highest", "right"), ("speed", "right"), ("torque", "right")
+    )
+    for name, joint in zip(robot.joint_names, robot.joints):
+        turns = joint.unit == "rad"
+        scale, unit = (_DEGREE, "deg") if turns else (1.0, "m")
+        low, high = joint.limits.position or (float("nan"), float("nan"))
+        limits.add_row(
+            name,
+            _with_unit(low / scale, unit),
+            _with_unit(high / scale, unit),
+            _with_unit(_or_nan(joint.limits.speed) / scale, f"{unit}/s"),
+            _with_unit(_or_nan(joint.limits.torque), "N m" if turns else "N"),
+        )
+    console.print()
+    console.print("Limits", style=STRONG)
+    console.print(limits)
+
+
+def _print_frames(robot: Robot, console: Console) -> None:
+    console.print()
+    gravity = " ".join(f"{_number(part)}" for part in robot.gravity)
+    console.print(
+        f"grav = {gravity} m/s², the acceleration of a falling body (toolbox files: the opposite sign)"
+    )
+    for name, pose in (("base", robot.base), ("tool", robot.tool)):
+        console.print(f"{name} = {_pose_text(pose)}", markup=False)
+
+
+def _pose_text(pose: Transform) -> str:
+    if pose.is_identity:
+        return "identity"
+    matrix = pose.matrix
+    return "\n" + "\n".join("  " + "".join(f"{_number(entry):>12}" for entry in row) for row in matrix)
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
+def _number(value: float) -> str:
+    """Six digits and no more zeros than needed; nothing for what a link does not have."""
+    return "" if np.isnan(value) else f"{value:.6g}"
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return "" if np.isnan(value) else f"{value:.6g} {unit}"

@@ -1,0 +1,110 @@
+"""What the commands say and how it looks: errors, warnings, tables, for wide and narrow terminals.
+
+Colours are chosen to be read on light and on dark backgrounds alike (contrast of at least 4:1 on both), no
+meaning hangs on colour alone, and nothing is dimmed. Results go to standard output; progress, warnings and
+errors go to standard error.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import TextIO
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from armblocks.errors import ArmblocksError, ArmblocksWarning
+
+ERROR = "bold color(160)"
+WARNING = "bold color(166)"
+ACCENT = "color(166)"
+GOOD = "bold color(28)"
+STRONG = "bold"
+
+_UNWRAPPED = 100_000
+"""Width for errors that do not go to a terminal: a log is searched by line, so lines stay whole."""
+
+
+def results_console() -> Console:
+    """Standard output: 80 columns when it is no terminal, unless ``COLUMNS`` says otherwise."""
+    return Console(highlight=False)
+
+
+def messages_console() -> Console:
+    """Standard error; lines are wrapped only for a terminal."""
+    console = Console(stderr=True, highlight=False)
+    return console if console.is_terminal else Console(stderr=True, highlight=False, width=_UNWRAPPED)
+
+
+def table(*columns: tuple[str, str], title: str | None = None) -> Table:
+    """An empty table; each column is its heading and ``"left"`` or ``"right"``."""
+    empty = Table(
+        title=title,
+        title_justify="left",
+        title_style=STRONG,
+        box=box.SIMPLE_HEAD,
+        header_style=STRONG,
+        pad_edge=False,
+        show_edge=False,
+    )
+    for heading, side in columns:
+        empty.add_column(heading, justify="right" if side == "right" else "left", overflow="fold")
+    return empty
+
+
+def show_error(error: ArmblocksError) -> None:
+    """What, where, allowed and fix, one under the other."""
+    console = messages_console()
+    console.print(Text.assemble(("error: ", ERROR), (error.what, STRONG)), soft_wrap=not console.is_terminal)
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    for label, text in (("where", error.where), ("allowed", error.allowed), ("fix", error.fix)):
+        if text:
+            grid.add_row(Text(f"  {label}"), Text(text))
+    if grid.row_count:
+        console.print(grid)
+
+
+def debugging() -> bool:
+    """Whether ``ARMBLOCKS_DEBUG`` asks for tracebacks."""
+    return os.environ.get("ARMBLOCKS_DEBUG", "") not in ("", "0")
+
+
+@contextmanager
+def tidy_warnings(console: Console) -> Generator[None]:
+    """Show each armblocks warning once, as one line on ``console``; all others as Python does."""
+    shown: set[str] = set()
+    pythons_own = warnings.showwarning
+
+    def show(
+        message: Warning | str,
+        category: type[Warning],
+        filename: str,
+        lineno: int,
+        file: TextIO | None = None,
+        line: str | None = None,
+    ) -> None:
+        if not issubclass(category, ArmblocksWarning):
+            pythons_own(message, category, filename, lineno, file, line)
+        elif str(message) not in shown:
+            shown.add(str(message))
+            console.print(
+                Text.assemble(("warning: ", WARNING), str(message)), soft_wrap=not console.is_terminal
+            )
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", ArmblocksWarning)
+        warnings.showwarning = show
+        yield
+
+
+def is_interactive(stream: TextIO = sys.stderr) -> bool:
+    """Whether a person watches: then progress moves, else it is told in plain lines."""
+    return stream.isatty()

@@ -1,0 +1,60 @@
+"""Every Python block of the README and of the pages in docs runs, in order, as a reader would type it."""
+
+import contextlib
+import io
+import os
+import re
+import warnings
+from pathlib import Path
+
+import pytest
+
+from armblocks.errors import InertiaWarning
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def python_blocks(page: Path) -> list[tuple[int, str]]:
+    """Line and text of each fenced Python block."""
+    text = page.read_text(encoding="utf-8")
+    return [(text[: match.start(1)].count("\n") + 1, match.group(1)) for match in BLOCK.finditer(text)]
+
+
+WITH_CODE = [page for page in PAGES if python_blocks(page)]
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=[page.name for page in WITH_CODE])
+def test_the_code_of_a_page_runs(page: Path, tmp_path: Path) -> None:
+    namespace: dict[str, object] = {"__name__": page.stem}
+    before = Path.cwd()
+    os.chdir(tmp_path)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+            # The paper's own robot has inertias that no body can have, and says so.
+            warnings.simplefilter("ignore", InertiaWarning)
+            for line, code in python_blocks(page):
+                # Lines are counted from the page's first, so that a traceback points into it.
+                exec(compile("\n" * (line - 1) + code, str(page), "exec"), namespace)  # noqa: S102
+    finally:
+        os.chdir(before)
+
+
+def test_the_readme_begins_with_the_two_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    first = re.search(r"^```\w*\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert first is not None
+    assert first.group(1).splitlines() == ["python3 scripts/demo.py", "python3 scripts/test.py"]
+
+
+def test_ci_runs_the_test_command_of_the_readme() -> None:
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert script.splitlines()[-1] == "python3 scripts/test.py"
+
+
+def test_links_between_the_documents_lead_somewhere() -> None:
+    for page in (*ROOT.glob("*.md"), *PAGES):
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
