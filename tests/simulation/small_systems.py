@@ -11,17 +11,18 @@ from casadi import SX
 from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, signature
 
 Equation = Callable[[SX, SX, SX], SX]
+NOTHING = Signature()
 
 
 def system(
     name: str,
     *,
-    states: Signature = Signature(),
+    states: Signature = NOTHING,
     signals: Signature,
     derivative: Equation = lambda t, x, p: SX(0, 1),
     outputs: Equation,
     initial: Sequence[float] = (),
-    parameters: Signature = Signature(),
+    parameters: Signature = NOTHING,
     values: Sequence[float] = (),
     breakpoints: Callable[[SX], Sequence[SX | float]] = lambda p: (),
     aliases: Mapping[str, str] | None = None,

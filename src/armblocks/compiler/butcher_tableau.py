@@ -29,8 +29,9 @@ class ButcherTableau:
         x(t + theta h) = x + h * sum_j (sum_m dense[j][m] theta^(m+1)) K[j]
 
     An adaptive method also has ``error`` (s + 1 weights): the estimate ``h * sum_j error[j] K[j]`` is of
-    order ``error_order``, so the step scales with ``norm^(-1 / (error_order + 1))``. Where ``stretched_error``
-    is given, the two estimates are joined as in DOP853: ``e = h |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2)``.
+    order ``error_order``, so the step scales with ``norm^(-1 / (error_order + 1))``. Where
+    ``stretched_error`` is given, both estimates are joined as in DOP853:
+    ``e = h |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2)``.
 
     ``order`` is that of the steps, ``dense_order`` that of the values between them (global, both).
     """
@@ -111,16 +112,19 @@ class ButcherTableau:
         """Length of the interval of absolute stability on the negative real axis.
 
         A linear decay of rate ``lambda`` stays bounded while ``h lambda`` is below it. From the stability
-        function ``R(z) = 1 + z b (I - z A)^-1 1`` (Hairer, Wanner II, IV.2, proposition 2.1) on a grid of 0.01.
+        function ``R(z) = 1 + z b (I - z A)^-1 1`` (Hairer, Wanner II, IV.2, proposition 2.1), in hundredths.
         """
         s = self.stages
         A = np.zeros((s, s))
         for i, row in enumerate(self.matrix):
             A[i, :i] = row
-        b, ones = np.array(self.weights), np.ones(s)
+        b: NDArray[np.float64] = np.array(self.weights)
+        ones = np.ones(s)
         grid = np.arange(1, 2000) * 0.01
         for z in grid:
-            if abs(1.0 - z * (b @ np.linalg.solve(np.eye(s) + z * A, ones))) > 1.0 + 1e-9:
+            solution: NDArray[np.float64] = np.linalg.solve(np.eye(s) + z * A, ones)
+            stability = 1.0 - z * float(np.dot(b, solution))
+            if abs(stability) > 1.0 + 1e-9:
                 return float(z)
         return float(grid[-1])
 

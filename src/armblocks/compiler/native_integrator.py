@@ -54,9 +54,10 @@ class NativeIntegrator:
         """A run from ``x0`` (n,) at ``samples[0]`` to ``samples[-1]``, ready for its first step.
 
         ``samples`` (N,) s, rising strictly: the instants whose states are recorded. ``breakpoints`` (nb,) s,
-        in any order: a step ends exactly on each that lies inside, what comes before sees ``f`` at most at the
-        last double before it, and what comes after starts anew. ``step`` s: grid of a fixed-step method (its
-        instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. Nothing is checked.
+        in any order: a step ends exactly on each that lies inside, what comes before sees ``f`` at most at
+        the last double before it, and what comes after starts anew. ``step`` s: grid of a fixed-step method
+        (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. Nothing is
+        checked.
         """
         start, stop = float(samples[0]), float(samples[-1])
         inside = np.unique(breakpoints[(breakpoints > start) & (breakpoints <= stop)])

@@ -5,8 +5,8 @@ instants and restarts at breakpoints, without returning to Python. All of its st
 so a run can stop after any number of steps and go on with the same bits.
 
 Step control is that of SciPy's ``RK45`` (Hairer, Norsett, Wanner I, II.4): root-mean-square norm of the
-error over ``atol + rtol max(|x|, |x_new|)``, safety 0.9, factors 0.2 to 10, no growth right after a rejection,
-the same choice of the first step. Step counts can therefore be laid beside SciPy's.
+error over ``atol + rtol max(|x|, |x_new|)``, safety 0.9, factors 0.2 to 10, no growth right after a
+rejection, the same choice of the first step. Step counts can therefore be laid beside SciPy's.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from enum import IntEnum
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.ir_routine import Routine
-from armblocks.compiler.ir_text import Module, number_text as literal
+from armblocks.compiler.ir_text import Module
+from armblocks.compiler.ir_text import number_text as literal
 
 REVISION = 1
 """Part of every cache key: raise it whenever the emitted loop changes."""
@@ -172,8 +173,9 @@ class _Loop:
     def inverse_root(self, a: str, k: int) -> str:
         """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, to a few units in the last place.
 
-        A first guess by dividing the exponent bits, then twice ``y (1 - r)^(-1/k)`` with ``r = 1 - a y^k``, as
-        its Taylor polynomial of degree 6. Only exactly rounded operations, so no library's ``pow`` decides a step.
+        A first guess by dividing the exponent bits, then twice ``y (1 - r)^(-1/k)`` with ``r = 1 - a y^k``,
+        as its Taylor polynomial of degree 6. All operations are exactly rounded: no library's ``pow`` decides
+        a step.
         """
         w = self.w
         one = 1023 << 52

@@ -107,7 +107,7 @@ class CompiledSystem:
         return slope
 
     def evaluate_signals(self, t: Vector, x: Vector, p: Vector) -> Vector:
-        """Signals at many instants, several at a time: ``t (N,)``, ``x (N, nx)``, ``p (np,)`` to ``(ny, N)``."""
+        """Signals ``(ny, N)`` at many instants, several at a time: ``t (N,)``, ``x (N, nx)``, ``p (np,)``."""
         y = np.empty((self.signals_layout.size, t.size))
         if y.size:
             self._signals(0, t.size, t.size, t.ctypes.data, x.ctypes.data, p.ctypes.data, y.ctypes.data)

@@ -10,6 +10,7 @@ from armblocks.compiler.runge_kutta import Status
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
+from armblocks.simulation.result import element_names
 
 Array = NDArray[np.float64]
 
@@ -20,12 +21,9 @@ MANY_STEPS = 20_000
 def element_name(layout: Signature, place: int) -> str:
     """The name of scalar ``place`` of a flat vector: ``arm/q[2]``."""
     for slot in layout:
-        where = layout.ranges[slot.name]
-        if where.start <= place < where.stop:
-            if not slot.shape:
-                return slot.name
-            index = np.unravel_index(place - where.start, slot.shape)
-            return f"{slot.name}[{','.join(str(int(i)) for i in index)}]"
+        if place < slot.size:
+            return element_names(slot)[place]
+        place -= slot.size
     raise IndexError(place)
 
 
@@ -34,8 +32,8 @@ def first_bad_signal(
 ) -> tuple[SimulationError, int] | None:
     """The error for the first signal that is NaN or infinite, and how many instants before it are good.
 
-    ``signals`` ``(ny, N)``. First in time, then in evaluation order. Finite signals cost one pass over memory: a
-    sum of squares that is finite proves them so.
+    ``signals`` ``(ny, N)``. First in time, then in evaluation order. Finite signals cost one pass over
+    memory: a sum of squares that is finite proves them so.
     """
     flat = signals.reshape(-1)
     if np.isfinite(np.dot(flat, flat)):
@@ -50,12 +48,13 @@ def first_bad_signal(
 
 def _signal_error(system: CompiledSystem, place: int, value: float, time: float) -> SimulationError:
     name = element_name(system.signals_layout, place)
+    block = name.split("[")[0].rpartition("/")[0]
     return SimulationError(
         f"signal '{name}' is {value} at {time:.9g} s",
         where=system.name,
         allowed="finite numbers; every signal before it in evaluation order is finite",
-        fix=f"look at block '{name.split('[')[0].rpartition('/')[0]}': a division by zero, a root or logarithm of a "
-        "negative number, or an overflow",
+        fix=f"look at block '{block}': a division by zero, a root or logarithm of a negative number, or an "
+        "overflow",
     )
 
 
@@ -71,7 +70,7 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
     place = int(np.argmin(np.isfinite(system.derivative(time, state, p))))
     name = element_name(system.states, place)
     return SimulationError(
-        f"the derivative of state '{name}' is not finite at {time:.9g} s, where the state is {state[place]:.6g}",
+        f"the derivative of state '{name}' is not finite at {time:.9g} s, where it is {state[place]:.6g}",
         where=system.name,
         allowed="finite numbers",
         fix="the solution may blow up there, or the step may be too long: look at what drives the state",
@@ -86,11 +85,12 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
     )
     name = element_name(system.states, int(worst[0]))
     return SimulationError(
-        f"the step became as small as the rounding of the time at {run.time:.9g} s, and the error is still too "
-        f"large; its largest parts, over what is allowed: {share}; state '{name}' is {run.state[worst[0]]:.6g}",
+        f"the step became as small as the rounding of the time at {run.time:.9g} s, and the error is still "
+        f"too large; its largest parts, over what is allowed: {share}; "
+        f"state '{name}' is {run.state[worst[0]]:.6g}",
         where=system.name,
         allowed="solutions that stay bounded, and jumps only at known instants",
-        fix=f"look at what drives '{name}': the solution may grow without bound there, or its derivative may jump",
+        fix=f"look at what drives '{name}': it may grow without bound there, or its derivative may jump",
     )
 
 
@@ -119,7 +119,7 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     if rate * mean_step < 0.5 * run.integrator.tableau.real_stability:
         return ""
     return (
-        f"this system looks stiff: {tried} steps of {mean_step:.2g} s on average were held short by the stability of "
-        f"the explicit method, not by accuracy (fastest rate about {rate:.2g} 1/s). Replace the fastest dynamics "
-        "by their steady state, or make them slower, to run faster"
+        f"this system looks stiff: {tried} steps of {mean_step:.2g} s on average were held short by the "
+        f"stability of the explicit method, not by accuracy (fastest rate about {rate:.2g} 1/s). Replace the "
+        "fastest dynamics by their steady state, or make them slower, to run faster"
     )

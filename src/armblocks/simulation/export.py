@@ -65,7 +65,8 @@ def _description(result: SimulationResult) -> dict[str, Any]:
 
 
 def _csv(result: SimulationResult) -> bytes:
-    return to_dataframe(result).to_csv().encode()
+    text = to_dataframe(result).to_csv()  # pyright: ignore[reportUnknownMemberType]
+    return text.encode()
 
 
 def _parquet(result: SimulationResult) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,9 +75,11 @@ def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
 def _number(
     name: str, value: object, allowed: str, least: float | None = None, above: float | None = None
 ) -> float:
-    good = isinstance(value, int | float | np.integer | np.floating) and math.isfinite(value)
-    if good and (least is None or value >= least) and (above is None or value > above):
-        return float(value)
+    if isinstance(value, SupportsFloat) and not isinstance(value, str):
+        number = float(value)
+        high_enough = (least is None or number >= least) and (above is None or number > above)
+        if math.isfinite(number) and high_enough:
+            return number
     raise InputError(f"{name} is {value!r}", allowed=allowed, fix=f"give another {name}")
 
 
@@ -100,7 +103,7 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Butcher
 
 
 def _sample_time(options: SimulationOptions, stop: float, fixed_step: float | None) -> float:
-    """As asked; else the fixed step, or the multiple of it that gives at most 10 000 rows; else stop / 1000."""
+    """As asked; else the fixed step or its multiple that gives at most 10 000 rows; else stop / 1000."""
     if options.sample_time is not None:
         sample_time = _number("sample_time", options.sample_time, "a time in s above 0", above=0.0)
     elif fixed_step is not None and stop > 0.0:
@@ -123,7 +126,7 @@ def sample_instants(stop: float, sample_time: float) -> Array:
     stop time is the stop time.
     """
     last = math.ceil(stop / sample_time - 1e-9)
-    instants = np.arange(last + 1) * sample_time
+    instants: Array = np.arange(last + 1, dtype=np.float64) * sample_time
     instants[-1] = stop
     return instants
 
@@ -131,8 +134,8 @@ def sample_instants(stop: float, sample_time: float) -> Array:
 def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
     """The flat parameters ``(np,)``: the system's own values, changed where ``given`` names others.
 
-    ``given`` is a mapping from ``block.parameter`` to a value of its shape (a number fills it), or the whole flat
-    vector. Raises ``UnknownNameError`` and ``InputError``.
+    ``given`` is a mapping from ``block.parameter`` to a value of its shape (a number fills it), or the
+    whole flat vector. Raises ``UnknownNameError`` and ``InputError``.
     """
     if given is None:
         return system.parameter_values

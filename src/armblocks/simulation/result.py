@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -10,13 +11,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.equations import Signature
+from armblocks.equations import Signature, Slot
 from armblocks.errors import UnknownNameError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+
+
+def element_names(slot: Slot) -> tuple[str, ...]:
+    """A name for each scalar of a quantity, row by row: ``clock/y``; ``rne/tau[0]``, …; ``fkine/T[0,3]``."""
+    if not slot.shape:
+        return (slot.name,)
+    places = itertools.product(*(range(count) for count in slot.shape))
+    return tuple(f"{slot.name}[{','.join(map(str, place))}]" for place in places)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,13 +104,7 @@ class SimulationResult:
 
     def columns(self) -> tuple[str, ...]:
         """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[0]``, ``fkine/T[0,3]``."""
-        names: list[str] = []
-        for slot in self.signals_layout:
-            if not slot.shape:
-                names.append(slot.name)
-                continue
-            names += [f"{slot.name}[{','.join(map(str, index))}]" for index in np.ndindex(*slot.shape)]
-        return tuple(names)
+        return tuple(name for slot in self.signals_layout for name in element_names(slot))
 
     def to_dataframe(self) -> pd.DataFrame:
         """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`."""

@@ -34,12 +34,13 @@ def simulate(
 ) -> SimulationResult:
     """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
 
-    ``parameters`` changes tunable parameters: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
+    ``parameters`` changes tunable ones: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
     ``progress(time, fraction, real_time_factor)`` is called at most some 16 times a second and at the end.
 
     With ``solver="auto"`` a system without states is evaluated directly at all instants, any other is
-    integrated by Dormand-Prince 5(4), or by RK4 where ``step`` is given. Without a ``sample_time`` the stop time
-    is cut into 1000 (10 s in steps of 10 ms); with a fixed step, every step is recorded up to 10 000 rows.
+    integrated by Dormand-Prince 5(4), or by RK4 where ``step`` is given. Without a ``sample_time`` the stop
+    time is cut into 1000 (10 s in steps of 10 ms); with a fixed step, every step is recorded, or as many of
+    them as give at most 10 000 rows.
 
     Ctrl-C ends the run early: what is there is returned, with ``run.complete`` false.
 

@@ -1,0 +1,153 @@
+"""A result as a notebook shows it: one small picture a signal, in plain HTML and SVG that need nothing else.
+
+The page's own text colour and font are kept, so the view fits light and dark notebooks; traces are colours of
+Okabe and Ito (2008) that stand out on both.
+"""
+
+from __future__ import annotations
+
+import itertools
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from armblocks.equations import Slot
+    from armblocks.simulation.result import SimulationResult
+
+Array = NDArray[np.float64]
+
+TRACES = ("#1f83c0", "#e06a12", "#0f9d74", "#c06d9f", "#b98300", "#5aa9dd", "#8a8f98", "#a39a10")
+MOST_PANELS = 30
+MOST_TRACES = 8
+WIDTH, HEIGHT = 264, 132
+LEFT, RIGHT, TOP, BOTTOM = 54, 10, 8, 20
+
+STYLE = """
+.ab-result{font:13px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif;color:inherit;max-width:1120px}
+.ab-result h3{font-size:15px;margin:0 0 2px;font-weight:600}
+.ab-result p{margin:0 0 8px;opacity:.78;font-variant-numeric:tabular-nums}
+.ab-result .ab-note{opacity:1;border-left:3px solid #d55e00;padding:2px 8px}
+.ab-result .ab-panels{display:grid;grid-template-columns:repeat(auto-fill,minmax(264px,1fr));gap:10px 16px}
+.ab-result figure{margin:0}
+.ab-result figcaption{font-weight:600;overflow-wrap:anywhere}
+.ab-result figcaption span{font-weight:400;opacity:.7}
+.ab-result svg{width:100%;height:auto;display:block}
+.ab-result svg text{font-size:10px;fill:currentColor;opacity:.75;font-variant-numeric:tabular-nums}
+"""
+
+
+def result_html(result: SimulationResult) -> str:
+    """Title, how the run went, and a panel for each signal, as one self-contained piece of HTML."""
+    report = result.run
+    end = float(result.time[-1]) if result.time.size else 0.0
+    solver = "no solver needed" if report.solver == "none" else f"{report.solver}, {report.steps} steps"
+    facts = (
+        f"{result.time.size} instants to {end:g} s · {solver} · "
+        f"{_seconds(report.wall_time)} · {report.real_time_factor:,.0f} × real time"
+    )
+    parts = [f'<div class="ab-result"><style>{STYLE}</style><h3>{escape(result.name)}</h3><p>{facts}</p>']
+    if not report.complete:
+        parts.append(
+            '<p class="ab-note"><strong>Incomplete:</strong> the run did not reach its stop time.</p>'
+        )
+    if report.message:
+        parts.append(f'<p class="ab-note">{escape(report.message)}</p>')
+    slots = list(result.signals_layout)
+    parts.append('<div class="ab-panels">')
+    parts += [_panel(result.time, result[slot.name], slot) for slot in slots[:MOST_PANELS]]
+    parts.append("</div>")
+    if len(slots) > MOST_PANELS:
+        rest = ", ".join(escape(slot.name) for slot in slots[MOST_PANELS:])
+        parts.append(f"<p>Not drawn: {rest}</p>")
+    parts.append("</div>")
+    return "".join(parts)
+
+
+def _panel(time: Array, values: Array, slot: Slot) -> str:
+    columns = values.reshape(time.size, slot.size)
+    shown = columns[:, _most_telling(columns)]
+    low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 0.0)
+    unit = slot.unit or ""
+    shape = "×".join(map(str, slot.shape))
+    what = " · ".join(part for part in (unit, shape and f"{shape}") if part)
+    left_out = slot.size - shown.shape[1]
+    if left_out:
+        what += f" · {shown.shape[1]} of {slot.size} drawn"
+    spoken = f"{slot.name}{f' in {unit}' if unit else ''}: from {_tick(low)} to {_tick(high)}"
+    caption = f"<figcaption>{escape(slot.name)} <span>{escape(what)}</span></figcaption>"
+    return f"<figure>{caption}{_svg(time, shown, low, high, spoken)}</figure>"
+
+
+def _most_telling(columns: Array) -> list[int]:
+    """The components to draw: all of them, or those that move, the first ``MOST_TRACES`` at most."""
+    count = columns.shape[1]
+    if count <= MOST_TRACES or columns.shape[0] == 0:
+        return list(range(min(count, MOST_TRACES)))
+    moving = [k for k in range(count) if columns[:, k].max() > columns[:, k].min()]
+    return (moving or list(range(count)))[:MOST_TRACES]
+
+
+def _svg(time: Array, columns: Array, low: float, high: float, spoken: str) -> str:
+    # A constant sits in the middle of its panel: half of itself, or 1, on either side.
+    margin = 0.06 * (high - low) if high > low else (0.5 * abs(high) or 1.0)
+    bottom, top = low - margin, high + margin
+    start, end = (float(time[0]), float(time[-1])) if time.size else (0.0, 0.0)
+    across = (WIDTH - LEFT - RIGHT) / ((end - start) or 1.0)
+    down = (HEIGHT - TOP - BOTTOM) / (top - bottom)
+
+    def y(value: float) -> float:
+        return HEIGHT - BOTTOM - (value - bottom) * down
+
+    floor, right = HEIGHT - BOTTOM, WIDTH - RIGHT
+    lines = [
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(spoken, quote=True)}">',
+        f'<path d="M{LEFT} {TOP}V{floor}H{right}" fill="none" stroke="currentColor" stroke-opacity=".3"/>',
+    ]
+    if bottom < 0.0 < top:
+        lines.append(f'<path d="M{LEFT} {y(0.0):.1f}H{right}" stroke="currentColor" stroke-opacity=".15"/>')
+    lines += [
+        f'<text x="{LEFT - 5}" y="{y(value) + 3.5:.1f}" text-anchor="end">{_tick(value)}</text>'
+        for value in dict.fromkeys((low, high))
+    ]
+    lines.append(f'<text x="{LEFT}" y="{HEIGHT - 6}">{start:g}</text>')
+    lines.append(f'<text x="{right}" y="{HEIGHT - 6}" text-anchor="end">{end:g} s</text>')
+    for k in range(columns.shape[1]):
+        instants, values = _outline(time, columns[:, k])
+        points = " ".join(
+            f"{LEFT + (t - start) * across:.1f},{y(v):.1f}"
+            for t, v in zip(instants.tolist(), values.tolist())
+        )
+        lines.append(
+            f'<polyline points="{points}" fill="none" stroke="{TRACES[k % len(TRACES)]}" stroke-width="1.6" '
+            'stroke-linejoin="round"/>'
+        )
+    lines.append("</svg>")
+    return "".join(lines)
+
+
+def _outline(time: Array, values: Array, pieces: int = 110) -> tuple[Array, Array]:
+    """At most two points a piece, its lowest and highest, in order: the picture stays, the text shrinks."""
+    if time.size <= 2 * pieces:
+        return time, values
+    edges = [time.size * k // pieces for k in range(pieces + 1)]
+    chosen = {0, time.size - 1}
+    for a, b in itertools.pairwise(edges):
+        chosen |= {a + int(np.argmin(values[a:b])), a + int(np.argmax(values[a:b]))}
+    places = np.array(sorted(chosen))
+    return time[places], values[places]
+
+
+def _tick(value: float) -> str:
+    """Three significant digits, with a real minus sign."""
+    return f"{0.0 if abs(value) < 1e-300 else value:.3g}".replace("-", "−")
+
+
+def _seconds(value: float) -> str:
+    """A wall time with the prefix that fits."""
+    for limit, factor, unit in ((1e-3, 1e6, "µs"), (1.0, 1e3, "ms")):
+        if value < limit:
+            return f"{value * factor:.3g} {unit}"
+    return f"{value:.3g} s"

@@ -1,0 +1,23 @@
+"""The part of PyArrow that armblocks uses, typed."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+class Array: ...
+
+class Schema:
+    @property
+    def metadata(self) -> dict[bytes, bytes] | None: ...
+
+class Table:
+    @property
+    def schema(self) -> Schema: ...
+    @property
+    def column_names(self) -> list[str]: ...
+
+def array(values: NDArray[Any]) -> Array: ...
+def table(
+    data: Sequence[Array], *, names: Sequence[str] = ..., metadata: Mapping[str, str] | None = ...
+) -> Table: ...
