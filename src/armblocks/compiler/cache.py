@@ -1,15 +1,171 @@
-"""temporary"""
+"""Results of compilation on disk, so that a second process starts at once.
 
+One file for each result; its name is the SHA-256 of all that the result depends on, so nothing is ever
+replaced by something else. A file holds a checksum of its content: what is damaged or cut short counts as
+absent. Files are written beside their place and moved into it, so concurrent processes see whole files only.
+A folder that cannot be read or written is no error: everything is then compiled anew.
+
+The folder is ``$ARMBLOCKS_CACHE_DIR`` (empty: no cache), else the system's place for caches.
+"""
+
+from __future__ import annotations
+
+import contextlib
 import hashlib
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+_MAGIC = b"armblocks cache 1\n"
+_SIZE_LIMIT = 256 * 1024 * 1024
+_DAY = 86400.0
+_SUFFIX = ".bin"
 
 
-def object_name(parts):
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+def folder() -> Path | None:
+    """Where results are kept; None when the cache is switched off or there is no place for it."""
+    chosen = os.environ.get("ARMBLOCKS_CACHE_DIR")
+    if chosen is not None:
+        return Path(chosen) if chosen else None
+    try:
+        if sys.platform == "win32":
+            local = os.environ.get("LOCALAPPDATA")
+            return (Path(local) if local else Path.home() / "AppData" / "Local") / "armblocks" / "Cache"
+        if sys.platform == "darwin":
+            return Path.home() / "Library" / "Caches" / "armblocks"
+        base = os.environ.get("XDG_CACHE_HOME")
+        return (Path(base) if base else Path.home() / ".cache") / "armblocks"
+    except RuntimeError:  # no home directory
+        return None
 
 
-def load_object(name):
-    return None
+def object_name(parts: Sequence[str]) -> str:
+    """Name of machine code: ``parts`` say which, the compiler's own sources are added."""
+    return _digest(("object", compiler_fingerprint(), *parts))
 
 
-def store_object(name, code):
-    return None
+def record_name(key: str) -> str:
+    """Name of what is known under a caller's key; the sources of the whole package are added."""
+    return _digest(("record", package_fingerprint(), key))
+
+
+def _digest(parts: Sequence[str]) -> str:
+    whole = hashlib.sha256()
+    for part in parts:
+        data = part.encode()
+        whole.update(len(data).to_bytes(8, "little"))
+        whole.update(data)
+    return whole.hexdigest()
+
+
+@cache
+def compiler_fingerprint() -> str:
+    """Changes whenever a source file of the compiler changes."""
+    return _fingerprint(Path(__file__).parent)
+
+
+@cache
+def package_fingerprint() -> str:
+    """Changes whenever a source file of the package changes."""
+    return _fingerprint(Path(__file__).parent.parent)
+
+
+def _fingerprint(root: Path) -> str:
+    """Names, sizes and times of all Python files below ``root``."""
+    found: list[str] = []
+    with contextlib.suppress(OSError):
+        for entry in _python_files(root):
+            status = entry.stat()
+            found.append(f"{entry.path} {status.st_size} {status.st_mtime_ns}")
+    return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()
+
+
+def _python_files(root: Path | str) -> Iterator[os.DirEntry[str]]:
+    with os.scandir(root) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                yield from _python_files(entry.path)
+            elif entry.name.endswith(".py"):
+                yield entry
+
+
+def load(name: str) -> bytes | None:
+    """The content stored under ``name``, None where there is none or it is damaged."""
+    root = folder()
+    if root is None:
+        return None
+    path = _path(root, name)
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    start = len(_MAGIC) + 32
+    content = data[start:]
+    if not data.startswith(_MAGIC) or data[len(_MAGIC) : start] != hashlib.sha256(content).digest():
+        return None
+    with contextlib.suppress(OSError):  # what is in use is pruned last
+        if time.time() - path.stat().st_mtime > _DAY:
+            os.utime(path)
+    return content
+
+
+def store(name: str, content: bytes) -> None:
+    """Keep ``content`` under ``name``. Failing to write is no error."""
+    root = folder()
+    if root is None:
+        return
+    path = _path(root, name)
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(prefix=f"{name[:16]}-", suffix=".tmp", dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(_MAGIC + hashlib.sha256(content).digest() + content)
+            os.replace(temporary, path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.unlink(temporary)
+            raise
+        _prune_now_and_then(root)
+
+
+def _path(root: Path, name: str) -> Path:
+    return root / name[:2] / f"{name}{_SUFFIX}"
+
+
+_stores = 0
+
+
+def _prune_now_and_then(root: Path) -> None:
+    global _stores
+    _stores += 1
+    if _stores % 64 == 1:
+        prune(root)
+
+
+def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
+    """Remove the files used least recently until three quarters of ``limit`` bytes are left, if they exceed it.
+
+    Remains of writers that were killed are removed after a day.
+    """
+    found: list[tuple[float, int, Path]] = []
+    for path in root.glob("??/*"):
+        with contextlib.suppress(OSError):
+            status = path.stat()
+            if path.suffix == ".tmp" and time.time() - status.st_mtime > _DAY:
+                path.unlink()
+            elif path.suffix == _SUFFIX:
+                found.append((status.st_mtime, status.st_size, path))
+    total = sum(size for _, size, _ in found)
+    if total <= limit:
+        return
+    for _, size, path in sorted(found):
+        if total <= limit * 3 // 4:
+            break
+        with contextlib.suppress(OSError):
+            path.unlink()
+            total -= size

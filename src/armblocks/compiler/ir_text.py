@@ -56,6 +56,8 @@ class Body:
         self.word = self.type("i64")
         self.bit = self.type("i1")
         self.lines: list[str] = []
+        self.undecided: str | None = None
+        """Condition on lanes in which a vector function could not give its result; None: always decided."""
         self._count = 0
 
     def type(self, scalar: str) -> str:
@@ -163,6 +165,10 @@ class Body:
     def either(self, a: str, b: str) -> str:
         """Disjunction of conditions."""
         return self.let(f"or {self.bit} {a}, {b}")
+
+    def doubt(self, condition: str) -> None:
+        """Mark lanes in which this body's results are wrong and must be worked out with one lane."""
+        self.undecided = condition if self.undecided is None else self.either(self.undecided, condition)
 
     # Bits.
 

@@ -40,14 +40,14 @@ def load_code(key: Sequence[str], write: Callable[[], str]) -> NativeCode:
     """
     target = host_target()
     name = cache.object_name((*key, target.key))
-    code = cache.load_object(name)
+    code = cache.load(name)
     if code is not None:
         try:
             return _link(code, target)
         except RuntimeError:
             pass  # an object that LLVM cannot read is made anew
     code = compile_object(write(), target)
-    cache.store_object(name, code)
+    cache.store(name, code)
     return _link(code, target)
 
 

@@ -1,0 +1,132 @@
+"""The arrays that users pass to kernels: checked, and brought into the form that native code reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.equations import Shape, Signature, Slot
+from armblocks.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def check_count(name: str, signature: Signature, values: Sequence[object]) -> None:
+    """Raise :class:`InputError` unless there is one value per slot."""
+    if len(values) != len(signature):
+        raise InputError(
+            f"{len(values)} arguments were given",
+            where=name,
+            allowed=_listing(signature),
+            fix="pass each once",
+        )
+
+
+def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:
+    """``value`` as a float64 array of the slot's shape, or of that shape with the samples' axis before it.
+
+    The strides are left as they are. Raises :class:`InputError` for another shape, and for what holds no real
+    numbers (complex, text, objects, booleans).
+    """
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InputError(
+            f"'{slot.name}' cannot be read as an array: {error}", where=name, allowed=_allowed(slot)
+        ) from error
+    if array.dtype.kind not in "fiu":
+        raise InputError(
+            f"'{slot.name}' holds {array.dtype}",
+            where=name,
+            allowed="real numbers: any float or integer type",
+            fix="convert it with numpy.asarray(…, dtype=float)",
+        )
+    if array.shape != slot.shape and (array.ndim == 0 or array.shape[1:] != slot.shape):
+        raise InputError(f"'{slot.name}' has shape {array.shape}", where=name, allowed=_allowed(slot))
+    return array.astype(np.float64, copy=False)
+
+
+def count_samples(name: str, signature: Signature, arrays: Sequence[Array]) -> int | None:
+    """N of the arrays that hold samples, None if none does. Raises :class:`InputError` if they disagree."""
+    counts = {
+        slot.name: array.shape[0] for slot, array in zip(signature, arrays) if array.ndim > len(slot.shape)
+    }
+    if len(set(counts.values())) > 1:
+        found = ", ".join(f"'{slot}' {count}" for slot, count in counts.items())
+        raise InputError(
+            f"the inputs hold different numbers of samples: {found}",
+            where=name,
+            allowed="one number of samples; an input without a samples' axis serves all",
+        )
+    return next(iter(counts.values()), None)
+
+
+def new_outputs(
+    name: str, signature: Signature, shapes: Sequence[Shape], out: object, inputs: Sequence[Array]
+) -> tuple[list[Array], list[Array]]:
+    """Arrays to write into and arrays to hand out: the same, unless ``out`` shares memory with an input.
+
+    Raises :class:`InputError` when ``out`` is not what the call would give: shape, float64, C-contiguous,
+    writable; a tuple of these where there are several outputs.
+    """
+    if out is None:
+        fresh = [np.empty(shape) for shape in shapes]
+        return fresh, fresh
+    given: tuple[object, ...] = (out,) if len(signature) == 1 and not isinstance(out, tuple) else _tuple(out)
+    if len(given) != len(signature):
+        raise InputError(
+            f"out= holds {len(given)} arrays", where=name, allowed=f"one per output: {_listing(signature)}"
+        )
+    written: list[Array] = []
+    handed: list[Array] = []
+    for slot, shape, array in zip(signature, shapes, given):
+        checked = _check_output(name, slot, shape, array)
+        handed.append(checked)
+        aliased = any(np.may_share_memory(checked, other) for other in (*inputs, *handed[:-1]))
+        written.append(np.empty(shape) if aliased else checked)
+    return written, handed
+
+
+def _tuple(out: object) -> tuple[object, ...]:
+    return tuple(out) if isinstance(out, (tuple, list)) else (out,)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+
+
+def _check_output(name: str, slot: Slot, shape: Shape, array: object) -> Array:
+    found = ""
+    if not isinstance(array, np.ndarray):
+        found = f"is a {type(array).__name__}"
+    elif array.dtype != np.float64 or not array.dtype.isnative:
+        found = f"holds {array.dtype.str}"
+    elif array.shape != shape:
+        found = f"has shape {array.shape}"
+    elif not array.flags.c_contiguous or not array.flags.aligned:
+        found = "is not C-contiguous"
+    elif not array.flags.writeable:
+        found = "is read-only"
+    else:
+        return array  # pyright: ignore[reportUnknownVariableType]
+    raise InputError(
+        f"out= for '{slot.name}' {found}",
+        where=name,
+        allowed=f"a writable C-contiguous float64 array of shape {shape}",
+        fix="leave out= away, or allocate it with numpy.empty",
+    )
+
+
+def check_threads(name: str, threads: object) -> int:
+    """The number of threads. Raises :class:`InputError` unless it is a whole number from 1 up."""
+    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+        raise InputError(f"threads={threads!r}", where=name, allowed="a whole number from 1 up")
+    return int(threads)
+
+
+def _allowed(slot: Slot) -> str:
+    if not slot.shape:
+        return "a number, or shape (N,) for N samples"
+    return f"shape {slot.shape}, or (N, {', '.join(map(str, slot.shape))}) for N samples"
+
+
+def _listing(signature: Signature) -> str:
+    return ", ".join(f"{slot.name} {slot.shape}" for slot in signature) if len(signature) else "none"

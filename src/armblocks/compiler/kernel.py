@@ -1,0 +1,247 @@
+"""Kernels: traced functions as native code, called with NumPy arrays."""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.compiler.arguments import (
+    check_count,
+    check_threads,
+    count_samples,
+    new_outputs,
+    read_input,
+)
+from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
+from armblocks.compiler.entry import ENTRY, TABLE, emit_entry, make_entry
+from armblocks.compiler.ir_text import Module
+from armblocks.compiler.llvm_ir import emit_function
+from armblocks.compiler.native import NativeCode, load_code
+from armblocks.compiler.tape import OperationCount, Tape
+from armblocks.compiler.target import host_target
+from armblocks.equations import Shape, Signature, TracedFunction
+
+Array = NDArray[np.float64]
+
+_SMALLEST_SHARE = 2048
+"""Samples below which a share of a batch is not worth another thread."""
+
+
+def compile_function(traced: TracedFunction) -> Kernel:
+    """The kernel of a traced function. Machine code is made when a call first needs it, or found on disk.
+
+    Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that kernels do not know.
+    """
+    from armblocks.compiler.from_casadi import tape_from
+
+    tape = tape_from(traced)
+    return Kernel(traced.name, traced.inputs, traced.outputs, tape.digest, lambda: tape)
+
+
+class Kernel:
+    """``outputs = kernel(*inputs)`` in native code.
+
+    ``name``, ``inputs`` and ``outputs`` are those of the traced function. The same input gives the same bits
+    for one sample or many, whatever the number of threads.
+    """
+
+    def __init__(
+        self, name: str, inputs: Signature, outputs: Signature, digest: str, tape: Callable[[], Tape]
+    ) -> None:
+        self.name = name
+        self.inputs = inputs
+        self.outputs = outputs
+        self._digest = digest
+        self._make_tape = tape
+        self._batches: dict[str, Callable[..., None]] = {}
+        self._loaded: list[NativeCode] = []  # what the functions above run in
+        self._lock = threading.RLock()
+
+    @cached_property
+    def tape(self) -> Tape:
+        """The scalar program."""
+        return self._make_tape()
+
+    @property
+    def count(self) -> OperationCount:
+        """Multiplies, adds, functions and so on of one evaluation."""
+        return self.tape.count
+
+    @cached_property
+    def entry(self) -> Callable[..., Any]:
+        """A builtin that takes the same arguments as the kernel; by far the fastest way in for one sample."""
+        return self.entry_before(self.__call__)
+
+    def entry_before(self, fallback: Callable[..., Any]) -> Callable[..., Any]:
+        """A builtin like :attr:`entry` that leaves all but plain single calls to ``fallback``.
+
+        ``fallback`` gets the arguments and options unchanged.
+        """
+        options = "/, *, out=None, threads=1"
+        names = ", ".join(self.inputs.names)
+        shapes = ", ".join(f"{slot.name} {slot.shape}" for slot in self.inputs)
+        results = ", ".join(f"{slot.name} {slot.shape}" for slot in self.outputs)
+        doc = f"{self.name}({names}, {options})\n--\n\n{shapes} -> {results}; or N samples of each."
+        with self._lock:
+            code = self._single
+            return make_entry(
+                name=self.name,
+                doc=doc,
+                address=code.address(ENTRY),
+                table=code.address(TABLE),
+                fallback=fallback,
+                kept=(self, code),
+            )
+
+    def __call__(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
+        """Evaluate one sample or a batch.
+
+        Each input has its slot's shape, or ``(N, *shape)``; an input without the samples' axis serves all samples.
+        Any float or integer dtype and any strides are taken; C-contiguous float64 is read in place. ``out`` takes
+        the result: an array as the call would give, or a tuple of them where there are several outputs; it may be
+        one of the inputs. ``threads`` spreads a batch over that many threads.
+
+        Gives one array per output, of the slot's shape or ``(N, *shape)``; a ``numpy.float64`` for one scalar.
+        Raises :class:`~armblocks.errors.InputError` for wrong counts, shapes, dtypes and options.
+        """
+        return self._run(arrays, out, threads, columns=False)
+
+    def columns(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
+        """Evaluate a batch into arrays of column layout: ``(*shape, N)`` for each output.
+
+        Inputs as in a call; at least one must have the samples' axis. An input ``(N, n)`` that is the transpose of
+        a C-contiguous ``(n, N)`` array is read in place too.
+        """
+        return self._run(arrays, out, threads, columns=True)
+
+    def _run(self, values: Sequence[ArrayLike], out: object, threads: object, *, columns: bool) -> Any:
+        workers = check_threads(self.name, threads)
+        check_count(self.name, self.inputs, values)
+        arrays = [read_input(self.name, slot, value) for slot, value in zip(self.inputs, values)]
+        samples = count_samples(self.name, self.inputs, arrays)
+        shapes = [_result_shape(slot.shape, samples, columns=columns) for slot in self.outputs]
+        written, results = new_outputs(self.name, self.outputs, shapes, out, arrays)
+        if samples is None:
+            arrays = [_in_place(array) for array in arrays]
+            self._evaluate(*(_address(array) for array in (*arrays, *written)))
+        else:
+            layouts, arrays = self._lay_out(arrays, columns=columns)
+            outputs = (Layout.COLUMNS if columns else Layout.ROWS,) * len(self.outputs)
+            batch = self._batch(BatchLayout(inputs=layouts, outputs=outputs))
+            addresses = [_address(array) for array in (*arrays, *written)]
+            _share(batch, samples, addresses, workers)
+        for source, result in zip(written, results):
+            if source is not result:
+                result[...] = source
+        if out is None:
+            results = [result if result.ndim else result[()] for result in results]
+        return results[0] if len(results) == 1 else tuple(results)
+
+    def _lay_out(self, arrays: Sequence[Array], *, columns: bool) -> tuple[tuple[Layout, ...], list[Array]]:
+        layouts: list[Layout] = []
+        ready: list[Array] = []
+        for slot, array in zip(self.inputs, arrays):
+            shared = array.ndim == len(slot.shape)
+            in_columns = columns and not shared and array.ndim == 2 and array.flags.f_contiguous
+            if in_columns and array.flags.aligned and not array.flags.c_contiguous:
+                layouts.append(Layout.COLUMNS)
+                ready.append(array.T)
+            else:
+                layouts.append(Layout.SHARED if shared else Layout.ROWS)
+                ready.append(_in_place(array))
+        return tuple(layouts), ready
+
+    @cached_property
+    def _single(self) -> NativeCode:
+        def write() -> str:
+            module = Module()
+            emit_function(module, self.tape, "evaluate", linkage="")
+            emit_entry(module, self.inputs, self.outputs, "evaluate")
+            return module.text
+
+        shapes = repr([[slot.shape for slot in signature] for signature in (self.inputs, self.outputs)])
+        return load_code(("single", self._digest, shapes), write)
+
+    @cached_property
+    def _evaluate(self) -> Callable[..., None]:
+        with self._lock:
+            code = self._single
+        prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(self.inputs) + len(self.outputs)))
+        return prototype(code.address("evaluate"))
+
+    def _batch(self, layout: BatchLayout) -> Callable[..., None]:
+        with self._lock:
+            function = self._batches.get(layout.key)
+            if function is None:
+                code = load_code(("batch", self._digest, layout.key), lambda: self._write_batch(layout))
+                pointers = [ctypes.c_void_p] * (len(self.inputs) + len(self.outputs))
+                prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *pointers)
+                function = self._batches[layout.key] = prototype(code.address("batch"))
+                self._loaded.append(code)
+        return function
+
+    def _write_batch(self, layout: BatchLayout) -> str:
+        module = Module()
+        emit_batch(module, self.tape, layout, host_target().lanes, "batch")
+        return module.text
+
+    def __repr__(self) -> str:
+        inputs = ", ".join(f"{slot.name} {slot.shape}" for slot in self.inputs)
+        outputs = ", ".join(f"{slot.name} {slot.shape}" for slot in self.outputs)
+        return f"<Kernel {self.name}: {inputs} -> {outputs}>"
+
+
+def _result_shape(shape: Shape, samples: int | None, *, columns: bool) -> Shape:
+    if samples is None:
+        return shape
+    return (*shape, samples) if columns else (samples, *shape)
+
+
+def _in_place(array: Array) -> Array:
+    """The array, or a C-contiguous aligned copy."""
+    flags = array.flags
+    return array if flags.c_contiguous and flags.aligned else array.copy(order="C")
+
+
+def _address(array: Array) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def _share(batch: Callable[..., None], samples: int, addresses: Sequence[int], workers: int) -> None:
+    """Evaluate all samples; the native code does not hold the interpreter's lock."""
+    workers = min(workers, max(1, samples // _SMALLEST_SHARE))
+    if workers == 1:
+        batch(0, samples, samples, *addresses)
+        return
+    # More shares than workers, so that a delayed worker does not hold up the others; whole cache lines each.
+    share = max(_SMALLEST_SHARE, -(-samples // (workers * 4)))
+    share += -share % 64
+    starts = itertools.count(0, share)  # handing out the next number is atomic
+
+    def work() -> None:
+        while (start := next(starts)) < samples:
+            batch(start, min(start + share, samples), samples, *addresses)
+
+    helpers = [_pool().submit(work) for _ in range(workers - 1)]
+    work()
+    for helper in helpers:
+        helper.result()
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max_workers=max(64, os.cpu_count() or 1), thread_name_prefix="armblocks")
+
+
+if hasattr(os, "register_at_fork"):
+    # Threads do not survive a fork: the child makes its own.
+    os.register_at_fork(after_in_child=_pool.cache_clear)

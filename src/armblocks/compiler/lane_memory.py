@@ -1,0 +1,104 @@
+"""Samples between memory and lanes: sample ``k + lane`` of a block goes to lane ``lane``.
+
+Arrays in row layout (one sample after the other) are read and written as rows of full registers, which are
+transposed in registers by log2(lanes) rounds of shuffles: much less work than one element at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armblocks.compiler.ir_text import Body
+
+
+def load_rows(body: Body, pointer: str, size: int, first: int) -> list[str]:
+    """Columns ``first`` … ``first + lanes - 1`` of the block of rows at ``pointer``, each over all lanes.
+
+    ``pointer`` is to the first row of the block; rows have ``size`` numbers and follow each other. Columns
+    beyond ``size`` are poison. Nothing outside the block is read.
+    """
+    lanes = body.lanes
+    if lanes == 1 or size == 1:
+        return [_load(body, pointer, first)] + ["poison"] * (lanes - 1)
+    rows: list[str] = []
+    for row in range(lanes):
+        begin = row * size + first
+        excess = max(0, begin + lanes - lanes * size)
+        value = _load(body, pointer, begin - excess)
+        if excess:  # read back to back with the end of the block, then move into place
+            places = [lane + excess if lane + excess < lanes else None for lane in range(lanes)]
+            value = shuffle(body, value, "poison", places)
+        rows.append(value)
+    return transpose(body, rows)
+
+
+def store_rows(body: Body, pointer: str, size: int, first: int, columns: Sequence[str]) -> None:
+    """Write ``columns`` as columns ``first`` … of the block of rows at ``pointer``.
+
+    There are ``lanes`` columns, or all ``size`` where that is less. Nothing outside the block is written.
+    """
+    lanes = body.lanes
+    if lanes == 1 or size == 1:
+        _store(body, pointer, first, columns[0])
+        return
+    width = len(columns)
+    rows = transpose(body, [*columns, *["poison"] * (lanes - width)])
+    for row, value in enumerate(rows):
+        begin = row * size + first
+        if width == lanes or begin + lanes <= lanes * size:
+            # Lanes beyond the row spill into the next one, which is written after this one.
+            _store(body, pointer, begin, value)
+            continue
+        done = 0
+        while done < width:
+            piece = 1 << ((width - done).bit_length() - 1)
+            _store_piece(body, pointer, begin + done, value, range(done, done + piece))
+            done += piece
+
+
+def transpose(body: Body, rows: Sequence[str]) -> list[str]:
+    """Rows to columns, as many of either as lanes (a power of two)."""
+    lanes = body.lanes
+    values = list(rows)
+    half = 1
+    while half < lanes:
+        # Swap the off-diagonal half x half blocks within each 2 half x 2 half block.
+        for upper in range(lanes):
+            if upper & half:
+                continue
+            lower = upper + half
+            a, b = values[upper], values[lower]
+            low = [lane if not lane & half else lanes + lane - half for lane in range(lanes)]
+            high = [lane + half if not lane & half else lanes + lane for lane in range(lanes)]
+            values[upper], values[lower] = shuffle(body, a, b, low), shuffle(body, a, b, high)
+        half *= 2
+    return values
+
+
+def shuffle(body: Body, a: str, b: str, places: Sequence[int | None]) -> str:
+    """A vector picked from two: ``places`` count through ``a`` and then ``b``; None leaves a lane open."""
+    if a == "poison" and b == "poison":
+        return "poison"
+    mask = ", ".join("i32 poison" if place is None else f"i32 {place}" for place in places)
+    vector = f"<{body.lanes} x double>"
+    return body.let(f"shufflevector {vector} {a}, {vector} {b}, <{len(places)} x i32> <{mask}>")
+
+
+def _load(body: Body, pointer: str, offset: int) -> str:
+    address = body.let(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}")
+    return body.let(f"load {body.real}, ptr {address}, align 8")
+
+
+def _store(body: Body, pointer: str, offset: int, value: str) -> None:
+    address = body.let(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}")
+    body.do(f"store {body.real} {value}, ptr {address}, align 8")
+
+
+def _store_piece(body: Body, pointer: str, offset: int, value: str, lanes: range) -> None:
+    address = body.let(f"getelementptr inbounds double, ptr {pointer}, i64 {offset}")
+    if len(lanes) == 1:
+        element = body.let(f"extractelement {body.real} {value}, i64 {lanes[0]}")
+        body.do(f"store double {element}, ptr {address}, align 8")
+        return
+    piece = shuffle(body, value, "poison", list(lanes))
+    body.do(f"store <{len(lanes)} x double> {piece}, ptr {address}, align 8")
