@@ -1,0 +1,127 @@
+"""One quantity over another: tool path projections, XY graphs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.report.numbers import axis_number, nice_ticks
+from armblocks.report.picture import Disc, Mark, Picture, Polyline, Rectangle, Text
+from armblocks.report.scale import Scale, padded
+from armblocks.report.style import SMALL_SIZE, TEXT_SIZE, Tone, trace_tone
+from armblocks.report.text_width import text_width
+
+_Array = NDArray[np.float64]
+
+
+def path_chart(
+    x: _Array,
+    y: _Array,
+    *,
+    x_label: str,
+    y_label: str,
+    width: float,
+    height: float,
+    equal: bool,
+    span: float | None = None,
+    index: int = 0,
+) -> Picture:
+    """One quantity over another, with start, end and direction; ``equal``: one unit is as long both ways.
+
+    ``span`` makes the longer side of the data at least so long, for charts that should share one scale.
+    """
+    picture = Picture(width=width, height=height, title=f"{y_label} over {x_label}")
+    room_left, room_right, room_top, room_bottom = 58.0, 14.0, 26.0, 44.0
+    inner_width, inner_height = width - room_left - room_right, height - room_top - room_bottom
+    x_range, y_range = padded(x, 0.07), padded(y, 0.07)
+    if equal:
+        x_range, y_range = _equalised(x_range, y_range, inner_width, inner_height, span)
+    across = Scale(*x_range, room_left, room_left + inner_width)
+    up = Scale(*y_range, room_top + inner_height, room_top)
+    picture.add(
+        Rectangle(room_left, room_top, inner_width, inner_height, stroke=Tone.HAIRLINE, stroke_width=1)
+    )
+    for value in nice_ticks(*x_range, 4):
+        at = across(value)
+        picture.add(
+            Polyline([(at, room_top), (at, room_top + inner_height)], stroke=Tone.GRID, sharp=True),
+            Text(at, height - room_bottom + 16, axis_number(value), SMALL_SIZE, Tone.MUTED, "middle"),
+        )
+    for value in nice_ticks(*y_range, 4):
+        at = up(value)
+        picture.add(
+            Polyline([(room_left, at), (room_left + inner_width, at)], stroke=Tone.GRID, sharp=True),
+            Text(room_left - 7, at + 3.5, axis_number(value), SMALL_SIZE, Tone.MUTED, "end"),
+        )
+    picture.add(
+        Text(room_left + inner_width / 2, height - 8, x_label, size=TEXT_SIZE, anchor="middle"),
+        Text(4, 14, y_label, size=TEXT_SIZE),
+    )
+    points = np.column_stack([across.array(x), up.array(y)])
+    picture.extend(_path_with_direction(points, trace_tone(index)))
+    return picture
+
+
+def side_by_side(pictures: Sequence[Picture], *, title: str, description: str, gap: float = 12.0) -> Picture:
+    """Pictures of equal height in one row."""
+    width = sum(p.width for p in pictures) + gap * (len(pictures) - 1)
+    whole = Picture(width=width, height=max(p.height for p in pictures), title=title, description=description)
+    left = 0.0
+    for picture in pictures:
+        whole.place(picture, left, 0.0)
+        left += picture.width + gap
+    return whole
+
+
+def _equalised(
+    x: tuple[float, float], y: tuple[float, float], width: float, height: float, span: float | None
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    per_px = max((x[1] - x[0]) / width, (y[1] - y[0]) / height, (span or 0.0) * 1.14 / min(width, height))
+
+    def about(interval: tuple[float, float], length: float) -> tuple[float, float]:
+        middle = (interval[0] + interval[1]) / 2
+        return middle - length / 2, middle + length / 2
+
+    return about(x, per_px * width), about(y, per_px * height)
+
+
+def _path_with_direction(points: _Array, tone: Tone) -> list[Mark]:
+    good = points[np.isfinite(points).all(axis=1)]
+    if len(good) == 0:
+        return []
+    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(good, axis=0), axis=1))])
+    total = float(walked[-1])
+    keep = np.unique(np.concatenate([np.searchsorted(walked, np.arange(0.0, total, 1.2)), [len(good) - 1]]))
+    marks: list[Mark] = [Polyline(good[keep], stroke=tone, width=1.8)]
+    if total > 60:
+        for share in (0.25, 0.5, 0.75):
+            k = min(max(int(np.searchsorted(walked, share * total)), 1), len(good) - 1)
+            heading = good[k] - good[max(k - max(len(good) // 200, 1), 0)]
+            length = float(np.linalg.norm(heading))
+            if length > 0:
+                along = heading / length
+                side = np.array([-along[1], along[0]])
+                tip = good[k] + 4.5 * along
+                wings = np.stack([tip, tip - 9.5 * along + 4 * side, tip - 9.5 * along - 4 * side])
+                marks.append(Polyline(wings, stroke=None, fill=tone, closed=True))
+    (x0, y0), (x1, y1) = good[0].tolist(), good[-1].tolist()
+    marks.append(Disc(x0, y0, 4.2, fill=Tone.SURFACE, stroke=tone, stroke_width=1.8))
+    marks.append(Disc(x1, y1, 4.2, fill=tone, stroke=Tone.SURFACE, stroke_width=1.0))
+    if math.hypot(x1 - x0, y1 - y0) > 30:
+        for (x, y), word in (((x0, y0), "start"), ((x1, y1), "end")):
+            marks.append(_beside(points, x, y, word))
+    return marks
+
+
+def _beside(points: _Array, x: float, y: float, word: str) -> Text:
+    """The word next to a point, on the side where the line is not."""
+    near = points[np.hypot(points[:, 0] - x, points[:, 1] - y) < 40]
+    middle = near.mean(axis=0) if len(near) else np.array([x, y])
+    above = middle[1] >= y
+    width = text_width(word, SMALL_SIZE)
+    low, high = float(np.nanmin(points[:, 0])), float(np.nanmax(points[:, 0]))
+    left = min(max(x - width / 2, low - 8), max(high + 8 - width, low - 8))
+    return Text(left, y - 9 if above else y + 17, word, SMALL_SIZE, Tone.MUTED)

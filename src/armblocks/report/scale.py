@@ -1,0 +1,45 @@
+"""Straight maps from numbers to px."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Straight map from a range of numbers to a range of px."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        return self.start + (value - self.low) * self.factor
+
+    @property
+    def factor(self) -> float:
+        """px per unit."""
+        return (self.end - self.start) / (self.high - self.low)
+
+    def array(self, values: _Array) -> _Array:
+        """The map over an array."""
+        return self.start + (values - self.low) * self.factor
+
+
+def padded(values: _Array, share: float) -> tuple[float, float]:
+    """The range of the finite values, widened by ``share`` of itself at both ends; never empty."""
+    finite = values[np.isfinite(values)]
+    if len(finite) == 0:
+        return -1.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    # Rounding noise about a constant is no signal.
+    if high - low <= 1e-9 * max(abs(low), abs(high)) or high == low:
+        half = max(abs(low), abs(high)) * 0.5 or 1.0
+        return low - half, high + half
+    return low - share * (high - low), high + share * (high - low)
