@@ -1,0 +1,44 @@
+"""Kinematics and dynamics of trees: each algorithm written once over symbols, traced with a robot's numbers.
+
+``TRACES`` names every quantity; :mod:`armblocks.dynamics.traces` says shapes, units and frames.
+"""
+
+from armblocks.dynamics.traces import (
+    TRACES,
+    trace_accel,
+    trace_accel_loaded,
+    trace_centre_of_mass,
+    trace_coriolis,
+    trace_fkine,
+    trace_friction,
+    trace_gravload,
+    trace_inertia,
+    trace_jacob0,
+    trace_jacobe,
+    trace_kinetic_energy,
+    trace_link_poses,
+    trace_manipulability,
+    trace_potential_energy,
+    trace_rne,
+    trace_rne_loaded,
+)
+
+__all__ = [
+    "TRACES",
+    "trace_accel",
+    "trace_accel_loaded",
+    "trace_centre_of_mass",
+    "trace_coriolis",
+    "trace_fkine",
+    "trace_friction",
+    "trace_gravload",
+    "trace_inertia",
+    "trace_jacob0",
+    "trace_jacobe",
+    "trace_kinetic_energy",
+    "trace_link_poses",
+    "trace_manipulability",
+    "trace_potential_energy",
+    "trace_rne",
+    "trace_rne_loaded",
+]

@@ -1,0 +1,82 @@
+"""Inertial parameters regrouped, so that inverse dynamics has fewer terms and the same result."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.spatial import Transform, transl
+from armblocks.spatial.inertia import NO_INERTIA, RigidInertia
+from armblocks.spatial.vectors import ZERO, Symmetric
+
+
+def regrouped(tree: KinematicTree) -> KinematicTree:
+    """The same equations of motion with the fewest inertial parameters.
+
+    A joint cannot feel some of its body's parameters apart from those of its parent: a revolute joint the
+    mass, the first moment along its axis and an inertia that is equal across the axis; a prismatic joint the
+    whole inertia matrix. These move to the parent. Each body's origin is first slid along its joint's axis to
+    the foot of the common normal with the next axis, which spares the products with that distance.
+
+    Joint torques, mass matrix and kinetic energy are those of the robot; the inertia of a single body is not.
+    Source: Khalil, Dombre, *Modeling, Identification and Control of Robots*, 9.4 (base inertial parameters).
+    """
+    tree = _origins_on_common_normals(tree)
+    inertias = [body.inertia for body in tree.bodies]
+    for i in reversed(range(tree.n)):
+        body = tree.bodies[i]
+        shared = _shared_with_parent(inertias[i], turn=body.turn, slide=body.slide)
+        inertias[i] = _without(inertias[i], shared)
+        if body.parent != BASE:
+            inertias[body.parent] = inertias[body.parent].plus(shared.moved(body.placement))
+    bodies = tuple(replace(body, inertia=inertia) for body, inertia in zip(tree.bodies, inertias))
+    return replace(tree, bodies=bodies)
+
+
+def _shared_with_parent(inertia: RigidInertia, *, turn: float, slide: float) -> RigidInertia:
+    """The part that is the same on either side of the joint: unmoved by its motion, no momentum from it."""
+    second = inertia.second
+    if turn:
+        # Equal across the axis and none about it: a turn neither changes it nor gives it momentum.
+        second = Symmetric(second.yy, second.yy, 0.0, 0.0, 0.0, 0.0)
+    if slide:
+        # Without mass a slide gives no momentum, and without first moment it leaves the inertia as it is.
+        return RigidInertia(0.0, ZERO, second)
+    return RigidInertia(inertia.mass, (0.0, 0.0, inertia.first[2]), second)
+
+
+def _without(inertia: RigidInertia, part: RigidInertia) -> RigidInertia:
+    """``inertia`` less ``part``, exactly zero where all of an entry leaves."""
+    mass, first, second = inertia
+    return RigidInertia(
+        mass - part.mass,
+        (first[0] - part.first[0], first[1] - part.first[1], first[2] - part.first[2]),
+        NO_INERTIA if second == part.second else Symmetric(*(a - b for a, b in zip(second, part.second))),
+    )
+
+
+def _origins_on_common_normals(tree: KinematicTree) -> KinematicTree:
+    """Slide each body's origin along its own axis to where its first child's origin has z = 0."""
+    bodies = list(tree.bodies)
+    links = list(tree.links)
+    for i in reversed(range(tree.n)):
+        children = [k for k, body in enumerate(bodies) if body.parent == i]
+        if not children:
+            continue
+        shift = bodies[children[0]].placement.translation[2]
+        forth, back = transl(0.0, 0.0, shift), transl(0.0, 0.0, -shift)
+        bodies[i] = replace(
+            bodies[i],
+            placement=bodies[i].placement @ forth,
+            inertia=bodies[i].inertia.moved(back),
+        )
+        for k in children:
+            bodies[k] = replace(bodies[k], placement=_level(back @ bodies[k].placement, k == children[0]))
+        links = [replace(frame, pose=back @ frame.pose) if frame.body == i else frame for frame in links]
+    return replace(tree, bodies=tuple(bodies), links=tuple(links))
+
+
+def _level(placement: Transform, exact: bool) -> Transform:
+    """The placement with z exactly zero where it was shifted by just that."""
+    x, y, z = placement.translation
+    return Transform(rotation=placement.rotation, translation=(x, y, 0.0 if exact else z))

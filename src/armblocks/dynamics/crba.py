@@ -1,0 +1,85 @@
+"""The joint-space inertia matrix by composite rigid bodies, and its factors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from casadi import SX
+
+from armblocks.dynamics.joint_motion import JointMotion
+from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.spatial.inertia import RigidInertia
+from armblocks.spatial.vectors import Scalar, Vector, add, cross, rotate_symmetric
+
+SquareMatrix = list[list[Scalar]]
+"""Rows of scalars; entries that are zero for any q are the number 0."""
+
+
+def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
+    """Inertia matrix of the rigid bodies and rotors in the order of the *bodies*.
+
+    ``tree`` may be regrouped. Source: Featherstone, *Rigid Body Dynamics Algorithms*, table 6.2, with
+    three-vectors in body frames.
+    """
+    n = tree.n
+    bodies = tree.bodies
+    M: SquareMatrix = [[0.0] * n for _ in range(n)]
+    composite = [body.inertia for body in bodies]
+    for i in reversed(range(n)):
+        body, inertia = bodies[i], composite[i]
+        # 1. The composite body joins its parent's.
+        if body.parent != BASE:
+            composite[body.parent] = composite[body.parent].plus(_in_parent(inertia, joints[i]))
+        # 2. The wrench that gives the composite body unit acceleration of joint i.
+        h, S = inertia.first, inertia.second
+        force: Vector = (-body.turn * h[1], body.turn * h[0], body.slide * inertia.mass)
+        moment: Vector = (
+            body.turn * S.xz + body.slide * h[1],
+            body.turn * S.yz - body.slide * h[0],
+            body.turn * S.zz,
+        )
+        M[i][i] = body.turn * moment[2] + body.slide * force[2] + body.reflected_inertia
+        # 3. What the joints further in feel of it.
+        j = i
+        while bodies[j].parent != BASE:
+            force_in_parent = joints[j].to_parent(force)
+            moment = add(joints[j].to_parent(moment), cross(joints[j].p, force_in_parent))
+            force = force_in_parent
+            j = bodies[j].parent
+            M[i][j] = M[j][i] = bodies[j].turn * moment[2] + bodies[j].slide * force[2]
+    return M
+
+
+def _in_parent(inertia: RigidInertia, joint: JointMotion) -> RigidInertia:
+    """A body's inertia in its parent's frame."""
+    second = rotate_symmetric(joint.body.placement.rotation, joint.turn.rotate_symmetric(inertia.second))
+    return RigidInertia(inertia.mass, joint.to_parent(inertia.first), second).shifted(joint.p)
+
+
+def solve_factored(tree: KinematicTree, M: SquareMatrix, right: Sequence[Scalar]) -> list[SX]:
+    """``x`` with ``M x = right``, all in the order of the bodies; ``M`` is symmetric positive definite.
+
+    ``M = L' D L`` from the tips inwards: entries that the tree's branches make zero stay zero.
+    Source: Featherstone, *Rigid Body Dynamics Algorithms*, 6.5 (tables 6.3 and 6.4).
+    """
+    n = tree.n
+    H = [list(row) for row in M]
+    inverse_pivots: list[SX] = [SX(0.0)] * n
+    x = [SX(entry) for entry in right]
+    for k in reversed(range(n)):
+        ancestors = tree.ancestors(k)
+        # Not 1 / d: CasADi would turn every later product with that back into a division of its own.
+        inverse_pivots[k] = 2.0 / (SX(H[k][k]) + H[k][k])
+        factors = {i: H[k][i] * inverse_pivots[k] for i in ancestors}
+        for i in ancestors:
+            for j in (i, *tree.ancestors(i)):
+                H[i][j] = H[i][j] - factors[i] * H[k][j]
+            # Forward substitution with L' as soon as its row is known.
+            x[i] = x[i] - factors[i] * x[k]
+        for i in ancestors:
+            H[k][i] = factors[i]
+    for i in range(n):
+        x[i] = x[i] * inverse_pivots[i]
+        for j in tree.ancestors(i):
+            x[i] = x[i] - H[i][j] * x[j]
+    return x

@@ -1,0 +1,100 @@
+"""The geometric Jacobian of the tool, and how well it can move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations
+
+from casadi import SX, fabs, fmax, horzcat, sqrt, vertcat
+
+from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose, in_frame
+from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.spatial.vectors import ZERO, Scalar, Vector, add, cross, scale, subtract
+
+Column = tuple[Vector, Vector]
+"""Linear and angular velocity of the tool at unit rate of one joint."""
+
+MOST_COLUMNS_BY_MINORS = 8
+"""Up to here all 6x6 minors are formed; beyond, the Gram matrix is cheaper."""
+
+
+def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
+    """Columns of ``jacob0``: point is the tool's origin, axes are the world's."""
+    ground = constant_pose(tree.base)
+    bodies = body_poses(tree, q, ground)
+    tool = frame_pose(tree.tool, bodies, ground)
+    return _columns(tree, bodies, tool.p)
+
+
+def tool_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
+    """Columns of ``jacobe``: point is the tool's origin, axes are the tool's."""
+    ground = constant_pose(tree.base)
+    bodies = body_poses(tree, q, ground)
+    tool = frame_pose(tree.tool, bodies, ground)
+    return [(in_frame(tool, v), in_frame(tool, w)) for v, w in _columns(tree, bodies, tool.p)]
+
+
+def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
+    """``v = turn z x (tip - p) + slide z``, ``w = turn z`` for the joints between base and tool, else zero.
+
+    Source: Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 3.1.3.
+    """
+    columns: list[Column] = [(ZERO, ZERO)] * tree.n
+    carrier = tree.tool.body
+    for i in () if carrier == BASE else (carrier, *tree.ancestors(carrier)):
+        body, pose = tree.bodies[i], bodies[i]
+        w = scale(body.turn, pose.z)
+        v = cross(w, subtract(tip, pose.p)) if body.turn else ZERO
+        columns[body.joint] = (add(v, scale(body.slide, pose.z)), w)
+    return columns
+
+
+def jacobian_matrix(columns: Sequence[Column]) -> SX:
+    """(6, n): rows linear, then angular."""
+    return horzcat(*(vertcat(*v, *w) for v, w in columns))
+
+
+def yoshikawa(columns: Sequence[Column]) -> SX:
+    """Yoshikawa's measure: the product of the Jacobian's singular values, of which there are min(6, n).
+
+    ``sqrt(det(J J'))`` for six joints or more, ``sqrt(det(J' J))`` for fewer (where the toolbox's formula is
+    zero). By Cauchy and Binet it is the root of the sum of all squared minors: no cancellation and no
+    division, so it is good to the last digits near a singularity. Source: Yoshikawa, *Manipulability of
+    Robotic Mechanisms*, IJRR 1985.
+    """
+    entries = [list(v + w) for v, w in columns]
+    n = len(entries)
+    if n > MOST_COLUMNS_BY_MINORS:
+        rows = list(zip(*entries))
+        gram = [[_dot(a, b) for b in rows] for a in rows]
+        return sqrt(fmax(_minors(gram)[0], 0.0))
+    short = entries if n <= 6 else [list(row) for row in zip(*entries)]
+    minors = _minors(short)
+    if len(minors) == 1:
+        return fabs(minors[0])
+    return sqrt(_dot(minors, minors))
+
+
+def _minors(rows: Sequence[Sequence[Scalar]]) -> list[SX]:
+    """All minors of full height: by Laplace's expansion row after row, every smaller minor formed once."""
+    width = len(rows[0])
+    known: dict[tuple[int, ...], Scalar] = {(): 1.0}
+    for height, row in enumerate(rows, start=1):
+        grown: dict[tuple[int, ...], Scalar] = {}
+        for chosen in combinations(range(width), height):
+            total: Scalar = 0.0
+            for place, column in enumerate(chosen):
+                term = row[column] * known[chosen[:place] + chosen[place + 1 :]]
+                total = total + term if (height - 1 - place) % 2 == 0 else total - term
+            grown[chosen] = total
+        known = grown
+    assert len(known) == math.comb(width, len(rows))
+    return [SX(minor) for minor in known.values()]
+
+
+def _dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> SX:
+    total: Scalar = 0.0
+    for x, y in zip(a, b):
+        total = total + x * y
+    return SX(total)

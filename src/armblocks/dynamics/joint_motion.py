@@ -1,0 +1,77 @@
+"""What a joint coordinate does to the frames on both sides, as the algorithms need it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from casadi import SX, cos, sin
+
+from armblocks.robot.tree import Body, KinematicTree
+from armblocks.spatial.vectors import Scalar, Turn, Vector, add, rotate
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """A body's joint at one q: ``turn`` about z, and where the body's origin lies in the parent body.
+
+    ``p`` position of the body's origin in the parent body's frame, m.
+    """
+
+    body: Body
+    turn: Turn
+    p: Vector
+
+    def to_body(self, a: Vector) -> Vector:
+        """A vector of the parent body's axes in the body's axes."""
+        return self.turn.rotate_back(self.to_joint(a))
+
+    def to_joint(self, a: Vector) -> Vector:
+        """A vector of the parent body's axes in the axes of the joint, before it turns."""
+        R = self.body.placement.rotation
+        return rotate((_column(R, 0), _column(R, 1), _column(R, 2)), a)
+
+    def to_parent(self, a: Vector) -> Vector:
+        """A vector of the body's axes in the parent body's axes."""
+        return rotate(self.body.placement.rotation, self.turn.rotate(a))
+
+
+def joint_motions(tree: KinematicTree, q: SX) -> list[JointMotion]:
+    """The motion of every body's joint; ``q`` column (n, 1)."""
+    return [_motion(body, q[body.joint]) for body in tree.bodies]
+
+
+def entries(x: SX | Sequence[Scalar]) -> list[Scalar]:
+    """The entries of a column, as scalars."""
+    return [x[i] for i in range(x.numel())] if isinstance(x, SX) else list(x)
+
+
+def cos_sin(variable: Scalar, constant: float) -> Turn:
+    """cos and sin of ``variable + constant``; a constant of whole quarter turns costs nothing."""
+    quarters = round(constant / (math.pi / 2))
+    if abs(constant - quarters * (math.pi / 2)) > 4 * math.ulp(max(abs(constant), math.pi / 2)):
+        variable, quarters = variable + constant, 0
+    c, s = SX(cos(variable)), SX(sin(variable))
+    match quarters % 4:
+        case 0:
+            return Turn(c, s)
+        case 1:
+            return Turn(-s, c)
+        case 2:
+            return Turn(-c, -s)
+        case _:
+            return Turn(s, -c)
+
+
+def _motion(body: Body, q: SX) -> JointMotion:
+    turn = cos_sin(body.turn * q, body.turn * body.offset) if body.turn else Turn(1.0, 0.0)
+    p: Vector = body.placement.translation
+    if body.slide:
+        shift = body.slide * q + body.slide * body.offset
+        p = add(p, rotate(body.placement.rotation, (0.0, 0.0, shift)))
+    return JointMotion(body, turn, p)
+
+
+def _column(R: tuple[tuple[float, float, float], ...], j: int) -> tuple[float, float, float]:
+    return R[0][j], R[1][j], R[2][j]

@@ -1,0 +1,108 @@
+"""Poses of all bodies, links and the tool, in symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from casadi import SX, horzcat, vertcat
+
+from armblocks.dynamics.joint_motion import cos_sin
+from armblocks.robot.tree import BASE, Body, Frame, KinematicTree
+from armblocks.spatial import IDENTITY3, Transform
+from armblocks.spatial.vectors import ZERO, Matrix, Scalar, Turn, Vector, add, rotate, scale
+
+
+class Pose(NamedTuple):
+    """Rotation and position (m) of a frame; its columns are x, y, z."""
+
+    x: Vector
+    y: Vector
+    z: Vector
+    p: Vector
+
+    def rotate(self, a: Vector) -> Vector:
+        """R a."""
+        return add(add(scale(a[0], self.x), scale(a[1], self.y)), scale(a[2], self.z))
+
+    def point(self, a: Vector) -> Vector:
+        """T a."""
+        return add(self.p, self.rotate(a))
+
+    def after(self, T: Transform) -> Pose:
+        """This pose, then the constant transform ``T``."""
+        R = T.rotation
+        x, y, z = (self.rotate((R[0][j], R[1][j], R[2][j])) for j in range(3))
+        return Pose(x, y, z, self.point(T.translation))
+
+    def matrix(self) -> SX:
+        """The homogeneous matrix, (4, 4)."""
+        columns = [vertcat(*column, 0.0) for column in (self.x, self.y, self.z)]
+        return horzcat(*columns, vertcat(*self.p, 1.0))
+
+
+class _TurnedPose(NamedTuple):
+    """A pose kept as ``start Rz(variable + constant)``, so that joints with parallel axes add their angles
+    instead of multiplying their matrices.
+    """
+
+    start: Pose
+    variable: Scalar
+    constant: float
+    turn: Turn
+    pose: Pose
+
+
+def constant_pose(T: Transform) -> Pose:
+    """The pose that a constant transform stands for."""
+    R = T.rotation
+    x, y, z = ((R[0][j], R[1][j], R[2][j]) for j in range(3))
+    return Pose(x, y, z, T.translation)
+
+
+def body_poses(tree: KinematicTree, q: Sequence[Scalar], ground: Pose) -> list[Pose]:
+    """Poses of all bodies where the base stands at ``ground``; q in the robot's order, rad or m."""
+    base = _TurnedPose(ground, 0.0, 0.0, Turn(1.0, 0.0), ground)
+    turned: list[_TurnedPose] = []
+    for body in tree.bodies:
+        parent = base if body.parent == BASE else turned[body.parent]
+        turned.append(_moved(parent, body, q[body.joint]))
+    return [entry.pose for entry in turned]
+
+
+def _moved(parent: _TurnedPose, body: Body, q: Scalar) -> _TurnedPose:
+    """The pose of a body from its parent's."""
+    p = parent.start.rotate(parent.turn.rotate(body.placement.translation))
+    p = add(parent.pose.p, p)
+    if body.placement.rotation == IDENTITY3:
+        start, variable, constant = parent.start, parent.variable, parent.constant
+    else:
+        start = parent.pose.after(Transform(rotation=body.placement.rotation))
+        variable, constant = 0.0, 0.0
+    if body.slide:
+        p = add(p, scale(body.slide * q + body.slide * body.offset, start.z))
+    if body.turn:
+        variable = variable + body.turn * q
+        constant = constant + body.turn * body.offset
+    turn = cos_sin(variable, constant) if isinstance(variable, SX) else Turn(1.0, 0.0)
+    x = add(scale(turn.c, start.x), scale(turn.s, start.y))
+    y = add(scale(turn.c, start.y), scale(-turn.s, start.x))
+    start = Pose(start.x, start.y, start.z, ZERO)
+    return _TurnedPose(start, variable, constant, turn, Pose(x, y, start.z, p))
+
+
+def frame_pose(frame: Frame, bodies: Sequence[Pose], ground: Pose) -> Pose:
+    """The pose of a frame that rides on a body or on the base."""
+    carrier = ground if frame.body == BASE else bodies[frame.body]
+    return carrier.after(frame.pose)
+
+
+def rotation_of(pose: Pose) -> Matrix:
+    """The rotation matrix, by rows."""
+    x, y, z = pose.x, pose.y, pose.z
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+
+def in_frame(pose: Pose, a: Vector) -> Vector:
+    """A vector of the axes in which ``pose`` is given, in the axes of ``pose``: R' a."""
+    return rotate((pose.x, pose.y, pose.z), a)

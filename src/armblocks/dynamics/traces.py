@@ -1,0 +1,342 @@
+"""Every quantity that an arm offers, as a traced function: the table that the rest of the house uses.
+
+Shapes, units and frames of the inputs and outputs, here and in all functions below:
+
+``q`` (n,) rad or m, ``qd`` (n,) per second, ``qdd`` (n,) per second squared, ``tau`` (n,) N m or N, all in
+the order of the robot's moving links.
+``wrench`` (6,): force (N) and moment (N m) that the tip exerts on its surroundings, about the origin and in
+the axes of the *last link's* frame (the toolbox's ``fext``; the tool transform has no part in it).
+``payload`` (10,): mass (kg), centre x y z (m), inertia xx yy zz xy yz xz about that centre (kg m2), in the
+axes of the *tool* frame.
+
+Robots of inadmissible values do not get here: :class:`armblocks.robot.Robot` refuses them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from casadi import SX, jacobian, vertcat
+
+from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.crba import crba
+from armblocks.dynamics.energy import first_moment, kinetic_energy, potential_energy
+from armblocks.dynamics.forward import check_accelerations_exist, forward_dynamics
+from armblocks.dynamics.friction import joint_friction, rotor_torques
+from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
+from armblocks.dynamics.joint_motion import entries, joint_motions
+from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
+from armblocks.dynamics.rnea import Wrench, rnea
+from armblocks.equations import Signature, TracedFunction, signature
+from armblocks.equations.signature import Slot
+from armblocks.errors import RobotError
+from armblocks.robot.robot import Robot
+from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.spatial.inertia import RigidInertia
+from armblocks.spatial.vectors import Scalar, Symmetric, Vector, add, cross, rotate, scale
+
+WRENCH_SLOT = Slot("wrench", (6,), "N, N m")
+PAYLOAD_SLOT = Slot("payload", (10,), "kg, m, kg m2")
+
+
+def trace_fkine(robot: Robot) -> TracedFunction:
+    """``T (4, 4)``: pose of the tool in the world, base and tool transform included; m."""
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX) -> SX:
+        ground = constant_pose(tree.base)
+        return frame_pose(tree.tool, body_poses(tree, entries(q), ground), ground).matrix()
+
+    return _trace("fkine", robot, ("q",), ("T", (4, 4), "m"), equations)
+
+
+def trace_link_poses(robot: Robot) -> TracedFunction:
+    """``poses (L + 2, 4, 4)`` in the world: the base, every link in the robot's order, the tool; m."""
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX) -> SX:
+        ground = constant_pose(tree.base)
+        bodies = body_poses(tree, entries(q), ground)
+        riding = [frame_pose(frame, bodies, ground) for frame in (*tree.links, tree.tool)]
+        return SX(vertcat(*(pose.matrix() for pose in (ground, *riding))))
+
+    return _trace("link_poses", robot, ("q",), ("poses", (len(robot.links) + 2, 4, 4), "m"), equations)
+
+
+def trace_jacob0(robot: Robot) -> TracedFunction:
+    """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in world axes."""
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX) -> SX:
+        return jacobian_matrix(world_columns(tree, entries(q)))
+
+    return _trace("jacob0", robot, ("q",), ("J", (6, robot.n), ""), equations)
+
+
+def trace_jacobe(robot: Robot) -> TracedFunction:
+    """``J (6, n)``: velocity of the tool's origin, then angular velocity of the tool, in tool axes."""
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX) -> SX:
+        return jacobian_matrix(tool_columns(tree, entries(q)))
+
+    return _trace("jacobe", robot, ("q",), ("J", (6, robot.n), ""), equations)
+
+
+def trace_manipulability(robot: Robot) -> TracedFunction:
+    """``w ()``: Yoshikawa's measure, see :func:`armblocks.dynamics.jacobian.yoshikawa`."""
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX) -> SX:
+        return yoshikawa(world_columns(tree, entries(q)))
+
+    return _trace("manipulability", robot, ("q",), ("w", (), ""), equations)
+
+
+def trace_rne(robot: Robot) -> TracedFunction:
+    """``tau (n,)`` for a motion: rigid bodies, rotor inertia and friction, in the robot's gravity."""
+    tree = regrouped(KinematicTree.of(robot))
+
+    def equations(q: SX, qd: SX, qdd: SX) -> SX:
+        rates, accelerations = entries(qd), entries(qdd)
+        rigid = rnea(tree, joint_motions(tree, q), rates, accelerations, tree.gravity)
+        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+
+    return _trace("rne", robot, ("q", "qd", "qdd"), ("tau", (robot.n,), "N m"), equations)
+
+
+def trace_rne_loaded(robot: Robot) -> TracedFunction:
+    """``tau (n,)`` as of ``rne``, while the tip exerts a wrench and the tool carries a payload."""
+    tree = regrouped(KinematicTree.of(robot))
+
+    def equations(q: SX, qd: SX, qdd: SX, wrench: SX, payload: SX) -> SX:
+        rates, accelerations = entries(qd), entries(qdd)
+        loaded = _carrying(tree, payload)
+        rigid = rnea(
+            loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, _at_tip(tree, wrench)
+        )
+        return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
+
+    inputs = ("q", "qd", "qdd", "wrench", "payload")
+    return _trace("rne_loaded", robot, inputs, ("tau", (robot.n,), "N m"), equations)
+
+
+def trace_gravload(robot: Robot) -> TracedFunction:
+    """``tau (n,)`` that holds the arm at rest against gravity."""
+    tree = regrouped(KinematicTree.of(robot))
+
+    def equations(q: SX) -> SX:
+        still = [0.0] * tree.n
+        return _sum(rnea(tree, joint_motions(tree, q), still, still, tree.gravity))
+
+    return _trace("gravload", robot, ("q",), ("tau", (robot.n,), "N m"), equations)
+
+
+def trace_inertia(robot: Robot) -> TracedFunction:
+    """``M (n, n)``: joint-space inertia, rotors included; kg m2, kg m or kg."""
+    tree = regrouped(KinematicTree.of(robot))
+    place = _body_of_joint(tree)
+
+    def equations(q: SX) -> SX:
+        M = crba(tree, joint_motions(tree, q))
+        return _matrix([[M[i][j] for j in place] for i in place])
+
+    return _trace("inertia", robot, ("q",), ("M", (robot.n, robot.n), "kg m2"), equations)
+
+
+def trace_coriolis(robot: Robot) -> TracedFunction:
+    """``C (n, n)``: ``C qd`` is the velocity torque without friction, and ``dM/dt - 2 C`` is skew.
+
+    The velocity torque is quadratic, ``c(q, qd) = C(q, qd) qd``; half its derivative by ``qd`` is the matrix
+    of Christoffel symbols (Siciliano, Sciavicco, Villani, Oriolo, *Robotics*, 7.1.2 and 7.2.1).
+    """
+    tree = regrouped(KinematicTree.of(robot))
+
+    def equations(q: SX, qd: SX) -> SX:
+        weightless = (0.0, 0.0, 0.0)
+        still = [0.0] * tree.n
+        c = _sum(rnea(tree, joint_motions(tree, q), entries(qd), still, weightless))
+        return 0.5 * jacobian(c, qd)
+
+    return _trace("coriolis", robot, ("q", "qd"), ("C", (robot.n, robot.n), "N m s"), equations)
+
+
+def trace_friction(robot: Robot) -> TracedFunction:
+    """``tau (n,)`` that overcomes motor friction, of the sign of ``qd``; see :class:`FrictionModel`.
+
+    The toolbox's ``friction`` has the opposite sign since release 9.
+    """
+
+    def equations(qd: SX) -> SX:
+        return _sum(joint_friction(robot, entries(qd)))
+
+    return _trace("friction", robot, ("qd",), ("tau", (robot.n,), "N m"), equations)
+
+
+def trace_accel(robot: Robot) -> TracedFunction:
+    """``qdd (n,)`` that joint torques give: friction and gravity act, rotors are accelerated.
+
+    Raises RobotError, naming the joint, where a joint has nothing to accelerate.
+    """
+    tree = regrouped(KinematicTree.of(robot))
+    check_accelerations_exist(tree)
+
+    def equations(q: SX, qd: SX, tau: SX) -> SX:
+        rates = entries(qd)
+        left_over = _difference(entries(tau), joint_friction(robot, rates))
+        return _sum(forward_dynamics(tree, q, rates, left_over))
+
+    return _trace("accel", robot, ("q", "qd", "tau"), ("qdd", (robot.n,), "rad/s2"), equations)
+
+
+def trace_accel_loaded(robot: Robot) -> TracedFunction:
+    """``qdd (n,)`` as of ``accel``, while the tip exerts a wrench and the tool carries a payload.
+
+    Raises RobotError, naming the joint, where a joint has nothing to accelerate, whatever the payload.
+    """
+    tree = regrouped(KinematicTree.of(robot))
+    some_payload = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    check_accelerations_exist(_carrying(tree, some_payload))
+
+    def equations(q: SX, qd: SX, tau: SX, wrench: SX, payload: SX) -> SX:
+        rates = entries(qd)
+        left_over = _difference(entries(tau), joint_friction(robot, rates))
+        loaded = _carrying(tree, payload)
+        return _sum(forward_dynamics(loaded, q, rates, left_over, _at_tip(tree, wrench)))
+
+    inputs = ("q", "qd", "tau", "wrench", "payload")
+    return _trace("accel_loaded", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
+
+
+def trace_kinetic_energy(robot: Robot) -> TracedFunction:
+    """``energy ()``, J, of bodies and rotors."""
+    tree = regrouped(KinematicTree.of(robot))
+
+    def equations(q: SX, qd: SX) -> SX:
+        return SX(kinetic_energy(tree, joint_motions(tree, q), entries(qd)))
+
+    return _trace("kinetic_energy", robot, ("q", "qd"), ("energy", (), "J"), equations)
+
+
+def trace_potential_energy(robot: Robot) -> TracedFunction:
+    """``energy ()``, J, in the robot's gravity: zero with the centre of mass at the world's origin."""
+    tree = KinematicTree.of(robot)
+
+    def equations(q: SX) -> SX:
+        return SX(potential_energy(tree, joint_motions(tree, q)))
+
+    return _trace("potential_energy", robot, ("q",), ("energy", (), "J"), equations)
+
+
+def trace_centre_of_mass(robot: Robot) -> TracedFunction:
+    """``centre (3,)`` of mass of all links in the world, m. Raises RobotError for a robot without mass."""
+    tree = KinematicTree.of(robot)
+    if not sum(link.mass for link in robot.links):
+        raise RobotError(
+            "no link has a mass, so there is no centre of mass",
+            where=f"robot '{robot.name}'",
+            allowed="at least one link with a mass above zero",
+            fix="give the links their masses",
+        )
+
+    def equations(q: SX) -> SX:
+        mass, moment = first_moment(tree, joint_motions(tree, q))
+        centre = scale(1.0 / mass, moment)
+        return SX(vertcat(*add(tree.base.translation, rotate(tree.base.rotation, centre))))
+
+    return _trace("centre_of_mass", robot, ("q",), ("centre", (3,), "m"), equations)
+
+
+TRACES: Mapping[str, Callable[[Robot], TracedFunction]] = {
+    "fkine": trace_fkine,
+    "link_poses": trace_link_poses,
+    "jacob0": trace_jacob0,
+    "jacobe": trace_jacobe,
+    "manipulability": trace_manipulability,
+    "rne": trace_rne,
+    "rne_loaded": trace_rne_loaded,
+    "gravload": trace_gravload,
+    "inertia": trace_inertia,
+    "coriolis": trace_coriolis,
+    "friction": trace_friction,
+    "accel": trace_accel,
+    "accel_loaded": trace_accel_loaded,
+    "kinetic_energy": trace_kinetic_energy,
+    "potential_energy": trace_potential_energy,
+    "centre_of_mass": trace_centre_of_mass,
+}
+"""By name: ``TRACES["rne"](robot)``."""
+
+
+def _trace(
+    name: str,
+    robot: Robot,
+    inputs: Sequence[str],
+    output: tuple[str, tuple[int, ...], str],
+    equations: Callable[..., SX],
+) -> TracedFunction:
+    return TracedFunction.trace(name, _inputs(robot, inputs), signature(output), equations)
+
+
+def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
+    """Slots of the named inputs; joint quantities have the joints' unit where all have the same."""
+    units = set(robot.joint_units)
+    unit = units.pop() if len(units) == 1 else ""
+    force = {"rad": "N m", "m": "N"}.get(unit, "")
+    n = (robot.n,)
+    known = {
+        "q": Slot("q", n, unit),
+        "qd": Slot("qd", n, f"{unit}/s" if unit else ""),
+        "qdd": Slot("qdd", n, f"{unit}/s2" if unit else ""),
+        "tau": Slot("tau", n, force),
+        "wrench": WRENCH_SLOT,
+        "payload": PAYLOAD_SLOT,
+    }
+    return Signature(tuple(known[name] for name in names))
+
+
+def _carrying(tree: KinematicTree, payload: SX) -> KinematicTree:
+    """The tree with a payload on its tool (none where the tool is fixed to the base)."""
+    tool = tree.tool
+    if tool.body == BASE:
+        return tree
+    mass, x, y, z, *second = entries(payload)
+    load = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)).moved(tool.pose)
+    bodies = list(tree.bodies)
+    carrier = bodies[tool.body]
+    bodies[tool.body] = replace(carrier, inertia=carrier.inertia.plus(load))
+    return replace(tree, bodies=tuple(bodies))
+
+
+def _at_tip(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:
+    """The wrench of the last link's frame, on the body that carries it."""
+    tip = tree.tip
+    if tip.body == BASE:
+        return {}
+    fx, fy, fz, nx, ny, nz = entries(wrench)
+    R, p = tip.pose.rotation, tip.pose.translation
+    force = rotate(R, (fx, fy, fz))
+    moment: Vector = add(rotate(R, (nx, ny, nz)), cross(p, force))
+    return {tip.body: Wrench(force, moment)}
+
+
+def _body_of_joint(tree: KinematicTree) -> list[int]:
+    """For each joint in the order of q, the index of its body."""
+    place = [0] * tree.n
+    for i, body in enumerate(tree.bodies):
+        place[body.joint] = i
+    return place
+
+
+def _sum(*terms: Sequence[Scalar]) -> SX:
+    """A column of the sums, entry by entry."""
+    return SX(vertcat(*(sum(entry, SX(0.0)) for entry in zip(*terms))))
+
+
+def _difference(a: Sequence[Scalar], b: Sequence[Scalar]) -> list[Scalar]:
+    return [x - y for x, y in zip(a, b)]
+
+
+def _matrix(rows: Sequence[Sequence[Scalar]]) -> SX:
+    return SX(vertcat(*(vertcat(*(SX(entry) for entry in row)).T for row in rows)))

@@ -1,0 +1,137 @@
+"""Three-vectors and 3x3 matrices of scalars that may be numbers or symbols.
+
+The algorithms are written once over these. A term that a known zero multiplies vanishes while it is traced
+(CasADi folds ``0 * x``, ``1 * x`` and ``0 + x``), so that a sparse arm gives short equations.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+from casadi import SX
+
+Scalar: TypeAlias = SX | float
+Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
+"""x, y, z."""
+Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+"""Three rows."""
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class Symmetric(NamedTuple):
+    """A symmetric 3x3 matrix by its six entries."""
+
+    xx: Scalar
+    yy: Scalar
+    zz: Scalar
+    xy: Scalar
+    yz: Scalar
+    xz: Scalar
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scale(k: Scalar, a: Vector) -> Vector:
+    """k a."""
+    return k * a[0], k * a[1], k * a[2]
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """a' b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def rotate(R: Matrix, a: Vector) -> Vector:
+    """R a."""
+    return dot(R[0], a), dot(R[1], a), dot(R[2], a)
+
+
+def rotate_back(R: Matrix, a: Vector) -> Vector:
+    """R' a."""
+    return rotate(transpose(R), a)
+
+
+def transpose(R: Matrix) -> Matrix:
+    """R'."""
+    return (R[0][0], R[1][0], R[2][0]), (R[0][1], R[1][1], R[2][1]), (R[0][2], R[1][2], R[2][2])
+
+
+def multiply(A: Matrix, B: Matrix) -> Matrix:
+    """A B."""
+    return transpose((rotate(A, _column(B, 0)), rotate(A, _column(B, 1)), rotate(A, _column(B, 2))))
+
+
+def multiply_symmetric(S: Symmetric, a: Vector) -> Vector:
+    """S a."""
+    return (
+        S.xx * a[0] + S.xy * a[1] + S.xz * a[2],
+        S.xy * a[0] + S.yy * a[1] + S.yz * a[2],
+        S.xz * a[0] + S.yz * a[1] + S.zz * a[2],
+    )
+
+
+def rotate_symmetric(R: Matrix, S: Symmetric) -> Symmetric:
+    """R S R'."""
+    SRt = tuple(multiply_symmetric(S, row) for row in R)
+    return Symmetric(
+        xx=dot(R[0], SRt[0]),
+        yy=dot(R[1], SRt[1]),
+        zz=dot(R[2], SRt[2]),
+        xy=dot(R[0], SRt[1]),
+        yz=dot(R[1], SRt[2]),
+        xz=dot(R[0], SRt[2]),
+    )
+
+
+def add_symmetric(A: Symmetric, B: Symmetric) -> Symmetric:
+    """A + B."""
+    return Symmetric(*(a + b for a, b in zip(A, B)))
+
+
+class Turn(NamedTuple):
+    """A rotation about z by its cosine and sine: four products a vector instead of nine."""
+
+    c: Scalar
+    s: Scalar
+
+    def rotate(self, a: Vector) -> Vector:
+        """Rz a."""
+        return self.c * a[0] - self.s * a[1], self.s * a[0] + self.c * a[1], a[2]
+
+    def rotate_back(self, a: Vector) -> Vector:
+        """Rz' a."""
+        return self.c * a[0] + self.s * a[1], self.c * a[1] - self.s * a[0], a[2]
+
+    def rotate_symmetric(self, S: Symmetric) -> Symmetric:
+        """Rz S Rz', with six products for the block that turns by twice the angle."""
+        c, s = self
+        difference = S.yy - S.xx
+        twice = S.xy + S.xy
+        even = s * (s * difference - c * twice)
+        odd = s * (c * difference + s * twice)
+        return Symmetric(
+            xx=S.xx + even,
+            yy=S.yy - even,
+            zz=S.zz,
+            xy=S.xy - odd,
+            yz=s * S.xz + c * S.yz,
+            xz=c * S.xz - s * S.yz,
+        )
+
+
+def _column(A: Matrix, j: int) -> Vector:
+    return A[0][j], A[1][j], A[2][j]
