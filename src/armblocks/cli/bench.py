@@ -46,7 +46,7 @@ def bench(
         style=STRONG,
         markup=False,
     )
-    columns = ("one call", "batch", f"{threads} threads", "multiplies", "adds", "divisions", "functions")
+    columns = ("one call", "batch", f"{threads} threads", "multiplies", "adds", "fused", "others")
     rows = table(("method", "left"), *((name, "right") for name in columns))
     for method, inputs in METHODS.items():
         rows.add_row(method, *_row(arm, method, len(inputs), samples, threads))
@@ -71,7 +71,8 @@ def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list
         _least(lambda: call(*batch, out=out)) / samples,
         _least(lambda: call(*batch, out=out, threads=threads)) / samples,
     )
-    counts = (count.multiplies, count.adds, count.divisions, count.functions)
+    others = count.divisions + count.square_roots + count.comparisons + count.others + count.function_calls
+    counts = (count.multiplies, count.adds, count.fused_multiply_adds, others)
     return [*(f"{seconds * 1e9:,.1f}" for seconds in times), *(str(number) for number in counts)]
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from enum import StrEnum
 from typing import Annotated
 
 import typer
+from rich.table import Table
 
 from armblocks.cli.terminal import results_console, table
+from armblocks.errors import InertiaWarning
 
 
 class Kind(StrEnum):
@@ -18,12 +21,44 @@ class Kind(StrEnum):
     EXAMPLES = "examples"
 
 
-def list_names(kind: Annotated[Kind, typer.Argument(help="What to list.", show_choices=True)]) -> None:
+def list_names(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
     """List the shipped robots, the blocks, or the shipped example diagrams."""
+    console = results_console()
+    rows = {Kind.ROBOTS: _robots, Kind.BLOCKS: _blocks, Kind.EXAMPLES: _examples}[kind]()
+    console.print(rows)
+
+
+def _robots() -> Table:
     import armblocks as ab
 
-    lists = {Kind.ROBOTS: ab.list_robots, Kind.BLOCKS: ab.list_blocks, Kind.EXAMPLES: ab.list_examples}
-    rows = table(("name", "left"), ("what it is", "left"))
-    for name, text in lists[kind]().items():
-        rows.add_row(name, text)
-    results_console().print(rows)
+    rows = table(("robot", "left"), ("joints", "left"), ("what it is", "left"))
+    # Each of them is loaded only to be named; its inertias are a matter for those who use it.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InertiaWarning)
+        for name in ab.list_robots():
+            robot = ab.load_robot(name).robot
+            about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
+            rows.add_row(name, robot.joint_letters, about)
+    return rows
+
+
+def _blocks() -> Table:
+    from armblocks.blocks import BLOCKS
+
+    rows = table(("block", "left"), ("family", "left"), ("what it does", "left"))
+    for family, kinds in BLOCKS.by_family().items():
+        for kind in kinds:
+            rows.add_row(kind.type_name(), family, kind.summary())
+    return rows
+
+
+def _examples() -> Table:
+    import armblocks as ab
+
+    rows = table(("example", "left"), ("blocks", "right"), ("stop time", "right"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InertiaWarning)
+        for name in ab.list_examples():
+            diagram = ab.load_diagram(name)
+            rows.add_row(name, str(len(diagram.blocks)), f"{diagram.settings.stop_time:g} s")
+    return rows

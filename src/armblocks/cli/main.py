@@ -41,11 +41,12 @@ app = typer.Typer(
     name="armblocks",
     cls=Commands,
     no_args_is_help=True,
+    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Industrial arms and block diagrams, traced once and compiled to native code.",
 )
-app.command("run", help=run.run.__doc__)(run.run)
+app.command("run")(run.run)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
 app.command("bench")(bench.bench)

@@ -10,7 +10,6 @@ import typer
 
 from armblocks.cli.assignments import parse_assignments
 from armblocks.cli.progress import RunProgress
-from armblocks.cli.summary import print_displays, print_files, print_run
 from armblocks.cli.terminal import messages_console, results_console
 from armblocks.errors import ArmblocksError, FormatError, SimulationError
 
@@ -47,6 +46,7 @@ def run(
 ) -> None:
     """Simulate a diagram and write a report: figures, numbers, data."""
     import armblocks as ab
+    from armblocks.cli.summary import print_displays, print_files, print_motions, print_run
 
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model)
@@ -78,6 +78,7 @@ def run(
     console = results_console()
     print_run(result, console)
     print_displays(diagram, result, console)
+    print_motions(diagram, result, console)
     print_files(folder, console)
     if open_report:
         typer.launch(str(folder / "report.html"))

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
-from armblocks.cli.terminal import STRONG, WARNING, table
+from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind
+from armblocks.report.analysis import JointSummary, LimitKind, people_unit, summarise
+from armblocks.report.motion import motions
 
 if TYPE_CHECKING:
     from armblocks import Diagram, SimulationResult
+
+BEYOND = "!"
+"""Marks what is beyond a limit, for readers without colours."""
 
 
 def print_run(result: SimulationResult, console: Console) -> None:
@@ -36,14 +43,14 @@ def print_run(result: SimulationResult, console: Console) -> None:
 
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:
     """The last value of everything that a Display block shows."""
-    shown = table(("display", "left"), ("at the end", "right"), ("", "left"))
+    shown = table(("display", "left"), ("at the end", "left"), ("", "left"))
     for block, view in diagram.views():
         if view.kind is not ViewKind.VALUE or not result.time.size:
             continue
         labels = view.labels or ("",) * len(view.signals)
         for signal, label in zip(view.signals, labels):
             path = f"{block}/{signal}"
-            value = result[path][-1]
+            value = np.asarray(result[path][-1])
             name = label or (block if len(view.signals) == 1 else path)
             shown.add_row(name, _value_text(value), result.units[result.resolve(path)])
     if shown.row_count:
@@ -51,11 +58,75 @@ def print_displays(diagram: Diagram, result: SimulationResult, console: Console)
         console.print(shown)
 
 
-def _value_text(value: NDArray[np.float64] | np.float64) -> str:
-    """Nine digits: what the Display block of the paper shows and more than a motion needs."""
-    if np.ndim(value) == 2:
-        return "\n".join(_value_text(row) for row in value)
-    return "  ".join(f"{number:.9g}" for number in np.atleast_1d(value))
+def _value_text(value: NDArray[np.float64]) -> str:
+    """Nine digits: more than a Display shows, and what a person needs to compare two runs."""
+    rows = [[f"{number:.9g}" for number in row] for row in np.atleast_2d(value)]
+    widths = [max(len(cell) for cell in column) for column in zip(*rows)]
+    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in rows)
+
+
+def print_motions(diagram: Diagram, result: SimulationResult, console: Console) -> None:
+    """Each robot's joints against their limits; what is beyond one stands out and is said in words."""
+    if not result.time.size:
+        return
+    for motion in motions(diagram, result):
+        whole = summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
+        broken = {(finding.joint, finding.kind) for finding in whole.findings}
+        console.print()
+        console.print(Text(motion.robot.name, STRONG))
+        console.print(_joint_table(whole.joints, broken))
+        for finding in whole.findings:
+            console.print(Text.assemble((f"{BEYOND} ", ERROR), finding.text))
+
+
+def _joint_table(joints: Sequence[JointSummary], broken: set[tuple[str, LimitKind]]) -> Table:
+    units = {joint.unit for joint in joints}
+    mixed = len(units) != 1
+    limited = any(joint.torque_limit is not None for joint in joints)
+    headings = {kind: "" if mixed else f"\n{people_unit(kind, joints[0].unit)[1]}" for kind in LimitKind}
+    rows = table(
+        ("joint", "left"),
+        *((("unit", "left"),) if mixed else ()),
+        (f"from … to{headings[LimitKind.POSITION]}", "right"),
+        ("allowed", "right"),
+        (f"peak speed{headings[LimitKind.SPEED]}", "right"),
+        ("allowed", "right"),
+        (f"peak torque{headings[LimitKind.TORQUE]}", "right"),
+        ("RMS", "right"),
+        *((("allowed", "right"),) if limited else ()),
+    )
+    for joint in joints:
+        position, angle = people_unit(LimitKind.POSITION, joint.unit)
+        speed, _ = people_unit(LimitKind.SPEED, joint.unit)
+        ends = joint.position_limits
+        rows.add_row(
+            joint.name,
+            *((angle,) if mixed else ()),
+            _judged(
+                _span(joint.position_min * position, joint.position_max * position),
+                (joint.name, LimitKind.POSITION) in broken,
+            ),
+            "" if ends is None else _span(ends[0] * position, ends[1] * position),
+            _judged(_short(joint.speed_peak * speed), (joint.name, LimitKind.SPEED) in broken),
+            _short(None if joint.speed_limit is None else joint.speed_limit * speed),
+            _judged(_short(joint.torque_peak), (joint.name, LimitKind.TORQUE) in broken),
+            _short(joint.torque_rms),
+            *((_short(joint.torque_limit),) if limited else ()),
+        )
+    return rows
+
+
+def _judged(text: str, beyond: bool) -> Text:
+    """A cell; beyond a limit it has a mark as well as a colour."""
+    return Text(f"{BEYOND} {text}", ERROR) if beyond else Text(text)
+
+
+def _span(low: float, high: float) -> str:
+    return f"{_short(low)} … {_short(high)}"
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
 
 
 def print_files(folder: Path, console: Console) -> None:
