@@ -1,0 +1,59 @@
+"""Diagrams by name or path, and their files on the disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armblocks.diagram import BlockLibrary, Diagram
+from armblocks.errors import UnknownNameError
+from armblocks.files import read_bounded, write_atomically
+from armblocks.formats.diagram_json import MOST_BYTES, diagram_from_bytes, diagram_to_bytes
+from armblocks.formats.robot_files import load_robot, shipped_folder
+from armblocks.formats.robot_references import ResolveRobot
+
+SUFFIX = ".json"
+
+
+def list_examples() -> tuple[str, ...]:
+    """Names of the shipped diagrams, sorted."""
+    return tuple(sorted(path.stem for path in shipped_folder("examples").glob(f"*{SUFFIX}")))
+
+
+def load_diagram(
+    name_or_path: str | Path, library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
+) -> Diagram:
+    """A shipped diagram by its name, ``"kr180model"``, or a diagram file by its path.
+
+    What holds a path separator or ends in ``.json`` is a path, everything else a name. Raises
+    ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`.
+    """
+    text = str(name_or_path)
+    if isinstance(name_or_path, Path) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
+        return read_diagram(name_or_path, library, resolve_robot)
+    known = list_examples()
+    if text not in known:
+        raise UnknownNameError("shipped diagram", text, known)
+    return read_diagram(shipped_folder("examples") / f"{text}{SUFFIX}", library, resolve_robot)
+
+
+def read_diagram(
+    path: str | Path, library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
+) -> Diagram:
+    """The checked diagram of a file; ``library`` holds the block types that it may use.
+
+    ``resolve_robot`` turns a shipped name or a path into a robot; paths in the file are relative to the
+    file's folder. Raises ``FormatError`` for a missing or unreadable file and for what the format forbids,
+    ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, ``DiagramError`` for a
+    diagram that cannot be built. All name the file, and the line where the fault has one.
+    """
+    data = read_bounded(path, MOST_BYTES)
+    return diagram_from_bytes(data, str(path), library, resolve_robot, folder=Path(path).parent)
+
+
+def write_diagram(diagram: Diagram, path: str | Path, resolve_robot: ResolveRobot = load_robot) -> None:
+    """Write the canonical file of a diagram, all or nothing. Reading it gives an equal diagram.
+
+    Robots are written as references, the whole robot only where it is neither shipped nor from a file.
+    Raises ``FormatError`` where the folder cannot be written or a value has no place in JSON.
+    """
+    write_atomically(path, diagram_to_bytes(diagram, resolve_robot, folder=Path(path).parent))

@@ -1,0 +1,295 @@
+"""Diagrams as canonical JSON: small differences in a diagram are small differences in its file.
+
+Blocks are keyed by name and sorted, connections are sorted sentences (``"jtraj/q -> fkine/q"``), the layout
+stands apart from the meaning, and nothing derived, no ids and no times are written. So a changed parameter is
+one line, a moved block is one line of the layout, and two people who add different blocks do not collide::
+
+    {
+      "blocks": {"sine": {"parameters": {"frequency": 2, …}, "type": "SineWave"}, …},
+      "connections": ["sine/y -> scope/u1"],
+      "format": 1,
+      "layout": {"sine": {"x": 40, "y": 40}, …},
+      "name": "model",
+      "settings": {"stop_time": 10, …}
+    }
+
+Keys that armblocks does not know are kept in ``Diagram.extras`` and written again (by another program, or a
+newer armblocks); a key that is nearly a known one, and an unknown parameter, are refused. Infinite parameters
+are the texts ``"inf"`` and ``"-inf"``; NaN has no place in a file. References to robots: see
+:mod:`armblocks.formats.robot_references`. The JSON Schema is ``formats/schema/diagram.schema.json``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import cast
+
+from armblocks.diagram import (
+    Block,
+    BlockLibrary,
+    Diagram,
+    DiagramBuilder,
+    Parameter,
+    ParameterKind,
+    Placement,
+    PortRef,
+)
+from armblocks.equations import SimulationOptions
+from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError, FormatError, UnknownNameError
+from armblocks.formats.json_document import (
+    KeyPath,
+    Node,
+    canonical_bytes,
+    read_document,
+    split_members,
+)
+from armblocks.formats.robot_references import ResolveRobot, reference_of_robot, robot_of_reference
+from armblocks.robot import Robot
+
+FORMAT_VERSION = 1
+MOST_BYTES = 16 * 2**20
+
+_DOCUMENT_KEYS = ("format", "name", "blocks", "connections", "layout", "settings")
+_SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
+_PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
+_WIRE = re.compile(r"([^/]+)/([^/\s]+) -> ([^/]+)/([^/\s]+)")
+_INFINITIES = {"inf": math.inf, "-inf": -math.inf}
+_NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
+
+Extras = dict[str, dict[str, object]]
+"""Unknown members by the place where they stand: ``""``, ``"blocks"``, ``"layout"``, ``"settings"``."""
+
+
+def diagram_from_bytes(
+    data: bytes, name: str, library: BlockLibrary, resolve_robot: ResolveRobot, *, folder: Path | None = None
+) -> Diagram:
+    """The checked diagram of a document; ``library`` holds the block types that it may use.
+
+    ``name`` is what messages call the file; a robot's path is relative to ``folder``, and ``resolve_robot``
+    turns a shipped name or a path into a robot. Raises ``FormatError`` for what the format forbids,
+    ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, and ``DiagramError`` for a
+    diagram that cannot be built. All name the file, and the line where the fault has one.
+    """
+    root = read_document(data, name, MOST_BYTES)
+    extras: Extras = {}
+    members = _split(root, _DOCUMENT_KEYS, extras, "")
+    _check_version(root, members)
+    settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
+    block_nodes = members["blocks"].members() if "blocks" in members else {}
+    blocks = {
+        key: _block(key, node, library, resolve_robot, folder, extras) for key, node in block_nodes.items()
+    }
+    placements = _layout(members["layout"], set(blocks), extras) if "layout" in members else {}
+    builder = DiagramBuilder(
+        members["name"].text() if "name" in members else Path(name).stem, settings=settings, extras=extras
+    )
+    for key, block in blocks.items():
+        with _located(block_nodes[key]):
+            builder.add(key, block)
+    for node in members["connections"].elements() if "connections" in members else []:
+        source, target = _wire(node)
+        with _located(node):
+            builder.connect(source, target)
+    for key, place in placements.items():
+        builder.place(key, place.x, place.y, width=place.width, height=place.height, flipped=place.flipped)
+    with _located(root):
+        return builder.build()
+
+
+def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: Path | None = None) -> bytes:
+    """The canonical document of a diagram. Reading it gives an equal diagram.
+
+    A robot is written as the shortest reference that gives an equal robot, its path relative to ``folder``.
+    Raises ``FormatError`` where a value has no place in JSON.
+    """
+    extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
+    block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
+
+    def value_of(rule: Parameter, value: object) -> object:
+        if isinstance(value, Robot):
+            return reference_of_robot(value, folder, resolve_robot)
+        return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
+
+    blocks = {
+        key: {
+            **_members(block_extras.get(key)),
+            "type": block.type_name(),
+            "parameters": {
+                rule.name: value_of(rule, block.parameter_value(rule.name)) for rule in block.parameters()
+            },
+        }
+        for key, block in diagram.blocks.items()
+    }
+    layout = dict(layout_extras)
+    for key, place in diagram.layout.items():
+        stated = {
+            name: value for name, default in _PLACEMENT.items() if (value := getattr(place, name)) != default
+        }
+        layout[key] = {**_members(layout_extras.get(key)), **stated}
+    settings = {name: value for name in _SETTINGS if (value := getattr(diagram.settings, name)) is not None}
+    document = {
+        **extras.get("", {}),
+        "format": FORMAT_VERSION,
+        "name": diagram.name,
+        "blocks": blocks,
+        "connections": [str(wire) for wire in diagram.connections],
+        "layout": layout,
+        "settings": {**extras.get("settings", {}), **settings},
+    }
+    return canonical_bytes(document, one_line=_is_placement)
+
+
+def _is_placement(path: KeyPath) -> bool:
+    return len(path) == 2 and path[0] == "layout"
+
+
+def _members(extra: object) -> Mapping[str, object]:
+    return cast("Mapping[str, object]", extra or {})
+
+
+def _with_texts_for_infinities(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_with_texts_for_infinities(entry) for entry in cast("tuple[object, ...]", value)]
+    if isinstance(value, float) and math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return value
+
+
+# -- reading -----------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _located(node: Node) -> Iterator[None]:
+    """Give the errors of what a node describes the node's file and line; kinds and texts stay."""
+    try:
+        yield
+    except AlgebraicLoopError as error:
+        raise AlgebraicLoopError(error.loop, where=_joined(node, error)) from error
+    except UnknownNameError as error:
+        raise UnknownNameError(error.kind, error.name, error.known, where=_joined(node, error)) from error
+    except DiagramError as error:
+        raise DiagramError(
+            error.what, where=_joined(node, error), allowed=error.allowed, fix=error.fix
+        ) from error
+    except ArmblocksError as error:
+        raise FormatError(
+            error.what, where=_joined(node, error), allowed=error.allowed, fix=error.fix
+        ) from error
+
+
+def _joined(node: Node, error: ArmblocksError) -> str:
+    return f"{node.where}: {error.where}" if error.where else node.where
+
+
+def _split(node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = "") -> dict[str, Node]:
+    """The known members; the others go to ``extras[place]``, under ``key`` where there is one."""
+    members, unknown = split_members(node, known)
+    if unknown:
+        extras.setdefault(place, {}).update({key: unknown} if key else unknown)
+    return members
+
+
+def _check_version(root: Node, members: Mapping[str, Node]) -> None:
+    if "format" not in members:
+        fix = f'add "format": {FORMAT_VERSION}'
+        raise root.error(
+            "the key 'format' is missing", allowed=f"the format version {FORMAT_VERSION}", fix=fix
+        )
+    version = members["format"].value
+    if version != FORMAT_VERSION or isinstance(version, bool):
+        raise members["format"].error(
+            f"the format version is {version!r}",
+            allowed=str(FORMAT_VERSION),
+            fix="update armblocks, if the file is newer than it",
+        )
+
+
+def _settings(node: Node, extras: Extras) -> SimulationOptions:
+    values: dict[str, object] = {}
+    for name, member in _split(node, tuple(_SETTINGS), extras, "settings").items():
+        default = _SETTINGS[name]
+        if isinstance(default, str):
+            values[name] = member.text()
+        else:
+            values[name] = None if member.value is None and default is None else member.number()
+    return dataclasses.replace(SimulationOptions(), **values)  # pyright: ignore[reportArgumentType]
+
+
+def _block(
+    key: str,
+    node: Node,
+    library: BlockLibrary,
+    resolve_robot: ResolveRobot,
+    folder: Path | None,
+    extras: Extras,
+) -> Block:
+    members = _split(node, ("type", "parameters"), extras, "blocks", key)
+    if "type" not in members:
+        raise node.error("the key 'type' is missing", allowed="a block type", fix='add "type": "Gain"')
+    with _located(members["type"]):
+        kind = library[members["type"].text()]
+    rules = {rule.name: rule for rule in kind.parameters()}
+    given = members["parameters"].members() if "parameters" in members else {}
+    values: dict[str, object] = {}
+    for name, member in given.items():
+        if name not in rules:
+            raise UnknownNameError(f"parameter of {kind.type_name()}", name, rules, where=member.where)
+        values[name] = _parameter(rules[name], member, resolve_robot, folder)
+    missing = [name for name, rule in rules.items() if rule.required and name not in values]
+    if missing:
+        raise node.error(
+            f"a {kind.type_name()} needs the parameter '{missing[0]}'",
+            allowed=rules[missing[0]].describe(),
+            fix=f"add '{missing[0]}': {rules[missing[0]].doc}",
+        )
+    with _located(node):
+        return kind(**values)
+
+
+def _parameter(rule: Parameter, node: Node, resolve_robot: ResolveRobot, folder: Path | None) -> object:
+    """The checked value of one parameter, so that what is wrong is said at its own line."""
+    if rule.kind is ParameterKind.ROBOT:
+        return robot_of_reference(node, folder, resolve_robot)
+    value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value
+    with _located(node):
+        return rule.check(value, "")
+
+
+def _with_infinities(value: object) -> object:
+    if isinstance(value, list):
+        return [_with_infinities(entry) for entry in cast("list[object]", value)]
+    return _INFINITIES.get(value, value) if isinstance(value, str) else value
+
+
+def _wire(node: Node) -> tuple[PortRef, PortRef]:
+    found = _WIRE.fullmatch(node.text())
+    if found is None:
+        raise node.error(f"'{node.text()[:80]}' is no connection", allowed='"block/output -> block/input"')
+    return PortRef(found[1], found[2]), PortRef(found[3], found[4])
+
+
+def _layout(node: Node, blocks: set[str], extras: Extras) -> dict[str, Placement]:
+    """Where the blocks stand. What stands there and is no block belongs to another program and is kept."""
+    places: dict[str, Placement] = {}
+    for key, member in node.members().items():
+        if key not in blocks:
+            extras.setdefault("layout", {})[key] = member.value
+            continue
+        members = _split(member, tuple(_PLACEMENT), extras, "layout", key)
+        closed = {name: members[name] for name in ("x", "y") if name in members}
+        if len(closed) < 2:
+            raise member.error(f"block '{key}' is placed without x or y", allowed="x and y in pixels")
+        extents = {name: members[name].number() for name in ("width", "height") if name in members}
+        places[key] = Placement(
+            x=closed["x"].number(),
+            y=closed["y"].number(),
+            width=extents.get("width"),
+            height=extents.get("height"),
+            flipped="flipped" in members and members["flipped"].boolean(),
+        )
+    return places

@@ -1,0 +1,428 @@
+"""Canonical JSON: strict when read, the same bytes for the same content when written.
+
+Read: UTF-8, at most so many bytes and so deep, no duplicate keys, no NaN or infinity (``json`` alone accepts
+``NaN`` and ``1e999``), and messages that give file, line and the path inside the document. Written: keys
+sorted, two blanks per level, every member on a line of its own, rows of numbers on one line, floats with the
+fewest digits that read back to the same bits, a newline at the end.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import cast
+
+from armblocks.errors import FormatError
+
+DEEPEST = 64
+"""Objects and arrays inside each other."""
+LONGEST_INTEGER = 18
+"""Digits of an integer: they fit into 64 bits."""
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """The text of a file, for the lines of its messages."""
+
+    name: str
+    text: str
+
+    def where(self, path: KeyPath) -> str:
+        """``model.json:12, blocks.jtraj.parameters.q0[2]``"""
+        line = _line_of(self.text, path)
+        place = f"{self.name}:{line}" if line else self.name
+        return f"{place}, {path_text(path)}" if path else place
+
+
+@dataclass(frozen=True)
+class Node:
+    """One value of a document and its place in it. All readers raise ``FormatError`` with file and line."""
+
+    document: Document
+    path: KeyPath
+    value: object
+
+    @property
+    def where(self) -> str:
+        """File, line and path of this value."""
+        return self.document.where(self.path)
+
+    def error(self, what: str, *, allowed: str = "", fix: str = "") -> FormatError:
+        """The refusal of this value, to be raised by the caller."""
+        return FormatError(what, where=self.where, allowed=allowed, fix=fix)
+
+    def members(self) -> dict[str, Node]:
+        """The members of an object, by key."""
+        value = self.value
+        if not isinstance(value, dict):
+            raise self._wrong("an object {…}")
+        entries = cast("dict[str, object]", value)
+        return {key: Node(self.document, (*self.path, key), value) for key, value in entries.items()}
+
+    def elements(self) -> list[Node]:
+        """The elements of an array."""
+        value = self.value
+        if not isinstance(value, list):
+            raise self._wrong("an array […]")
+        entries = cast("list[object]", value)
+        return [Node(self.document, (*self.path, i), value) for i, value in enumerate(entries)]
+
+    def text(self) -> str:
+        """A string."""
+        if not isinstance(self.value, str):
+            raise self._wrong("text")
+        return self.value
+
+    def number(self) -> float:
+        """A number; it is finite, as the reader lets no other through."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+            raise self._wrong("a number")
+        return float(self.value)
+
+    def boolean(self) -> bool:
+        """``true`` or ``false``"""
+        if not isinstance(self.value, bool):
+            raise self._wrong("true or false")
+        return self.value
+
+    def numbers(self, count: int) -> tuple[float, ...]:
+        """An array of ``count`` numbers."""
+        elements = self.elements()
+        if len(elements) != count:
+            raise self.error(f"{len(elements)} numbers are given", allowed=f"{count} numbers")
+        return tuple(element.number() for element in elements)
+
+    def choice(self, choices: Iterable[str]) -> str:
+        """One of some texts."""
+        word, known = self.text(), list(choices)
+        if word not in known:
+            raise self.error(
+                f"'{_short(word)}' is not known here", allowed=", ".join(known), fix=_nearest(word, known)
+            )
+        return word
+
+    def _wrong(self, wanted: str) -> FormatError:
+        return self.error(f"the value is {describe(self.value)}", allowed=wanted)
+
+
+def read_document(data: bytes, name: str, most_bytes: int) -> Node:
+    """The root of a JSON document. ``name`` is what messages call the file.
+
+    Raises ``FormatError`` for anything that is not strict JSON, and for what passes the caps.
+    """
+    if len(data) > most_bytes:
+        raise FormatError("the document is too large", where=name, allowed=f"at most {most_bytes} bytes")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise FormatError(
+            "the file is not UTF-8 text", where=f"{name}:{line}", fix="save it as UTF-8"
+        ) from error
+    document = Document(name, text)
+    _check_depth(document)
+    try:
+        value = json.loads(
+            text,
+            object_pairs_hook=_unique_members,
+            parse_constant=_refuse_constant,
+            parse_float=_finite,
+            parse_int=_bounded_integer,
+        )
+    except json.JSONDecodeError as error:
+        raise FormatError(
+            f"the file is not valid JSON: {error.msg} (column {error.colno})", where=f"{name}:{error.lineno}"
+        ) from error
+    except _RefusedError as refusal:
+        line = _line_with(text, refusal.needle)
+        raise FormatError(refusal.what, where=f"{name}:{line}", allowed=refusal.allowed) from None
+    root = Node(document, (), value)
+    _check_text(root)
+    return root
+
+
+def canonical_bytes(value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False) -> bytes:
+    """The one way to write a document of dicts, lists, texts, numbers, booleans and ``None``.
+
+    ``one_line`` says of the path of an object or array whether it is kept on one line. Raises ``FormatError`` for
+    numbers that are not finite, texts that are no Unicode, keys that are no texts, and foreign types.
+    """
+    pieces: list[str] = []
+    _write(value, (), 0, one_line, pieces.append)
+    try:
+        return ("".join(pieces) + "\n").encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise FormatError(
+            "a text cannot be written, as it is not valid Unicode", fix="correct the text"
+        ) from error
+
+
+def describe(value: object) -> str:
+    """A value in a few words, for messages."""
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return f"the text '{_short(value)}'"
+        case int() | float():
+            return f"the number {value!r}"
+        case list():
+            return f"an array of {len(cast('list[object]', value))}"
+        case _:
+            return "an object"
+
+
+def path_text(path: KeyPath) -> str:
+    """``("blocks", "XY Graph", "q", 2)`` as ``blocks."XY Graph".q[2]``."""
+    text = ""
+    for step in path:
+        if isinstance(step, int):
+            text += f"[{step}]"
+        else:
+            word = step if re.fullmatch(r"[\w-]+", step) else json.dumps(_short(step), ensure_ascii=False)
+            text += f".{word}" if text else word
+    return text
+
+
+def split_members(node: Node, known: Iterable[str]) -> tuple[dict[str, Node], dict[str, object]]:
+    """The known members of an object, and the unknown ones as plain values, which a writer must preserve.
+
+    An unknown key that is nearly a known one is a slip of the pen: it raises ``FormatError``.
+    """
+    names = list(known)
+    members = node.members()
+    extra: dict[str, object] = {}
+    for key, member in list(members.items()):
+        if key in names:
+            continue
+        near = difflib.get_close_matches(key.casefold(), names, n=1, cutoff=0.8)
+        if near and near[0] not in members:
+            raise member.error(
+                f"the key '{_short(key)}' is not known here",
+                allowed=", ".join(names),
+                fix=f"did you mean '{near[0]}'?",
+            )
+        extra[key] = member.value
+        del members[key]
+    return members, extra
+
+
+def closed_members(node: Node, known: Iterable[str], required: Iterable[str] = ()) -> dict[str, Node]:
+    """The members of an object that may have no others. Raises ``FormatError`` with the nearest name."""
+    names, members = list(known), node.members()
+    for key, member in members.items():
+        if key not in names:
+            raise member.error(
+                f"the key '{_short(key)}' is not known here",
+                allowed=", ".join(names),
+                fix=_nearest(key, names),
+            )
+    for key in required:
+        if key not in members:
+            raise node.error(f"the key '{key}' is missing", allowed=", ".join(names), fix=f"add '{key}'")
+    return members
+
+
+class _RefusedError(Exception):
+    """Something that JSON's own parser lets through, found while parsing, where no line is known."""
+
+    def __init__(self, what: str, needle: str, allowed: str) -> None:
+        self.what, self.needle, self.allowed = what, needle, allowed
+        super().__init__(what)
+
+
+def _unique_members(pairs: list[tuple[str, object]]) -> dict[str, object]:
+    members = dict(pairs)
+    if len(members) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for i, key in enumerate(keys) if key in keys[:i])
+        raise _RefusedError(
+            f"the key '{_short(twice)}' stands twice in one object", json.dumps(twice), "every key once"
+        )
+    return members
+
+
+def _refuse_constant(word: str) -> object:
+    raise _RefusedError(f"{word} is not a JSON number", word, "finite numbers")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if math.isinf(value):
+        raise _RefusedError(f"the number {_short(text)} is too large", text, "magnitudes below 1.8e308")
+    return value
+
+
+def _bounded_integer(text: str) -> int:
+    if len(text) > LONGEST_INTEGER + 1:
+        raise _RefusedError(
+            f"the integer {_short(text)} is too long", text, f"at most {LONGEST_INTEGER} digits"
+        )
+    return int(text)
+
+
+_TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}:,]|\n|[^\s\[\]{}:,"]+', re.DOTALL)
+
+
+def _check_depth(document: Document) -> None:
+    """Python's parser recurses: refuse before it starts."""
+    depth, line = 0, 1
+    for found in _TOKEN.finditer(document.text):
+        token = found.group()
+        line += token.count("\n")
+        if token in "[{":
+            depth += 1
+            if depth > DEEPEST:
+                raise FormatError(
+                    "objects and arrays lie too deep in each other",
+                    where=f"{document.name}:{line}",
+                    allowed=f"{DEEPEST} levels",
+                )
+        elif token in "]}":
+            depth -= 1
+
+
+def _check_text(root: Node) -> None:
+    """Refuse halves of surrogate pairs, which ``"\\ud800"`` makes and no file can hold."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        texts = [node.value] if isinstance(node.value, str) else []
+        if isinstance(node.value, dict):
+            members = node.members()
+            texts += list(members)
+            waiting += members.values()
+        elif isinstance(node.value, list):
+            waiting += node.elements()
+        for text in texts:
+            if any("\ud800" <= character <= "\udfff" for character in text):
+                raise node.error(
+                    "a text is not valid Unicode (half of a surrogate pair)", allowed="whole characters"
+                )
+
+
+def _line_with(text: str, needle: str) -> int:
+    """The line of the last occurrence of a needle (of a duplicate key this is the second one, mostly)."""
+    return text.count("\n", 0, max(text.rfind(needle), 0)) + 1
+
+
+@dataclass
+class _Level:
+    """One open object or array on the way; ``step`` is the key or index of its value at hand."""
+
+    bracket: str
+    step: str | int | None
+
+
+def _line_of(text: str, path: KeyPath) -> int:
+    """The line on which the value at ``path`` starts, or 0. The text is known to be valid JSON."""
+    stack: list[_Level] = []
+    line, key = 1, ""
+    for found in _TOKEN.finditer(text):
+        token = found.group()
+        level = stack[-1] if stack else None
+        if token == "\n":
+            line += 1
+        elif token in ("]", "}"):
+            stack.pop()
+        elif token == "," and level is not None:
+            level.step = level.step + 1 if isinstance(level.step, int) else None
+        elif token == ":" and level is not None:
+            level.step = key
+        elif level is not None and level.step is None:
+            key = json.loads(token)
+        else:
+            if tuple(entry.step for entry in stack) == path:
+                return line
+            if token in ("[", "{"):
+                stack.append(_Level(token, 0 if token == "[" else None))
+    return 0
+
+
+def _write(
+    value: object, path: KeyPath, depth: int, one_line: Callable[[KeyPath], bool], put: Callable[[str], None]
+) -> None:
+    """Append the text of one value."""
+    if depth > DEEPEST:
+        raise FormatError("objects and arrays lie too deep in each other", allowed=f"{DEEPEST} levels")
+    match value:
+        case Mapping():
+            members = cast("Mapping[object, object]", value)
+            keys = [key for key in members if isinstance(key, str)]
+            if len(keys) < len(members):
+                raise FormatError("a key is not text", where=path_text(path), allowed="texts as keys")
+            flat = one_line(path)
+            _write_group(
+                "{}",
+                [(json.dumps(key, ensure_ascii=False) + ": ", key, members[key]) for key in sorted(keys)],
+                (path, depth, flat, one_line, put),
+            )
+        case list() | tuple():
+            elements = cast("list[object] | tuple[object, ...]", value)
+            flat = not any(isinstance(element, Mapping | list | tuple | str) for element in elements)
+            _write_group(
+                "[]",
+                [("", i, element) for i, element in enumerate(elements)],
+                (path, depth, flat or not elements or one_line(path), one_line, put),
+            )
+        case _:
+            put(_scalar(value, path))
+
+
+def _write_group(
+    brackets: str,
+    entries: list[tuple[str, str | int, object]],
+    context: tuple[KeyPath, int, bool, Callable[[KeyPath], bool], Callable[[str], None]],
+) -> None:
+    path, depth, flat, one_line, put = context
+    outer, inner = ("", "") if flat else ("\n" + "  " * depth, "\n" + "  " * (depth + 1))
+    put(brackets[0])
+    for position, (label, step, entry) in enumerate(entries):
+        put(("," + (" " if flat else "") if position else "") + inner + label)
+        _write(entry, (*path, step), depth + 1, (lambda path: True) if flat else one_line, put)
+    put((outer if entries else "") + brackets[1])
+
+
+def _scalar(value: object, path: KeyPath) -> str:
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case int():
+            return str(value)
+        case float():
+            if not math.isfinite(value):
+                raise FormatError(
+                    f"the number {value} cannot be written", where=path_text(path), allowed="finite numbers"
+                )
+            # 10.0 as 10, which is how JavaScript writes it; the sign of -0.0 would be lost so.
+            whole = (
+                value.is_integer() and abs(value) < 1e15 and math.copysign(1.0, value) * (value or 1.0) > 0
+            )
+            return str(int(value)) if whole else repr(value)
+        case _:
+            raise FormatError(
+                f"a {type(value).__name__} cannot be written",
+                where=path_text(path),
+                allowed="JSON's own types",
+            )
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def _nearest(word: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f"did you mean '{near[0]}'?" if near else "remove it"

@@ -1,0 +1,127 @@
+"""Robots by name or path: the formats, the shipped robots, and what loading a user's file adds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+from armblocks.errors import FormatError, UnknownNameError
+from armblocks.files import read_bounded
+from armblocks.formats.matlab_script import MATLAB_SCRIPT
+from armblocks.formats.robot_format import RobotFormat
+from armblocks.formats.robot_json import ROBOT_JSON
+from armblocks.robot import FrictionModel, Robot, warn_of_inertias
+
+ROBOT_FORMATS: tuple[RobotFormat, ...] = (ROBOT_JSON, MATLAB_SCRIPT)
+"""Every format of robot files. A new one is one file with a ``RobotFormat``, and its name here."""
+
+SHIPPED_FILE = "robot.json"
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names of the shipped robots, sorted."""
+    folder = shipped_folder("robots")
+    return tuple(sorted(entry.name for entry in folder.iterdir() if (entry / SHIPPED_FILE).is_file()))
+
+
+def load_robot(
+    name_or_path: str | Path, *, name: str | None = None, friction_model: FrictionModel | None = None
+) -> Robot:
+    """A shipped robot by its name, ``"kr180"``, or a robot file by its path.
+
+    What holds a path separator or ends in the suffix of a robot format is a path, everything else a name.
+    ``name`` picks one of several robots of a script, by the script's variable or by the robot's own name.
+    ``friction_model`` replaces that of the file; scripts have none and get that of releases 9.5 to 10. The
+    robot's ``source`` is the shipped name or the path.
+
+    Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` that the file does not hold,
+    ``FormatError`` for a file that is missing, of no known format or not understood. Warns
+    (``InertiaWarning``) of inertias in a user's file that no body can have; the shipped robots' are told by
+    ``armblocks show``.
+    """
+    if is_path(name_or_path):
+        robot = _pick(_read_file(Path(name_or_path)), str(name_or_path), name)
+        robot = replace(robot, source=str(name_or_path))
+        warn_of_inertias(robot)
+    else:
+        robot = shipped_robot(str(name_or_path))
+        if name is not None:
+            robot = _pick({robot.name: robot}, str(name_or_path), name)
+    return robot if friction_model is None else robot.with_friction_model(friction_model)
+
+
+@cache
+def shipped_robot(name: str) -> Robot:
+    """A shipped robot by its name; raises ``UnknownNameError`` with the nearest."""
+    known = list_robots()
+    if name not in known:
+        raise UnknownNameError("shipped robot", name, known)
+    path = shipped_folder("robots") / name / SHIPPED_FILE
+    (robot,) = _read_file(path).values()
+    return replace(robot, source=name)
+
+
+def is_path(name_or_path: str | Path) -> bool:
+    """Whether a path is meant, and not the name of something shipped."""
+    if isinstance(name_or_path, Path):
+        return True
+    suffixes = tuple(suffix for format in ROBOT_FORMATS for suffix in format.suffixes)
+    return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(suffixes)
+
+
+def shipped_folder(kind: str) -> Path:
+    """The folder of the shipped ``robots`` or ``examples``: in the installed package, or in a checkout.
+
+    Raises ``FormatError`` where the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / "shipped" / kind, package.parent.parent / kind):
+        if folder.is_dir():
+            return folder
+    raise FormatError(
+        f"the shipped {kind} are missing", where=str(package), fix="install armblocks again, from a wheel"
+    )
+
+
+def _read_file(path: Path) -> Mapping[str, Robot]:
+    if path.is_dir():
+        raise FormatError(
+            "this is a folder",
+            where=str(path),
+            allowed="a robot file: " + ", ".join(suffix for f in ROBOT_FORMATS for suffix in f.suffixes),
+            fix=f"give the path of a file in it, such as {path.name}/{SHIPPED_FILE}",
+        )
+    for format in ROBOT_FORMATS:
+        if path.suffix.lower() in format.suffixes:
+            return format.read(read_bounded(path, format.most_bytes), str(path))
+    raise FormatError(
+        f"'{path.suffix}' is no suffix of a robot file",
+        where=str(path),
+        allowed=", ".join(f"{suffix} ({f.name})" for f in ROBOT_FORMATS for suffix in f.suffixes),
+        fix="rename the file",
+    )
+
+
+def _pick(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
+    """The robot that is meant among those of one file."""
+    if not robots:
+        raise FormatError(
+            "the file defines no robot", where=where, allowed="kuka = robot(L, …) or SerialLink(L, …)"
+        )
+    if name is not None:
+        for variable, robot in robots.items():
+            if name in (variable, robot.name):
+                return robot
+        raise UnknownNameError(
+            "robot", name, [*robots, *(robot.name for robot in robots.values())], where=where
+        )
+    if len(robots) > 1:
+        raise FormatError(
+            f"the file defines {len(robots)} robots",
+            where=where,
+            allowed=", ".join(robots),
+            fix="say which: name=…",
+        )
+    return next(iter(robots.values()))

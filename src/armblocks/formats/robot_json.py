@@ -1,0 +1,355 @@
+"""Robots as canonical JSON, ``robot.json``: every field of a ``Robot``, in SI units.
+
+Angles may be written ``"90 deg"`` and angular speeds ``"105 deg/s"``; they are written so where the degrees
+have few digits and read back to the same bits. A link with a ``dh`` row takes its joint and transforms from
+it. Unknown keys are refused with the nearest known one: a robot file in which a slip of the pen is ignored
+is a wrong robot. ``notes`` is for people and not kept.
+
+The JSON Schema is ``formats/schema/robot.schema.json``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from armblocks.errors import ArmblocksError, FormatError, RobotError
+from armblocks.formats.json_document import Node, canonical_bytes, closed_members, read_document
+from armblocks.formats.robot_format import RobotFormat
+from armblocks.formats.shapes_json import shape_from, shape_to
+from armblocks.robot import (
+    JOINT_TYPES,
+    DhConvention,
+    DhRow,
+    FrictionModel,
+    Joint,
+    JointLimits,
+    Link,
+    Motor,
+    Prismatic,
+    Robot,
+    link_from_dh,
+)
+from armblocks.robot.robot import STANDARD_GRAVITY
+from armblocks.spatial import Matrix3, Transform, Vector3
+
+FORMAT_VERSION = 1
+MOST_BYTES = 16 * 2**20
+
+_ROBOT_KEYS = (
+    "format",
+    "name",
+    "manufacturer",
+    "comment",
+    "notes",
+    "base",
+    "tool",
+    "gravity",
+    "friction_model",
+    "links",
+)
+_MASS_KEYS = ("mass", "centre_of_mass", "inertia")
+_LINK_KEYS = ("name", "parent", "dh", "joint", "before", "after", "limits", *_MASS_KEYS, "motor", "geometry")
+_INERTIA_KEYS = ("xx", "yy", "zz", "xy", "yz", "xz")
+_DEGREES = re.compile(r"(-?[0-9]+(?:\.[0-9]+)?) deg(/s)?")
+_JOINTS = {kind.__name__.lower(): kind for kind in JOINT_TYPES}
+
+
+def read_robot(data: bytes, name: str) -> Robot:
+    """The robot of a JSON document. Raises ``FormatError`` with file, line and path."""
+    return robot_from(read_document(data, name, MOST_BYTES))
+
+
+def robot_from(node: Node) -> Robot:
+    """The robot that a JSON object describes."""
+    members = closed_members(node, _ROBOT_KEYS, required=("format", "name", "links"))
+    if members["format"].value != FORMAT_VERSION or isinstance(members["format"].value, bool):
+        raise members["format"].error(
+            f"the format version is {members['format'].value!r}",
+            allowed=str(FORMAT_VERSION),
+            fix="update armblocks, if the file is newer than it",
+        )
+    texts = {
+        key: members[key].text() if key in members else ""
+        for key in ("name", "manufacturer", "comment", "notes")
+    }
+    model = FrictionModel.SQUARED_GEAR
+    if "friction_model" in members:
+        model = FrictionModel(members["friction_model"].choice([model.value for model in FrictionModel]))
+    links = tuple(_link(member) for member in members["links"].elements())
+    try:
+        return Robot(
+            name=texts["name"],
+            manufacturer=texts["manufacturer"],
+            comment=texts["comment"],
+            links=links,
+            base=_transform(members["base"]) if "base" in members else Transform(),
+            tool=_transform(members["tool"]) if "tool" in members else Transform(),
+            gravity=_vector(members["gravity"]) if "gravity" in members else STANDARD_GRAVITY,
+            friction_model=model,
+        )
+    except RobotError as error:
+        raise FormatError(
+            f"{error.where}: {error.what}", where=node.where, allowed=error.allowed, fix=error.fix
+        ) from error
+
+
+def write_robot(robot: Robot) -> bytes:
+    """The canonical document of a robot. Reading it gives an equal robot."""
+    return canonical_bytes(robot_to(robot), one_line=lambda path: path[-1:] == ("position",))
+
+
+def robot_to(robot: Robot) -> dict[str, object]:
+    """The JSON object that describes a robot; what is empty or identity is left out."""
+    document: dict[str, object] = {
+        "format": FORMAT_VERSION,
+        "name": robot.name,
+        "gravity": robot.gravity,
+        "friction_model": robot.friction_model.value,
+        "links": [_link_to(link) for link in robot.links],
+    }
+    for key in ("manufacturer", "comment"):
+        if getattr(robot, key):
+            document[key] = getattr(robot, key)
+    for key in ("base", "tool"):
+        if not getattr(robot, key).is_identity:
+            document[key] = _transform_to(getattr(robot, key))
+    return document
+
+
+# -- reading -----------------------------------------------------------------------------------------------
+
+
+def _link(node: Node) -> Link:
+    members = closed_members(node, _LINK_KEYS, required=("name",))
+    if "dh" in members and (both := {"joint", "before", "after"} & set(members)):
+        raise node.error(
+            f"the link has both 'dh' and {', '.join(map(repr, sorted(both)))}",
+            allowed="a D-H row, or joint, before and after",
+            fix="remove one of them",
+        )
+    name = members["name"].text()
+    parent = members["parent"].text() if "parent" in members and members["parent"].value is not None else None
+    geometry = (
+        tuple(shape_from(shape) for shape in members["geometry"].elements())
+        if "geometry" in members
+        else None
+    )
+    mass = members["mass"].number() if "mass" in members else 0.0
+    centre = _vector(members["centre_of_mass"]) if "centre_of_mass" in members else (0.0, 0.0, 0.0)
+    inertia = _inertia(members["inertia"]) if "inertia" in members else (0.0,) * 6
+    motor = _motor(members["motor"]) if "motor" in members else None
+    if "dh" in members:
+        dh = _dh(members["dh"])
+        limits = _limits(members["limits"], angular=not dh.sigma) if "limits" in members else None
+        return link_from_dh(
+            name,
+            dh,
+            parent=parent,
+            limits=limits,
+            mass=mass,
+            centre_of_mass=centre,
+            inertia=inertia,
+            motor=motor,
+            geometry=geometry,
+        )
+    return Link(
+        name=name,
+        parent=parent,
+        joint=_joint(members.get("joint"), members.get("limits")),
+        before=_transform(members["before"]) if "before" in members else Transform(),
+        after=_transform(members["after"]) if "after" in members else Transform(),
+        mass=mass,
+        centre_of_mass=centre,
+        inertia=_symmetric(inertia),
+        motor=motor,
+        geometry=geometry,
+    )
+
+
+def _symmetric(six: tuple[float, ...]) -> Matrix3:
+    xx, yy, zz, xy, yz, xz = six
+    return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+
+
+def _dh(node: Node) -> DhRow:
+    members = closed_members(
+        node, ("convention", "joint", "alpha", "a", "d", "theta", "offset"), ("convention",)
+    )
+    sliding = "joint" in members and members["joint"].choice(("revolute", "prismatic")) == "prismatic"
+    word = members["convention"].choice([convention.value for convention in DhConvention])
+    offset = members.get("offset")
+    return DhRow(
+        convention=DhConvention(word),
+        sigma=int(sliding),
+        alpha=_angle(members["alpha"]) if "alpha" in members else 0.0,
+        theta=_angle(members["theta"]) if "theta" in members else 0.0,
+        a=members["a"].number() if "a" in members else 0.0,
+        d=members["d"].number() if "d" in members else 0.0,
+        offset=0.0 if offset is None else offset.number() if sliding else _angle(offset),
+    )
+
+
+def _joint(node: Node | None, limits: Node | None) -> Joint:
+    if node is None:
+        kind, members = _JOINTS["revolute"], dict[str, Node]()
+    else:
+        members = closed_members(node, ("type", "axis", "offset"), required=("type",))
+        kind = _JOINTS[members["type"].choice(_JOINTS)]
+    angular = kind.unit != Prismatic.unit
+    offset = members.get("offset")
+    return kind(
+        axis=_vector(members["axis"]) if "axis" in members else (0.0, 0.0, 1.0),
+        offset=0.0 if offset is None else _angle(offset) if angular else offset.number(),
+        limits=_limits(limits, angular=angular) if limits is not None else JointLimits(),
+    )
+
+
+def _limits(node: Node, *, angular: bool) -> JointLimits:
+    members = closed_members(node, ("position", "speed", "torque"))
+    position: tuple[float, float] | None = None
+    if "position" in members:
+        ends = members["position"].elements()
+        if len(ends) != 2:
+            raise members["position"].error(
+                f"{len(ends)} limits are given", allowed="the lowest and the highest"
+            )
+        low, high = (_angle(end) if angular else end.number() for end in ends)
+        position = (low, high)
+    speed = members.get("speed")
+    return JointLimits(
+        position=position,
+        speed=None if speed is None else _angle(speed, per_second=True) if angular else speed.number(),
+        torque=members["torque"].number() if "torque" in members else None,
+    )
+
+
+def _motor(node: Node) -> Motor:
+    members = closed_members(node, ("inertia", "gear_ratio", "viscous_friction", "coulomb_friction"))
+    numbers = {
+        key: members[key].number() for key in ("inertia", "gear_ratio", "viscous_friction") if key in members
+    }
+    plus, minus = members["coulomb_friction"].numbers(2) if "coulomb_friction" in members else (0.0, 0.0)
+    return Motor(coulomb_friction=(plus, minus), **numbers)
+
+
+def _inertia(node: Node) -> tuple[float, ...]:
+    members = closed_members(node, _INERTIA_KEYS)
+    return tuple(members[key].number() if key in members else 0.0 for key in _INERTIA_KEYS)
+
+
+def _vector(node: Node) -> Vector3:
+    x, y, z = node.numbers(3)
+    return x, y, z
+
+
+def _transform(node: Node) -> Transform:
+    members = closed_members(node, ("rotation", "translation"))
+    identity = Transform()
+    rotation: Matrix3 = identity.rotation
+    if "rotation" in members:
+        rows = members["rotation"].elements()
+        if len(rows) != 3:
+            raise members["rotation"].error(f"{len(rows)} rows are given", allowed="3 rows of 3 numbers")
+        rotation = (_vector(rows[0]), _vector(rows[1]), _vector(rows[2]))
+    translation = _vector(members["translation"]) if "translation" in members else identity.translation
+    try:
+        return Transform(rotation=rotation, translation=translation)
+    except ArmblocksError as error:
+        raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
+
+
+def _angle(node: Node, *, per_second: bool = False) -> float:
+    """An angle in rad, or text in degrees; an angular speed likewise."""
+    if not isinstance(node.value, str):
+        return node.number()
+    found = _DEGREES.fullmatch(node.value)
+    unit = "deg/s" if per_second else "deg"
+    if found is None or (found.group(2) is not None) != per_second or len(node.value) > 40:
+        raise node.error(
+            f"'{node.value[:40]}' is not an angle", allowed=f'rad as a number, or text such as "90 {unit}"'
+        )
+    return math.radians(float(found.group(1)))
+
+
+# -- writing -----------------------------------------------------------------------------------------------
+
+
+def _link_to(link: Link) -> dict[str, object]:
+    angular = link.joint.unit != Prismatic.unit
+    entry: dict[str, object] = {"name": link.name, "parent": link.parent, "mass": link.mass}
+    if link.dh is not None:
+        entry["dh"] = _dh_to(link.dh)
+    else:
+        entry["joint"] = {
+            "type": type(link.joint).__name__.lower(),
+            "axis": link.joint.axis,
+            "offset": _angle_to(link.joint.offset) if angular else link.joint.offset,
+        }
+        for key in ("before", "after"):
+            if not getattr(link, key).is_identity:
+                entry[key] = _transform_to(getattr(link, key))
+    if link.joint.limits != JointLimits():
+        entry["limits"] = _limits_to(link.joint.limits, angular=angular)
+    if any(link.centre_of_mass):
+        entry["centre_of_mass"] = link.centre_of_mass
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia
+    moments = dict(zip(_INERTIA_KEYS, (xx, yy, zz, xy, yz, xz)))
+    if any(moments.values()):
+        products = {key: moments[key] for key in ("xy", "yz", "xz") if moments[key]}
+        entry["inertia"] = {"xx": xx, "yy": yy, "zz": zz, **products}
+    if link.motor is not None:
+        entry["motor"] = {
+            "inertia": link.motor.inertia,
+            "gear_ratio": link.motor.gear_ratio,
+            "viscous_friction": link.motor.viscous_friction,
+            "coulomb_friction": link.motor.coulomb_friction,
+        }
+    if link.geometry is not None:
+        entry["geometry"] = [shape_to(shape) for shape in link.geometry]
+    return entry
+
+
+def _dh_to(dh: DhRow) -> dict[str, object]:
+    return {
+        "convention": dh.convention.value,
+        "joint": "prismatic" if dh.sigma else "revolute",
+        "alpha": _angle_to(dh.alpha),
+        "a": dh.a,
+        "d": dh.d,
+        "theta": _angle_to(dh.theta),
+        "offset": dh.offset if dh.sigma else _angle_to(dh.offset),
+    }
+
+
+def _limits_to(limits: JointLimits, *, angular: bool) -> dict[str, object]:
+    entry: dict[str, object] = {}
+    if limits.position is not None:
+        entry["position"] = [_angle_to(end) if angular else end for end in limits.position]
+    if limits.speed is not None:
+        entry["speed"] = _angle_to(limits.speed, "deg/s") if angular else limits.speed
+    if limits.torque is not None:
+        entry["torque"] = limits.torque
+    return entry
+
+
+def _transform_to(transform: Transform) -> dict[str, object]:
+    return {"rotation": transform.rotation, "translation": transform.translation}
+
+
+def _angle_to(angle: float, unit: str = "deg") -> float | str:
+    """Degrees in words where they have few digits and lose nothing, else rad."""
+    degrees = round(math.degrees(angle), 6)
+    text = f"{degrees:.6f}".rstrip("0").rstrip(".")
+    if angle == 0 or len(text) > 8 or math.radians(float(text)) != angle:
+        return angle
+    return f"{text} {unit}"
+
+
+def _read(data: bytes, name: str) -> Mapping[str, Robot]:
+    robot = read_robot(data, name)
+    return {robot.name: robot}
+
+
+ROBOT_JSON = RobotFormat(name="armblocks robot", suffixes=(".json",), most_bytes=MOST_BYTES, read=_read)
