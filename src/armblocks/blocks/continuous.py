@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from casadi import SX, dot, mtimes, vertcat
 from numpy.typing import ArrayLike
 
@@ -182,7 +183,7 @@ class StateSpace(Block):
         return (State("x", shape_of(self.A)[:1], "the state of the system"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        D = SX([list(row) for row in self.D])
+        D = SX(np.asarray(self.D))
         return {"y": mtimes(p["C"], x["x"]) + mtimes(D, u["u"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -207,10 +208,10 @@ class TransferFunction(Block):
     denominator: ArrayLike = parameter((1.0, 1.0), dimensions=(1,), doc="a0 … an, highest power first")
 
     def check(self) -> None:
-        (b,), a = shape_of(self.numerator), tuple[float, ...](self.parameter_value("denominator"))
-        if a[0] == 0.0 or len(a) < 2 or b > len(a):
+        b, a = np.asarray(self.numerator), np.asarray(self.denominator)
+        if a[0] == 0.0 or len(a) < 2 or len(b) > len(a):
             raise InputError(
-                f"the denominator is {list(a)} and the numerator has {b} coefficients",
+                f"the denominator is {a.tolist()} and the numerator has {len(b)} coefficients",
                 where="TransferFunction",
                 allowed="a0 not zero, at least two a, and no more b than a",
                 fix="leave out leading zeros; a system with more zeros than poles cannot be simulated",
@@ -226,15 +227,15 @@ class TransferFunction(Block):
         return (State("x", (self._degree,), "the canonical state"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        n, a = self._degree, p["denominator"] / p["denominator"][0]
-        b = vertcat(SX.zeros(n + 1 - p["numerator"].numel()), p["numerator"]) / p["denominator"][0]
+        a = p["denominator"] / p["denominator"][0]
+        b = vertcat(SX.zeros(self._degree + 1 - p["numerator"].numel()), p["numerator"]) / p["denominator"][0]
         # y = b0 u + sum (b_i - b0 a_i) x_i; a strictly proper system has no b0, so nothing feeds through.
         return {"y": b[0] * u["u"] + dot(b[1:] - b[0] * a[1:], x["x"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         a = p["denominator"] / p["denominator"][0]
         first = u["u"] - dot(a[1:], x["x"])
-        return {"x": vertcat(first, x["x"][: self._degree - 1])}
+        return {"x": vertcat(first, x["x"])[: self._degree]}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"x": SX(0.0)}

@@ -1,6 +1,7 @@
 """Diagrams: what a block is, how blocks are wired and checked, and how the whole becomes equations."""
 
 from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.block_equations import BlockEquations, SlotKind, block_equations
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.diagram import Connection, Diagram, Placement
@@ -16,6 +17,7 @@ from armblocks.diagram.variation import with_parameters
 __all__ = [
     "REQUIRED",
     "Block",
+    "BlockEquations",
     "BlockHandle",
     "BlockLibrary",
     "Connection",
@@ -29,9 +31,11 @@ __all__ = [
     "PortRef",
     "Shapes",
     "Signals",
+    "SlotKind",
     "State",
     "View",
     "ViewKind",
+    "block_equations",
     "broadcast",
     "check_block_name",
     "check_diagram",

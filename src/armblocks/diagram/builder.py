@@ -59,6 +59,7 @@ class DiagramBuilder:
         self.settings = settings or SimulationOptions()
         self._extras = dict(extras or {})
         self._blocks: dict[str, Block] = {}
+        self._ports: dict[str, tuple[dict[str, None], dict[str, None]]] = {}  # names of inputs, of outputs
         self._taken: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
         self._layout: dict[str, Placement] = {}
@@ -86,6 +87,10 @@ class DiagramBuilder:
             )
         self._taken[folded(name)] = name
         self._blocks[name] = block
+        self._ports[name] = (
+            dict.fromkeys(port.name for port in ports),
+            dict.fromkeys(port.name for port in block.output_ports()),
+        )
         handle = BlockHandle(name, block)
         for port, source in zip(ports, inputs):
             self.connect(source, PortRef(name, port.name))
@@ -145,7 +150,7 @@ class DiagramBuilder:
         side = "output" if output else "input"
         name = end.block if isinstance(end, PortRef) else end.name
         block = self._known(name)
-        ports = [port.name for port in (block.output_ports() if output else block.input_ports())]
+        ports = self._ports[name][output]
         if isinstance(end, PortRef):
             if end.port not in ports:
                 raise UnknownNameError(f"{side} port", end.port, ports, where=_where(name, block))
@@ -157,7 +162,7 @@ class DiagramBuilder:
                 allowed=", ".join(f'"{port}"' for port in ports) or "a block with one",
                 fix='name the port: handle["port"]',
             )
-        return PortRef(name, ports[0])
+        return PortRef(name, next(iter(ports)))
 
 
 def _where(name: str, block: Block) -> str:

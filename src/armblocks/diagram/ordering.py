@@ -35,19 +35,22 @@ class Network:
     diagram: Diagram
     equations: Mapping[str, BlockEquations]
 
-    def output(self, ref: PortRef, order: int = 0) -> Value:
-        """Where an output port's value is found. A derivative port is one order more of what feeds it."""
-        passed = {ref}
-        drivers = self.diagram.drivers
+    def route(self, ref: PortRef) -> tuple[PortRef, ...]:
+        """From a port back through derivative ports to the port whose equations are differentiated."""
+        route = {ref: None}
         while ref.port in self.diagram.blocks[ref.block].time_derivatives:
             source = self.diagram.blocks[ref.block].time_derivatives[ref.port]
-            ref = drivers[PortRef(ref.block, source)]
-            order += 1
-            if ref in passed:
-                raise AlgebraicLoopError(
-                    [str(entry) for entry in sorted(passed)], where=f"diagram '{self.diagram.name}'"
-                )
-            passed.add(ref)
+            ref = self.diagram.drivers[PortRef(ref.block, source)]
+            if ref in route:
+                loop = [str(entry) for entry in route][::-1]
+                raise AlgebraicLoopError(loop, where=f"diagram '{self.diagram.name}'")
+            route[ref] = None
+        return tuple(route)
+
+    def output(self, ref: PortRef, order: int = 0) -> Value:
+        """Where an output port's value is found. A derivative port is one order more of what feeds it."""
+        route = self.route(ref)
+        ref, order = route[-1], order + len(route) - 1
         rates = self.diagram.blocks[ref.block].output_rates
         port = ref.port
         while order and port in rates:
@@ -62,24 +65,24 @@ class Network:
         """Where the ``order``-th (at least first) derivative of a state is found."""
         return self._slot(block, SlotKind.DERIVATIVE, state, order - 1)
 
-    def needs(self, node: Node) -> Iterator[tuple[Node, str]]:
-        """The nodes that must be worked out before, each with the path of the signal that is needed."""
+    def needs(self, node: Node) -> Iterator[tuple[Node, tuple[str, ...]]]:
+        """The nodes that must be worked out before, each with the paths of the signals on the way to it."""
         group = self.equations[node.block].groups[node.group]
         for order in range(node.order + 1):
             for port in group.inputs:
                 ref = self.diagram.drivers[PortRef(node.block, port)]
-                yield self.output(ref, order).node, str(ref)
+                yield self.output(ref, order).node, tuple(str(entry) for entry in self.route(ref))
             if order:
                 for state in group.states:
-                    yield self.state_rate(node.block, state, order).node, f"{node.block}/{state}'"
+                    yield self.state_rate(node.block, state, order).node, (f"{node.block}/{state}'",)
 
-    def roots(self) -> Iterator[tuple[Node, str]]:
+    def roots(self) -> Iterator[Node]:
         """Everything that a run asks for: all groups, and what the derivative ports need."""
         for name, block in self.diagram.blocks.items():
-            for index, group in enumerate(self.equations[name].groups):
-                yield Node(name, index, 0), f"{name}/{group.slots[0].name}"
+            for index in range(len(self.equations[name].groups)):
+                yield Node(name, index, 0)
             for port in block.time_derivatives:
-                yield self.output(PortRef(name, port)).node, f"{name}/{port}"
+                yield self.output(PortRef(name, port)).node
 
     def _slot(self, block: str, kind: SlotKind, name: str, order: int) -> Value:
         return Value(Node(block, self.equations[block].group_of[kind, name], order), kind, name)
@@ -96,10 +99,10 @@ def evaluation_order(network: Network) -> list[Node]:
     """
     order: list[Node] = []
     done: set[Node] = set()
-    for root, label in network.roots():
+    for root in network.roots():
         if root in done:
             continue
-        path = [(root, label)]
+        path: list[tuple[Node, tuple[str, ...]]] = [(root, ())]
         pending = [network.needs(root)]
         open_orders: dict[tuple[str, int], list[int]] = {(root.block, root.group): [root.order]}
         while path:
@@ -123,7 +126,7 @@ def evaluation_order(network: Network) -> list[Node]:
     return order
 
 
-def _loop(path: list[tuple[Node, str]], closing: tuple[Node, str]) -> list[str]:
+def _loop(path: list[tuple[Node, tuple[str, ...]]], closing: tuple[Node, tuple[str, ...]]) -> list[str]:
     """The signals from the last visit of the closing node's group to the closing one, as they flow."""
     node = closing[0]
     start = max(
@@ -131,5 +134,5 @@ def _loop(path: list[tuple[Node, str]], closing: tuple[Node, str]) -> list[str]:
         for place, (entry, _) in enumerate(path)
         if (entry.block, entry.group) == (node.block, node.group) and entry.order <= node.order
     )
-    needed = [label for _, label in path[start + 1 :]] + [closing[1]]
+    needed = [entry for _, labels in (*path[start + 1 :], closing) for entry in labels]
     return needed[::-1]

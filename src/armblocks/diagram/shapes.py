@@ -129,29 +129,33 @@ def _input_shapes(
 def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     """All shapes by block, after the complaints that had to wait until they were known."""
     drivers = diagram.drivers
+    stated = {
+        PortRef(name, port.name): port.shape
+        for name, block in diagram.blocks.items()
+        for port in block.input_ports()
+    }
     for wire in diagram.connections:
-        given = known.get(wire.source)
-        port = next(p for p in diagram.blocks[wire.target.block].input_ports() if p.name == wire.target.port)
-        if given is not None and port.shape is not None and not shapes_agree(given, port.shape):
+        given, wanted = known.get(wire.source), stated[wire.target]
+        if given is not None and wanted is not None and not shapes_agree(given, wanted):
             raise DiagramError(
-                f"'{wire.source}' gives shape {given} but '{wire.target}' takes shape {port.shape}",
+                f"'{wire.source}' gives shape {given} but '{wire.target}' takes shape {wanted}",
                 where=f"diagram '{diagram.name}'",
                 allowed="both ends of a connection have the same shape",
-                fix="change the width of one end, or put a Mux, Demux or Gain matrix in between",
+                fix="change the width of one end, or put a Mux, Demux or Matrix Gain in between",
             )
     inputs: dict[str, Shapes] = {}
     outputs: dict[str, Shapes] = {}
     for name, block in diagram.blocks.items():
         # Still unknown: behind a block that complains below, or in a loop without any integrator, which the
         # ordering refuses; any shape does until then.
-        taken = {
-            port.name: port.shape
-            if port.shape is not None
-            else known.get(drivers[PortRef(name, port.name)], ())
-            for port in block.input_ports()
-        }
+        taken: dict[str, Shape] = {}
+        complete = True
+        for port in block.input_ports():
+            shape = port.shape if port.shape is not None else known.get(drivers[PortRef(name, port.name)])
+            complete = complete and shape is not None
+            taken[port.name] = shape or ()
         try:
-            if all(drivers[PortRef(name, port)] in known for port in taken):
+            if complete:
                 block.output_shapes(taken)
         except InputError as error:
             fed = ", ".join(f"'{port}' by '{drivers[PortRef(name, port)]}'" for port in taken)

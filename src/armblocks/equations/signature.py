@@ -106,7 +106,7 @@ class Signature:
         """Views of a flat array of shape ``(..., size)``: each slot as ``(..., *slot.shape)``."""
         lead = flat.shape[:-1]
         return {
-            slot.name: flat[..., self.ranges[slot.name]].reshape(*lead, *slot.shape) for slot in self.slots
+            slot.name: flat[..., self.ranges[slot.name]].reshape((*lead, *slot.shape)) for slot in self.slots
         }
 
 

@@ -1,0 +1,115 @@
+"""Evaluation order: every loop is printed, every chain is walked without recursion."""
+
+from __future__ import annotations
+
+import pytest
+
+from armblocks.blocks import (
+    Clock,
+    Constant,
+    Derivative,
+    Gain,
+    Integrator,
+    StateSpace,
+    Sum,
+    TransferFunction,
+)
+from armblocks.diagram import DiagramBuilder, trace_diagram
+from armblocks.errors import AlgebraicLoopError
+
+
+def test_a_loop_without_a_state_is_printed_in_the_direction_of_its_signals() -> None:
+    builder = DiagramBuilder("d")
+    total = builder.add("sum", Sum(signs="+-"), builder.add("one", Constant()))
+    half = builder.add("half", Gain(gain=0.5), total)
+    third = builder.add("third", Gain(gain=0.3), half)
+    builder.connect(third, total["u2"])
+    builder.add("after", Gain(), total)
+    with pytest.raises(AlgebraicLoopError) as caught:
+        builder.build()
+    loop = caught.value.loop
+    assert set(loop) == {"sum/y", "half/y", "third/y"}
+    place = loop.index("sum/y")
+    assert loop[place:] + loop[:place] == ("sum/y", "half/y", "third/y")
+    assert "diagram 'd': algebraic loop: " in str(caught.value)
+    assert "every loop passes through a block with a state" in str(caught.value)
+
+
+def test_a_gain_of_zero_does_not_hide_a_loop() -> None:
+    builder = DiagramBuilder("d")
+    gain = builder.add("gain", Gain(gain=0.0))
+    builder.connect(gain, gain)
+    with pytest.raises(AlgebraicLoopError, match="gain/y -> gain/y"):
+        builder.build()
+
+
+def test_an_integrator_breaks_a_loop_and_a_strictly_proper_filter_does() -> None:
+    for block in (Integrator(), TransferFunction(), StateSpace()):
+        builder = DiagramBuilder("d")
+        x = builder.add("x", block)
+        builder.connect(builder.add("back", Gain(gain=-1.0), x), x)
+        trace_diagram(builder.build())
+
+
+@pytest.mark.parametrize(
+    "block", [TransferFunction(numerator=(1.0, 0.0)), StateSpace(D=[[1.0]])], ids=["filter", "state space"]
+)
+def test_feedthrough_closes_a_loop(block: TransferFunction | StateSpace) -> None:
+    builder = DiagramBuilder("d")
+    x = builder.add("x", block)
+    builder.connect(builder.add("back", Gain(gain=-1.0), x), x)
+    with pytest.raises(AlgebraicLoopError):
+        builder.build()
+
+
+def test_a_derivative_of_itself_is_a_loop() -> None:
+    builder = DiagramBuilder("d")
+    rate = builder.add("rate", Derivative())
+    builder.connect(rate, rate)
+    with pytest.raises(AlgebraicLoopError, match="rate/y"):
+        builder.build()
+
+
+def test_a_derivative_in_an_algebraic_loop_is_a_loop() -> None:
+    builder = DiagramBuilder("d")
+    total = builder.add("sum", Sum(), builder.add("clock", Clock()))
+    builder.connect(builder.add("rate", Derivative(), total), total["u2"])
+    with pytest.raises(AlgebraicLoopError, match="sum/y"):
+        builder.build()
+
+
+def test_a_state_whose_rate_needs_its_own_rate_is_a_loop() -> None:
+    # x' = d/dt x, and x' = d2/dt2 x, where the orders would rise for ever
+    for count in (1, 2):
+        builder = DiagramBuilder("d")
+        x = builder.add("x", Integrator())
+        last = x
+        for k in range(count):
+            last = builder.add(f"rate{k}", Derivative(), last)
+        builder.connect(builder.add("back", Gain(gain=0.5), last), x)
+        with pytest.raises(AlgebraicLoopError):
+            builder.build()
+
+
+def test_higher_derivatives_of_a_state_are_no_loop() -> None:
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator(initial=2.0))
+    builder.connect(builder.add("back", Gain(gain=-3.0), x), x)
+    last = x
+    for k in range(4):
+        last = builder.add(f"rate{k}", Derivative(), last)
+    system = trace_diagram(builder.build())
+    (y,) = system.signals(0.0, [2.0], system.parameter_values)
+    signals = system.signals_layout.unpack(y)
+    assert [float(signals[f"rate{k}/y"]) for k in range(4)] == [-6.0, 18.0, -54.0, 162.0]
+
+
+def test_a_chain_of_ten_thousand_blocks_in_the_worst_order() -> None:
+    builder = DiagramBuilder("chain")
+    last = builder.add("source", Constant(value=0.0))
+    for k in range(10_000):
+        # names fall, so that the sorted order is the reverse of the order of evaluation
+        last = builder.add(f"{10_000 - k:05d}", Gain(gain=1.0), last)
+    system = trace_diagram(builder.build())
+    assert system.signals_layout.names[0] == "source/y"
+    assert system.signals_layout.names[-1] == "00001/y"

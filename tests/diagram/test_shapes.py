@@ -1,0 +1,108 @@
+"""Shapes spread through a diagram, round loops too; ends that disagree are both named."""
+
+from __future__ import annotations
+
+import pytest
+
+from armblocks.blocks import (
+    Constant,
+    Demux,
+    Gain,
+    Integrator,
+    MatrixGain,
+    MatrixProduct,
+    Mux,
+    SineWave,
+    Sum,
+    T2xyz,
+    TransferFunction,
+)
+from armblocks.diagram import DiagramBuilder, broadcast, infer_shapes
+from armblocks.errors import DiagramError, InputError
+
+
+def test_scalars_spread_over_anything() -> None:
+    assert broadcast({"a": (), "b": (3,)}) == (3,)
+    assert broadcast({"a": (2, 2), "b": (), "c": (1,)}) == (2, 2)
+    assert broadcast({"a": (), "b": (1,)}) == (1,)
+    assert broadcast({}) == ()
+    with pytest.raises(InputError, match=r"'a' has shape \(3,\) and 'c' has shape \(2,\)"):
+        broadcast({"a": (3,), "b": (), "c": (2,)})
+
+
+def test_an_integrator_in_a_loop_becomes_as_wide_as_the_loop() -> None:
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator())
+    spring = builder.add("spring", Gain(gain=-2.0), x)
+    push = builder.add("push", Constant(value=[1.0, 2.0, 3.0]))
+    builder.connect(builder.add("sum", Sum(), spring, push), x)
+    shapes = infer_shapes(builder.build())
+    assert {name: list(ports.values()) for name, ports in shapes.outputs.items()} == {
+        "x": [(3,)],
+        "spring": [(3,)],
+        "push": [(3,)],
+        "sum": [(3,)],
+    }
+
+
+def test_a_matrix_in_a_loop_tells_the_width() -> None:
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator(initial=0.0))
+    builder.connect(builder.add("A", MatrixGain(gain=[[0.0, 1.0], [-1.0, 0.0]]), x), x)
+    assert infer_shapes(builder.build()).inputs["A"] == {"u": (2,)}
+
+
+def test_one_element_fits_a_scalar_port_and_the_other_way_round() -> None:
+    builder = DiagramBuilder("d")
+    one = builder.add("one", Constant(value=[1.0]))
+    builder.add("filter", TransferFunction(), one)
+    builder.add("matrix", MatrixGain(gain=[[2.0]]), builder.add("plain", Constant()))
+    assert infer_shapes(builder.build()).outputs["matrix"] == {"y": (1,)}
+
+
+def test_both_ends_of_a_mismatch_are_shown() -> None:
+    builder = DiagramBuilder("d")
+    builder.add("xyz", T2xyz(), builder.add("pose", Constant(value=[1.0, 2.0])))
+    with pytest.raises(
+        DiagramError, match=r"diagram 'd': 'pose/y' gives shape \(2,\) but 'xyz/T' takes shape \(4, 4\)"
+    ):
+        builder.build()
+
+
+def test_inputs_that_do_not_fit_each_other_name_what_feeds_them() -> None:
+    builder = DiagramBuilder("d")
+    two, three = builder.add("two", Constant(value=[1, 2])), builder.add("three", SineWave(bias=[1, 2, 3]))
+    builder.add("sum", Sum(), two, three)
+    with pytest.raises(
+        DiagramError,
+        match=r"block 'sum' \(Sum\), fed at 'u1' by 'two/y', 'u2' by 'three/y': "
+        r"'u1' has shape \(2,\) and 'u2' has shape \(3,\)",
+    ):
+        builder.build()
+
+
+def test_routing_refuses_what_it_cannot_route() -> None:
+    builder = DiagramBuilder("d")
+    builder.add("mux", Mux(), *[builder.add(name, Constant(value=[[1.0]])) for name in "ab"])
+    with pytest.raises(DiagramError, match=r"'u1' has shape \(1, 1\). Allowed: scalars and vectors"):
+        builder.build()
+    builder = DiagramBuilder("d")
+    builder.add("demux", Demux(parts=2), builder.add("c", Constant(value=[1, 2, 3])))
+    with pytest.raises(DiagramError, match=r"a vector whose length 2 divides"):
+        builder.build()
+
+
+def test_matrices_that_cannot_be_multiplied_are_refused() -> None:
+    builder = DiagramBuilder("d")
+    a, b = builder.add("a", Constant(value=[[1.0, 2.0]])), builder.add("b", Constant(value=[1.0, 2.0, 3.0]))
+    builder.add("product", MatrixProduct(), a, b)
+    with pytest.raises(DiagramError, match=r"'A' has shape \(1, 2\) and 'B' has shape \(3,\)"):
+        builder.build()
+
+
+def test_a_loop_that_widens_itself_without_end_is_refused() -> None:
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator())
+    builder.connect(builder.add("mux", Mux(), x, builder.add("one", Constant())), x)
+    with pytest.raises(DiagramError, match=r"does not settle: it was \(\d+,\) and becomes \(\d+,\)"):
+        builder.build()
