@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from armblocks.errors import InputError
 
 Row = tuple[float, ...]
@@ -103,30 +100,20 @@ class ButcherTableau:
         return len(self.dense)
 
     @cached_property
-    def dense_array(self) -> NDArray[np.float64]:
-        """``dense`` as an array of shape ``(rows, degree)``."""
-        return np.array(self.dense)
-
-    @cached_property
     def real_stability(self) -> float:
         """Length of the interval of absolute stability on the negative real axis.
 
         A linear decay of rate ``lambda`` stays bounded while ``h lambda`` is below it. From the stability
         function ``R(z) = 1 + z b (I - z A)^-1 1`` (Hairer, Wanner II, IV.2, proposition 2.1), in hundredths.
         """
-        s = self.stages
-        A = np.zeros((s, s))
-        for i, row in enumerate(self.matrix):
-            A[i, :i] = row
-        b: NDArray[np.float64] = np.array(self.weights)
-        ones = np.ones(s)
-        grid = np.arange(1, 2000) * 0.01
-        for z in grid:
-            solution: NDArray[np.float64] = np.linalg.solve(np.eye(s) + z * A, ones)
-            stability = 1.0 - z * float(np.dot(b, solution))
-            if abs(stability) > 1.0 + 1e-9:
-                return float(z)
-        return float(grid[-1])
+        for hundredths in range(1, 2000):
+            z = hundredths / 100
+            stages: list[float] = []
+            for row in self.matrix:
+                stages.append(1.0 - z * sum(a * y for a, y in zip(row, stages)))
+            if abs(1.0 - z * sum(b * y for b, y in zip(self.weights, stages))) > 1.0 + 1e-9:
+                return z
+        return 20.0
 
     @property
     def content(self) -> str:

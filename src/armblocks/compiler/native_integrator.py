@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
-from armblocks.compiler.runge_kutta import REVISION, Count, Real, Status, emit_integrator, workspace_size
+from armblocks.compiler.runge_kutta import Count, Real, Status, emit_integrator, workspace_size
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
@@ -25,18 +26,19 @@ _ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 7, ctypes.c_int
 class NativeIntegrator:
     """``x' = f(t, x, p)`` of one tape, stepped by one method in machine code."""
 
-    def __init__(self, tape: Tape, tableau: ButcherTableau) -> None:
+    def __init__(self, states: int, digest: str, tape: Callable[[], Tape], tableau: ButcherTableau) -> None:
+        """``digest`` is that of the derivative's tape, which ``tape()`` gives if the disk cache lacks it."""
         self.tableau = tableau
-        self.states = tape.output_sizes[0]
+        self.states = states
 
         def write() -> str:
             module = Module()
-            emit_function(module, tape, "derivative")
+            emit_function(module, tape(), "derivative")
             emit_integrator(module, tableau, self.states, "advance", "derivative")
             return module.text
 
         # The code object must outlive every call into it.
-        self._code = load_code(("runge_kutta", str(REVISION), tableau.content, tape.digest), write)
+        self._code = load_code(("runge_kutta", tableau.content, digest), write)
         self._advance = _ADVANCE(self._code.address("advance"))
 
     def begin(

@@ -19,9 +19,6 @@ from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.ir_text import number_text as literal
 
-REVISION = 1
-"""Part of every cache key: raise it whenever the emitted loop changes."""
-
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
 
@@ -173,26 +170,23 @@ class _Loop:
     def inverse_root(self, a: str, k: int) -> str:
         """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, to a few units in the last place.
 
-        A first guess by dividing the exponent bits, then twice ``y (1 - r)^(-1/k)`` with ``r = 1 - a y^k``,
-        as its Taylor polynomial of degree 6. All operations are exactly rounded: no library's ``pow`` decides
-        a step.
+        A first guess from the divided bits, its excess centred by 0.064, then twice ``y (1 - r)^(-1/k)`` with
+        ``r = 1 - a y^k`` (below 0.25, then 1e-3), as its Taylor polynomial of degree 4. All operations are
+        exactly rounded: no library's ``pow`` decides a step.
         """
         w = self.w
         one = 1023 << 52
-        bits = w.bits(a)
-        y = w.from_bits(w.word_op("sub", str(one + one // k), w.word_op("udiv", bits, str(k))))
+        offset = one + one // k - int(0.064 * (1 << 52))
+        y = w.from_bits(w.word_op("sub", str(offset), w.word_op("udiv", w.bits(a), str(k))))
         coefficients = [1.0]
-        for m in range(6):
+        for m in range(4):
             coefficients.append(coefficients[-1] * (1 / k + m) / (m + 1))
         for _ in range(2):
             power = y
             for _ in range(k - 1):
                 power = w.multiply(power, y)
             r = w.subtract(literal(1.0), w.multiply(a, power))
-            series = literal(coefficients[-1])
-            for c in reversed(coefficients[:-1]):
-                series = w.fma(series, r, literal(c))
-            y = w.multiply(y, series)
+            y = w.multiply(y, w.polynomial(r, coefficients))
         return y
 
     def scale(self, magnitude: str) -> str:
@@ -481,10 +475,7 @@ class _Loop:
             for row, powers in enumerate(tableau.dense):
                 if not any(powers):
                     continue
-                value = literal(powers[-1])
-                for c in reversed(powers[:-1]):
-                    value = w.fma(value, theta, literal(c))
-                values.append((row, w.multiply(value, theta)))
+                values.append((row, w.multiply(w.polynomial(theta, powers), theta)))
 
             def body(index: str) -> None:
                 total = literal(0.0)

@@ -3,30 +3,73 @@
 from __future__ import annotations
 
 import ctypes
+import json
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.compiler import cache
 from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
 from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.native_integrator import NativeIntegrator
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
-from armblocks.equations import HybridSystem, Signature
+from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction
+from armblocks.errors import CompileError
 
 Vector = NDArray[np.float64]
 
+_FUNCTIONS = ("derivative", "signals", "initial_states", "breakpoints")
 _SIGNALS_LAYOUT = BatchLayout(inputs=(Layout.COLUMNS, Layout.ROWS, Layout.SHARED), outputs=(Layout.COLUMNS,))
 
 
 def compile_system(system: HybridSystem) -> CompiledSystem:
-    """The system, ready to be run. Machine code is made, or found in the disk cache, when first needed."""
-    return CompiledSystem(system)
+    """The system, ready to be run. Machine code is made, or found in the disk cache, when first needed.
+
+    Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that tapes do not know.
+    """
+    tapes = {name: _tape_of(getattr(system, name)) for name in _FUNCTIONS}
+    return CompiledSystem(_describe(system, tapes), tapes.__getitem__)
+
+
+def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem:
+    """The system that ``key`` identifies, from the disk cache where an earlier process compiled it.
+
+    ``key`` must say everything that the equations depend on, parameters' values included; the sources of this
+    package are added to it. ``trace()`` is only called when the cache does not know the key: otherwise there
+    is no tracing, no CasADi and no LLVM optimiser. Raises what ``trace`` and :func:`compile_system` raise.
+    """
+    name = cache.record_name(f"system {key}")
+    stored = cache.load(name)
+    if stored is not None:
+        try:
+            description = json.loads(stored)
+
+            def tape(function: str) -> Tape:
+                found = cache.load(_tape_name(description["digests"][function]))
+                if found is not None:
+                    try:
+                        return Tape.from_bytes(found)
+                    except CompileError:
+                        pass  # a damaged tape is made anew
+                return _tape_of(getattr(trace(), function))
+
+            return CompiledSystem(description, tape)
+        except (ValueError, KeyError, TypeError):
+            pass  # a record of another make is made anew
+    system = trace()
+    tapes = {function: _tape_of(getattr(system, function)) for function in _FUNCTIONS}
+    description = _describe(system, tapes)
+    for tape_made in tapes.values():
+        cache.store(_tape_name(tape_made.digest), tape_made.to_bytes())
+    cache.store(name, json.dumps(description).encode())
+    return CompiledSystem(description, tapes.__getitem__)
 
 
 class CompiledSystem:
@@ -36,74 +79,74 @@ class CompiledSystem:
     ``y (ny,)``; time in seconds. Arrays that are given are float64 and C-contiguous, and nothing is checked.
     """
 
-    def __init__(self, system: HybridSystem) -> None:
-        self.name = system.name
-        self.states: Signature = system.states
-        self.parameters: Signature = system.parameters
-        self.signals_layout: Signature = system.signals_layout
-        self.parameter_values: Vector = np.array(system.parameter_values, dtype=np.float64)
+    def __init__(self, description: Mapping[str, Any], tape: Callable[[str], Tape]) -> None:
+        self.name = str(description["name"])
+        self.states = _signature(description["states"])
+        self.parameters = _signature(description["parameters"])
+        self.signals_layout = _signature(description["signals"])
+        self.parameter_values: Vector = np.array(description["parameter_values"], dtype=np.float64)
         self.parameter_values.flags.writeable = False
-        self.aliases = system.aliases
-        self._system = system
+        self.aliases: Mapping[str, str] = dict(description["aliases"])
+        self._breakpoint_count = int(description["breakpoints"])
+        self._digests: Mapping[str, str] = {name: description["digests"][name] for name in _FUNCTIONS}
+        self._make_tape = tape
         self._integrators: dict[int, NativeIntegrator] = {}
 
-    @cached_property
-    def derivative_tape(self) -> Tape:
-        """The derivative as a flat program."""
-        return tape_from(self._system.derivative)
-
-    @cached_property
-    def signals_tape(self) -> Tape:
-        """The signals as a flat program."""
-        return tape_from(self._system.signals)
+    def tape(self, function: str) -> Tape:
+        """``derivative``, ``signals``, ``initial_states`` or ``breakpoints`` as a flat program."""
+        return self._make_tape(function)
 
     @cached_property
     def _code(self) -> NativeCode:
-        tapes = {
-            "derivative": self.derivative_tape,
-            "initial_states": tape_from(self._system.initial_states),
-            "breakpoints": tape_from(self._system.breakpoints),
-        }
-
         def write() -> str:
             module = Module()
-            for name, tape in tapes.items():
-                emit_function(module, tape, name, linkage="")
-            emit_batch(module, self.signals_tape, _SIGNALS_LAYOUT, host_target().lanes, "signals")
+            for name in ("derivative", "initial_states", "breakpoints"):
+                emit_function(module, self.tape(name), name, linkage="")
+            emit_batch(module, self.tape("signals"), _SIGNALS_LAYOUT, host_target().lanes, "signals")
             return module.text
 
-        digests = (tape.digest for tape in (*tapes.values(), self.signals_tape))
-        return load_code(("system", *digests), write)
+        return load_code(("system", *self._digests.values()), write)
 
-    def _entry(self, name: str, integers: int, pointers: int) -> ctypes._CFunctionType:  # pyright: ignore
+    def _entry(self, name: str, integers: int, pointers: int) -> Callable[..., None]:
         kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * integers, *[ctypes.c_void_p] * pointers)
         return kind(self._code.address(name))
 
     @cached_property
-    def _derivative(self) -> ctypes._CFunctionType:  # pyright: ignore
+    def _derivative(self) -> Callable[..., None]:
         return self._entry("derivative", 0, 4)
 
     @cached_property
-    def _signals(self) -> ctypes._CFunctionType:  # pyright: ignore
+    def _initial_states(self) -> Callable[..., None]:
+        return self._entry("initial_states", 0, 2)
+
+    @cached_property
+    def _breakpoints(self) -> Callable[..., None]:
+        return self._entry("breakpoints", 0, 2)
+
+    @cached_property
+    def _signals(self) -> Callable[..., None]:
         return self._entry("signals", 3, 4)
 
     def initial_states(self, p: Vector) -> Vector:
         """``x(0)``, ``(nx,)``, for parameters ``p`` ``(np,)``."""
         x = np.empty(self.states.size)
-        self._entry("initial_states", 0, 2)(p.ctypes.data, x.ctypes.data)
+        if x.size:
+            self._initial_states(p.ctypes.data, x.ctypes.data)
         return x
 
     def breakpoints(self, p: Vector) -> Vector:
         """Known instants at which signals jump, ``(nb,)`` s, in no order."""
-        times = np.empty(self._system.breakpoints.outputs.size)
+        times = np.empty(self._breakpoint_count)
         if times.size:
-            self._entry("breakpoints", 0, 2)(p.ctypes.data, times.ctypes.data)
+            self._breakpoints(p.ctypes.data, times.ctypes.data)
         return times
 
     def derivative(self, t: float, x: Vector, p: Vector) -> Vector:
         """``x'``, ``(nx,)``, at one instant."""
         slope = np.empty(self.states.size)
-        self._derivative(ctypes.byref(ctypes.c_double(t)), x.ctypes.data, p.ctypes.data, slope.ctypes.data)
+        if slope.size:
+            time = np.array([t], dtype=np.float64)
+            self._derivative(time.ctypes.data, x.ctypes.data, p.ctypes.data, slope.ctypes.data)
         return slope
 
     def evaluate_signals(self, t: Vector, x: Vector, p: Vector) -> Vector:
@@ -118,5 +161,40 @@ class CompiledSystem:
         found = self._integrators.get(id(tableau))
         if found is None:
             # The integrator keeps its tableau alive, so the identity stays its own.
-            found = self._integrators[id(tableau)] = NativeIntegrator(self.derivative_tape, tableau)
+            found = NativeIntegrator(
+                self.states.size, self._digests["derivative"], lambda: self.tape("derivative"), tableau
+            )
+            self._integrators[id(tableau)] = found
         return found
+
+
+def _tape_of(traced: TracedFunction) -> Tape:
+    from armblocks.compiler.from_casadi import tape_from
+
+    return tape_from(traced)
+
+
+def _tape_name(digest: str) -> str:
+    return cache.object_name(("tape", digest))
+
+
+def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]:
+    """All of a system but its equations, as plain values that JSON gives back exactly."""
+
+    def slots(signature: Signature) -> list[list[Any]]:
+        return [[slot.name, list(slot.shape), slot.unit] for slot in signature]
+
+    return {
+        "name": system.name,
+        "states": slots(system.states),
+        "parameters": slots(system.parameters),
+        "signals": slots(system.signals_layout),
+        "parameter_values": np.asarray(system.parameter_values, dtype=np.float64).tolist(),
+        "aliases": dict(system.aliases),
+        "breakpoints": system.breakpoints.outputs.size,
+        "digests": {name: tape.digest for name, tape in tapes.items()},
+    }
+
+
+def _signature(slots: Sequence[Sequence[Any]]) -> Signature:
+    return Signature(tuple(Slot(name, tuple(shape), unit) for name, shape, unit in slots))

@@ -1,0 +1,206 @@
+"""The native integrator loop, below the level of systems: numbers in, numbers out."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from fractions import Fraction
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from armblocks.compiler.butcher_tableau import ButcherTableau, hermite_dense
+from armblocks.compiler.from_casadi import tape_from
+from armblocks.compiler.ir_routine import Routine
+from armblocks.compiler.ir_text import Module
+from armblocks.compiler.native import load_code
+from armblocks.compiler.native_integrator import NativeIntegrator
+from armblocks.compiler.runge_kutta import Status, _Loop
+from armblocks.equations import TracedFunction, signature
+from armblocks.errors import InputError
+
+RK4 = ButcherTableau(
+    name="rk4",
+    title="",
+    source="",
+    order=4,
+    dense_order=4,
+    nodes=(0.0, 0.5, 0.5, 1.0),
+    matrix=((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
+    weights=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
+    dense=hermite_dense((1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+)
+PAIR = ButcherTableau(
+    name="rk23",
+    title="",
+    source="",
+    order=3,
+    dense_order=3,
+    nodes=(0.0, 1 / 2, 3 / 4),
+    matrix=((), (1 / 2,), (0.0, 3 / 4)),
+    weights=(2 / 9, 1 / 3, 4 / 9),
+    error=(5 / 72, -1 / 12, -1 / 9, 1 / 8),
+    error_order=2,
+    dense=hermite_dense((2 / 9, 1 / 3, 4 / 9)),
+)
+
+
+def integrator(
+    equations, states: int, tableau: ButcherTableau = PAIR, parameters: int = 0
+) -> NativeIntegrator:
+    traced = TracedFunction.trace(
+        "f",
+        signature(("t", ()), ("x", (states,)), ("p", (parameters,))),
+        signature(("xd", (states,))),
+        equations,
+    )
+    tape = tape_from(traced)
+    return NativeIntegrator(states, tape.digest, lambda: tape, tableau)
+
+
+NONE = np.empty(0)
+
+
+@pytest.mark.parametrize("k", [2, 3, 5, 8])
+def test_inverse_root_is_right_to_the_last_place_over_all_magnitudes(k: int) -> None:
+    module = Module()
+
+    def write() -> str:
+        loop = _Loop(module, PAIR, 1, "unused")
+        w = Routine(module)
+        loop.w = w
+        w.do(f"ret double {loop.inverse_root('%a', k)}")
+        return w.text("define double @root(double %a)")
+
+    module.define("root", write)
+    code = load_code(("inverse root test", str(k)), lambda: module.text)
+    root = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(code.address("root"))
+    numbers = np.concatenate([np.logspace(-300, 300, 601), np.random.default_rng(1).uniform(0.5, 20.0, 400)])
+    # In exact arithmetic, so that only the root itself is judged: one unit in its last place, k times.
+    worst = max(abs(Fraction(a) * Fraction(root(a)) ** k - 1) for a in numbers.tolist())
+    assert worst < 1.5 * k * 2.0**-52
+
+
+def test_loops_and_written_out_states_give_the_same_bits() -> None:
+    """Twelve independent copies of an equation go through IR loops, one copy does not."""
+    alone = integrator(lambda t, x, p: -x * ca.sin(3 * t), 1)
+    many = integrator(lambda t, x, p: -x * ca.sin(3 * t), 12)
+    samples = np.linspace(0, 5, 101)
+    results = []
+    for native in (alone, many):
+        run = native.begin(np.ones(native.states), NONE, samples, NONE)
+        assert run.advance(10**9) is Status.DONE
+        results.append(run)
+    # The error norm of twelve equal parts rounds otherwise than that of one: steps differ in the last place.
+    assert results[0].accepted == results[1].accepted
+    np.testing.assert_allclose(results[1].states, np.repeat(results[0].states, 12, axis=1), rtol=1e-13)
+
+
+@pytest.mark.parametrize("tableau", [PAIR, RK4])
+def test_chunks_of_steps_do_not_change_a_bit(tableau: ButcherTableau) -> None:
+    native = integrator(lambda t, x, p: ca.vertcat(x[1], (1 - x[0] ** 2) * x[1] - x[0]), 2, tableau)
+    samples = np.linspace(0, 10, 51)
+    outcomes = []
+    for chunk in (1, 7, 10**9):
+        run = native.begin(np.array([2.0, 0.0]), NONE, samples, np.array([2.5, 7.1]), step=0.03)
+        while run.advance(chunk) is Status.PAUSED:
+            pass
+        outcomes.append((run.states.tobytes(), run.counts.tobytes(), run.reals[:6].tobytes()))
+    assert outcomes[0] == outcomes[1] == outcomes[2]
+
+
+def test_the_same_run_twice_gives_the_same_bits() -> None:
+    native = integrator(lambda t, x, p: ca.vertcat(x[1], -ca.sin(x[0])), 2)
+    runs = [native.begin(np.array([1.0, 0.0]), NONE, np.linspace(0, 9, 33), NONE) for _ in range(2)]
+    for run in runs:
+        run.advance(10**9)
+    assert runs[0].states.tobytes() == runs[1].states.tobytes()
+
+
+def test_steps_end_on_breakpoints_and_see_the_old_value_before_them() -> None:
+    """x' jumps from 1 to -3 at 0.7: every method is exact on both pieces, if none of its stages peeks."""
+    for tableau in (PAIR, RK4):
+        native = integrator(lambda t, x, p: ca.if_else(t < p, SX(1), SX(-3)), 1, tableau, parameters=1)
+        samples = np.array([0.0, 0.35, 0.7, 1.0, 2.0])
+        run = native.begin(np.zeros(1), np.array([0.7]), samples, np.array([0.7]), step=0.1)
+        assert run.advance(10**9) is Status.DONE
+        np.testing.assert_allclose(run.states[:, 0], [0, 0.35, 0.7, -0.2, -3.2], rtol=0, atol=2e-15)
+        assert run.rejected == 0
+
+
+def test_breakpoints_in_any_order_twice_or_outside_are_fine() -> None:
+    native = integrator(lambda t, x, p: ca.if_else(t < 1, SX(1), SX(-3)), 1)
+    for points in ([1.0], [5.0, 1.0, -2.0, 1.0, 0.0, 2.0]):
+        run = native.begin(np.zeros(1), NONE, np.array([0.0, 2.0]), np.array(points))
+        assert run.advance(10**9) is Status.DONE
+        assert run.states[1, 0] == pytest.approx(-2.0, abs=1e-14)
+
+
+def test_a_fixed_step_keeps_its_grid_after_a_breakpoint() -> None:
+    """Grid 0, 0.1, …, 1 with a breakpoint at 0.25 is eleven steps, and the grid instants stay k h."""
+    native = integrator(lambda t, x, p: SX(1) + 0 * x, 1, RK4)
+    run = native.begin(np.zeros(1), NONE, np.arange(11) * 0.1, np.array([0.25]), step=0.1)
+    assert run.advance(10**9) is Status.DONE
+    assert run.accepted == 11
+    np.testing.assert_allclose(run.states[:, 0], np.arange(11) * 0.1, atol=1e-15)
+
+
+def test_no_sliver_step_is_taken_where_the_grid_misses_the_end_by_rounding() -> None:
+    native = integrator(lambda t, x, p: SX(1) + 0 * x, 1, RK4)
+    run = native.begin(np.zeros(1), NONE, np.array([0.0, 3 * 0.7]), NONE, step=0.1)  # 21 * 0.1 < 3 * 0.7
+    assert run.advance(10**9) is Status.DONE
+    assert run.accepted == 21
+    assert run.time == 3 * 0.7
+
+
+def test_a_run_of_no_length_records_its_start() -> None:
+    run = integrator(lambda t, x, p: -x, 1).begin(np.ones(1), NONE, np.zeros(1), NONE)
+    assert run.advance(100) is Status.DONE
+    assert run.states.tolist() == [[1.0]]
+
+
+def test_failures_are_told_apart() -> None:
+    samples = np.array([0.0, 2.0])
+    grows = integrator(lambda t, x, p: x * x, 1)
+    run = grows.begin(np.ones(1), NONE, samples, NONE)
+    assert run.advance(10**9) is Status.STEP_TOO_SMALL
+    assert run.time == pytest.approx(1.0, abs=1e-3)
+    assert run.recorded == 1
+    assert run.weighted_errors()[0] >= 1.0
+    root = integrator(lambda t, x, p: ca.sqrt(1 - t) + 0 * x, 1)
+    run = root.begin(np.ones(1), NONE, samples, NONE)
+    assert run.advance(10**9) is Status.NON_FINITE
+    assert run.first_non_finite_stage()[0] == pytest.approx(1.0, abs=1e-12)
+    run = integrator(lambda t, x, p: 1 / x, 1).begin(np.zeros(1), NONE, samples, NONE)
+    assert run.advance(10**9) is Status.NON_FINITE_START
+    fixed = integrator(lambda t, x, p: ca.sqrt(1 - t) + 0 * x, 1, RK4)
+    run = fixed.begin(np.ones(1), NONE, samples, NONE, step=0.3)
+    assert run.advance(10**9) is Status.NON_FINITE
+    assert run.time == pytest.approx(0.9)
+    assert run.first_non_finite_stage()[0] == pytest.approx(1.05)
+
+
+def test_a_state_that_overflows_is_not_taken_for_exact() -> None:
+    """x' = 1e308: beyond the largest double, error over scale would be 0 / inf."""
+    native = integrator(lambda t, x, p: SX(1e308) + 0 * x, 1)
+    run = native.begin(np.zeros(1), NONE, np.array([0.0, 10.0]), NONE)
+    assert run.advance(10**9) in (Status.NON_FINITE, Status.STEP_TOO_SMALL)
+    assert math.isfinite(run.state[0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"weights": (1.0,)}, "'weights' does not fit the 3 stages"),
+        ({"weights": (2 / 9, 1 / 3, 4 / 8)}, "weights adds up to"),
+        ({"matrix": ((), (0.4,), (0.0, 0.75))}, "matrix row 1 adds up to 0.4"),
+        ({"error": (0.1, 0.0, 0.0, 0.0)}, "error adds up to 0.1"),
+    ],
+)
+def test_a_table_with_a_misprint_is_refused(changes: dict[str, object], message: str) -> None:
+    fields = {name: getattr(PAIR, name) for name in PAIR.__dataclass_fields__} | changes
+    with pytest.raises(InputError, match=message) as raised:
+        ButcherTableau(**fields)
+    assert "integrator rk23" in str(raised.value)

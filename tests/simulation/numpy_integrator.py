@@ -1,0 +1,123 @@
+"""An explicit Runge-Kutta integrator in plain Python and NumPy: the second opinion on the native one.
+
+Written from the description in Hairer, Norsett, Wanner I, II.4 to II.6, sharing nothing with the code under
+test but the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from armblocks.compiler.butcher_tableau import ButcherTableau
+
+Field = Callable[[float, np.ndarray], np.ndarray]
+
+
+class Counts:
+    """Accepted and rejected steps, evaluations."""
+
+    def __init__(self) -> None:
+        self.accepted = self.rejected = self.evaluations = 0
+
+
+def rms(v: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(v * v)))
+
+
+def first_step(
+    f: Field, t: float, x: np.ndarray, k0: np.ndarray, end: float, order: int, rtol: float, atol: float
+) -> float:
+    scale = atol + np.abs(x) * rtol
+    d0, d1 = rms(x / scale), rms(k0 / scale)
+    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h0 = min(h0, end - t)
+    d2 = rms((f(t + h0, x + h0 * k0) - k0) / scale) / h0
+    steepest = max(d1, d2)
+    h1 = max(1e-6, h0 * 1e-3) if steepest <= 1e-15 else (0.01 / steepest) ** (1 / (order + 1))
+    return min(100 * h0, h1, end - t)
+
+
+def error_norm(tableau: ButcherTableau, K: np.ndarray, h: float, scale: np.ndarray) -> float:
+    e = np.array(tableau.error) @ K[: tableau.stages + 1]
+    if tableau.stretched_error is None:
+        return rms(h * e / scale)
+    e5 = np.sum((e / scale) ** 2)
+    e3 = np.sum((np.array(tableau.stretched_error) @ K[: tableau.stages + 1] / scale) ** 2)
+    return 0.0 if e5 == e3 == 0 else float(h * e5 / np.sqrt((e5 + 0.01 * e3) * scale.size))
+
+
+def integrate(
+    f: Field,
+    tableau: ButcherTableau,
+    x0: Sequence[float],
+    samples: np.ndarray,
+    breakpoints: Sequence[float] = (),
+    *,
+    step: float = 0.0,
+    rtol: float = 1e-6,
+    atol: float = 1e-9,
+) -> tuple[np.ndarray, Counts]:
+    """States at the samples ``(N, n)`` and what it took."""
+    counts = Counts()
+    t, x, stop = float(samples[0]), np.array(x0, dtype=float), float(samples[-1])
+    rows: list[np.ndarray] = [x.copy()]
+    ends = [b for b in sorted(set(breakpoints)) if t < b <= stop]
+    limits = [float(np.nextafter(b, -np.inf)) for b in ends]
+    if not ends or ends[-1] < stop:
+        ends, limits = [*ends, stop], [*limits, stop]
+    s = tableau.stages
+    for end, limit in zip(ends, limits):
+
+        def slope(time: float, state: np.ndarray, limit: float = limit) -> np.ndarray:
+            counts.evaluations += 1
+            return np.asarray(f(min(time, limit), state))
+
+        K = np.zeros((tableau.rows, x.size))
+        K[0] = slope(t, x)
+        h = step
+        if tableau.adaptive:
+            h = first_step(slope, t, x, K[0], end, tableau.error_order, rtol, atol)
+        while t < end:
+            rejected = False
+            while True:
+                t_new = t + h
+                if not tableau.adaptive:
+                    k = int(np.floor(t / step)) - 1
+                    while k * step <= t:
+                        k += 1
+                    t_new = k * step
+                    t_new = end if t_new + 1e-9 * step >= end else t_new
+                t_new = min(t_new, end)
+                h = t_new - t
+                for i in range(1, s):
+                    K[i] = slope(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ K[:i]))
+                x_new = x + h * (np.array(tableau.weights) @ K[:s])
+                K[s] = slope(t_new, x_new)
+                if not tableau.adaptive:
+                    break
+                norm = error_norm(tableau, K, h, atol + rtol * np.maximum(np.abs(x), np.abs(x_new)))
+                factor = 10.0 if norm == 0 else 0.9 * norm ** (-1 / (tableau.error_order + 1))
+                if norm < 1:
+                    h_next = h * min(1.0 if rejected else 10.0, factor)
+                    break
+                h *= max(0.2, factor)
+                rejected = True
+                counts.rejected += 1
+            counts.accepted += 1
+            inside = samples[(samples > t) & (samples <= t_new)]
+            if tableau.extra_nodes and np.any(inside < t_new):
+                for i, node in enumerate(tableau.extra_nodes):
+                    weights = np.array(tableau.extra_matrix[i])
+                    K[s + 1 + i] = slope(t + node * h, x + h * (weights @ K[: s + 1 + i]))
+            for instant in inside:
+                theta = (instant - t) / h
+                powers = theta ** np.arange(1, len(tableau.dense[0]) + 1)
+                value = x + h * ((np.array(tableau.dense) @ powers) @ K)
+                rows.append(x_new.copy() if instant == t_new else value)
+            t, x = t_new, x_new
+            K[0] = K[s]
+            if tableau.adaptive:
+                h = h_next
+    return np.array(rows), counts
