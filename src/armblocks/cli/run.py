@@ -41,7 +41,9 @@ def run(
     formats: Annotated[
         list[DataFormat] | None, typer.Option("--format", help="Also write the data so; may be repeated.")
     ] = None,
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the figures.")] = True,
+    figures: Annotated[
+        bool, typer.Option("--figures/--no-figures", help="Also write each figure as a file.")
+    ] = True,
     open_report: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
 ) -> None:
     """Simulate a diagram and write a report: figures, numbers, data."""
@@ -71,17 +73,20 @@ def run(
             if not isinstance(error.partial, ab.SimulationResult):
                 raise
             failure, result = error, error.partial
-    ab.write_report(folder, diagram, result)
-    for extra in formats or []:
-        path = folder / f"data.{extra.value}"
-        result.save(path)
+    files = ab.write_report(
+        folder,
+        diagram,
+        result,
+        formats=("svg", "png") if figures else (),
+        data=("csv", "parquet", *(extra.value for extra in formats or [])),
+    )
     console = results_console()
     print_run(result, console)
     print_displays(diagram, result, console)
     print_motions(diagram, result, console)
-    print_files(folder, console)
+    print_files(files, console)
     if open_report:
-        typer.launch(str(folder / "report.html"))
+        typer.launch(str(files.page))
     if failure is not None:
         raise failure
     if not result.run.complete:

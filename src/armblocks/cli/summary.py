@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from armblocks.report.motion import motions
 
 if TYPE_CHECKING:
     from armblocks import Diagram, SimulationResult
+    from armblocks.report.writing import ReportFiles
 
 BEYOND = "!"
 """Marks what is beyond a limit, for readers without colours."""
@@ -129,11 +129,11 @@ def _short(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
 
 
-def print_files(folder: Path, console: Console) -> None:
+def print_files(files: ReportFiles, console: Console) -> None:
     """Where the report is."""
-    report = folder / "report.html"
-    files = sum(1 for path in folder.rglob("*") if path.is_file())
+    names = [path.name for path in (*files.data, files.diagram)]
+    if files.figures:
+        names.append(f"{len(files.figures)} figures in {files.figures[0].parent.name}")
     console.print()
-    console.print(
-        Text.assemble(("report: ", STRONG), str(report), f"  ({files} files in the folder)"), soft_wrap=True
-    )
+    console.print(Text.assemble(("report: ", STRONG), str(files.page)), soft_wrap=True)
+    console.print(f"beside it: {', '.join(names)}", markup=False, soft_wrap=True)

@@ -1,0 +1,78 @@
+"""What the tests of the command line share: one way to call it in-process, one in a process of its own."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from armblocks.cli.main import app
+
+
+@pytest.fixture
+def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Call the command line in this process, from an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: str, columns: int = 80) -> Result:
+        return CliRunner().invoke(app, list(arguments), env={"COLUMNS": str(columns), "ARMBLOCKS_DEBUG": ""})
+
+    return call
+
+
+@pytest.fixture
+def refused(invoke: Callable[..., Result]) -> Callable[..., str]:
+    """Call the command line with something that it must refuse: its message, after the common checks."""
+
+    def call(*arguments: str) -> str:
+        result = invoke(*arguments)
+        assert result.exit_code == 2, result.output
+        assert "Traceback" not in result.output
+        assert "error" in result.stderr.lower()
+        return " ".join(result.stderr.split())
+
+    return call
+
+
+@pytest.fixture
+def spawn(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Call the command line in a process of its own, from an empty folder, as a terminal would."""
+
+    def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "armblocks", *arguments],
+            cwd=tmp_path,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            env={**os.environ, "COLUMNS": "80", "PYTHONIOENCODING": "utf-8"},
+            timeout=120,
+        )
+
+    return call
+
+
+@pytest.fixture
+def write_diagram(tmp_path: Path) -> Callable[..., str]:
+    """Write a diagram file by hand: ``{"name": ("Type", {parameters})}`` and wires; gives its path."""
+
+    def write(
+        blocks: Mapping[str, tuple[str, Mapping[str, object]]], *connections: str, **settings: object
+    ) -> str:
+        document = {
+            "format": 1,
+            "name": "handmade",
+            "blocks": {name: {"type": kind, "parameters": values} for name, (kind, values) in blocks.items()},
+            "connections": sorted(connections),
+            "settings": settings,
+        }
+        path = tmp_path / "handmade.json"
+        path.write_text(json.dumps(document), encoding="utf-8")
+        return str(path)
+
+    return write

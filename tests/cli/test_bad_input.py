@@ -1,0 +1,244 @@
+"""Bad input through the command line: a message with what, where, allowed and fix; exit code 2."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import Result
+
+Refused = Callable[..., str]
+Write = Callable[..., str]
+
+SCOPE = {"scope": ("Scope", {"inputs": 1})}
+
+
+def test_an_unknown_model_says_the_nearest(refused: Refused) -> None:
+    assert "did you mean 'kr180model'?" in refused("run", "kr180modle")
+
+
+def test_an_unknown_robot_says_the_nearest(refused: Refused) -> None:
+    text = refused("show", "puma650")
+    assert "there is no" in text
+    assert "did you mean 'puma560'?" in text
+
+
+def test_a_missing_file_is_named(refused: Refused) -> None:
+    assert "nowhere.json" in refused("run", "nowhere.json")
+
+
+def test_a_file_that_is_no_json_is_named(refused: Refused, tmp_path: Path) -> None:
+    (tmp_path / "broken.json").write_text("{", encoding="utf-8")
+    assert "broken.json" in refused("run", "broken.json")
+
+
+def test_an_unknown_command_is_refused(refused: Refused) -> None:
+    assert "No such command" in refused("simulate")
+
+
+def test_an_unknown_solver_says_the_nearest(refused: Refused, write_diagram: Write) -> None:
+    path = write_diagram({"i": ("Integrator", {}), "c": ("Constant", {"value": 1.0})}, "c/y -> i/u")
+    assert "did you mean 'rk45'?" in refused("run", path, "--solver", "rk54")
+
+
+@pytest.mark.parametrize("time", ["-1", "nan", "inf"])
+def test_a_stop_time_is_finite_and_not_negative(time: str, refused: Refused) -> None:
+    text = refused("run", "kr180model", f"--stop-time={time}")
+    assert "stop_time is" in text
+    assert "allowed" in text
+
+
+@pytest.mark.parametrize(
+    "option", ["--step=0", "--step=-1", "--step=nan", "--rtol=0", "--rtol=nan", "--atol=-1"]
+)
+def test_settings_of_the_solver_are_checked(option: str, refused: Refused, write_diagram: Write) -> None:
+    path = write_diagram({"i": ("Integrator", {}), "c": ("Constant", {"value": 1.0})}, "c/y -> i/u")
+    assert option[2:].split("=")[0] in refused("run", path, option)
+
+
+def test_a_stop_time_that_is_no_number_is_refused(refused: Refused) -> None:
+    assert "stop-time" in refused("run", "kr180model", "--stop-time", "ten")
+
+
+def test_an_assignment_has_a_form(refused: Refused) -> None:
+    assert "block.parameter=value" in refused("run", "kr180model", "--set", "tmax=5")
+
+
+def test_an_assignment_says_the_nearest_block(refused: Refused) -> None:
+    assert "did you mean 'jtraj'?" in refused("run", "kr180model", "--set", "jtrja.tmax=5")
+
+
+def test_an_assignment_says_the_nearest_parameter(refused: Refused) -> None:
+    assert "did you mean 'tmax'?" in refused("run", "kr180model", "--set", "jtraj.tmxa=5")
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-1", "0", "[1 2]", "text"])
+def test_an_assigned_value_is_checked(value: str, refused: Refused) -> None:
+    assert "tmax" in refused("run", "kr180model", "--set", f"jtraj.tmax={value}")
+
+
+def test_an_assigned_vector_has_the_right_length(refused: Refused) -> None:
+    assert "q0" in refused("run", "kr180model", "--set", "jtraj.q0=[1 2 3]")
+
+
+def test_code_is_no_value(refused: Refused) -> None:
+    assert "is no value" in refused("run", "kr180model", "--set", "jtraj.tmax=__import__('os')")
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_the_run(refused: Refused, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    text = refused("run", "kr180model", "--out", "file/inside")
+    assert "the folder cannot be written" in text
+    assert "--out" in text
+
+
+def test_two_drivers_of_an_input_are_refused(refused: Refused, write_diagram: Write) -> None:
+    blocks = {"a": ("Constant", {"value": 1.0}), "b": ("Constant", {"value": 2.0}), "i": ("Integrator", {})}
+    assert "two drivers" in refused("run", write_diagram(blocks, "a/y -> i/u", "b/y -> i/u"))
+
+
+def test_an_unconnected_input_is_refused(refused: Refused, write_diagram: Write) -> None:
+    text = refused("run", write_diagram({"i": ("Integrator", {})}))
+    assert "i/u" in text or "'i'" in text
+    assert "connect" in text
+
+
+def test_mismatched_widths_are_refused(refused: Refused, write_diagram: Write) -> None:
+    blocks = {
+        "a": ("Constant", {"value": [1.0, 2.0]}),
+        "b": ("Constant", {"value": [1.0, 2.0, 3.0]}),
+        "sum": ("Sum", {"signs": "++"}),
+        "end": ("Terminator", {}),
+    }
+    text = refused("run", write_diagram(blocks, "a/y -> sum/u1", "b/y -> sum/u2", "sum/y -> end/u"))
+    assert "sum" in text
+    assert "2" in text
+    assert "3" in text
+
+
+def test_an_algebraic_loop_is_printed(refused: Refused, write_diagram: Write) -> None:
+    blocks = {"first": ("Gain", {"gain": 2.0}), "second": ("Gain", {"gain": 3.0})}
+    text = refused("run", write_diagram(blocks, "first/y -> second/u", "second/y -> first/u"))
+    assert "algebraic loop" in text
+    assert "first" in text
+    assert "second" in text
+
+
+def test_an_unknown_block_type_says_the_nearest(refused: Refused, write_diagram: Write) -> None:
+    assert "did you mean 'Constant'?" in refused("run", write_diagram({"c": ("Constnat", {})}))
+
+
+def test_a_signal_that_is_not_finite_names_the_block_that_made_it(
+    refused: Refused, write_diagram: Write, tmp_path: Path
+) -> None:
+    # 1 / (t - 1) becomes infinite at t = 1; what follows it is not the culprit.
+    blocks = {
+        "clock": ("Clock", {}),
+        "one": ("Constant", {"value": 1.0}),
+        "shift": ("Sum", {"signs": "+-"}),
+        "quotient": ("Product", {"operators": "*/"}),
+        "after": ("Gain", {"gain": 2.0}),
+        "end": ("Terminator", {}),
+    }
+    wires = (
+        "clock/y -> shift/u1",
+        "one/y -> shift/u2",
+        "one/y -> quotient/u1",
+        "shift/y -> quotient/u2",
+        "quotient/y -> after/u",
+        "after/y -> end/u",
+    )
+    path = write_diagram(blocks, *wires, stop_time=2.0, sample_time=0.25)
+    text = refused("run", path, "--out", "kept", "--no-figures")
+    assert "quotient" in text
+    assert "1 s" in text or "t = 1" in text
+    # Nothing is lost: the instants before that are in the report.
+    assert (tmp_path / "kept" / "report.html").is_file()
+
+
+ROBOT_SCRIPT = """L{{1}} = link([0 1 0 0 0], 'standard');
+L{{1}}.m = {mass};
+L{{1}}.r = [0 0 0];
+L{{1}}.I = [1 1 1 0 0 0];
+L{{1}}.Jm = {motor};
+L{{1}}.G = {gear};
+one = robot(L, 'one');
+"""
+
+
+@pytest.mark.parametrize(
+    ("mass", "motor", "gear", "word"),
+    [("-1", "0", "1", "mass"), ("1", "0", "0", "gear"), ("1", "-1", "1", "inertia"), ("0/0", "0", "1", "")],
+)
+def test_a_robot_that_cannot_be_is_refused(
+    mass: str, motor: str, gear: str, word: str, refused: Refused, tmp_path: Path
+) -> None:
+    (tmp_path / "bad.m").write_text(ROBOT_SCRIPT.format(mass=mass, motor=motor, gear=gear), encoding="utf-8")
+    assert word in refused("show", "bad.m")
+
+
+def test_a_script_with_code_it_does_not_know_says_line_and_text(refused: Refused, tmp_path: Path) -> None:
+    (tmp_path / "odd.m").write_text("a = 1;\nsystem('rm -rf x');\n", encoding="utf-8")
+    text = refused("show", "odd.m")
+    assert "odd.m:2" in text
+    assert "system" in text
+
+
+def test_debugging_shows_the_traceback(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "armblocks", "show", "puma650"],
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "ARMBLOCKS_DEBUG": "1"},
+    )
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+    assert "UnknownNameError" in done.stderr
+
+
+def test_without_debugging_a_process_shows_no_traceback(
+    spawn: Callable[..., "subprocess.CompletedProcess[str]"],
+) -> None:
+    done = spawn("show", "puma650")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a signal cannot be sent to a child alone on Windows")
+def test_ctrl_c_keeps_what_was_computed_and_says_so(write_diagram: Write, tmp_path: Path) -> None:
+    # An oscillator for ten million steps: longer than the test waits.
+    blocks = {"v": ("Integrator", {}), "x": ("Integrator", {"initial": 1.0}), "k": ("Gain", {"gain": -1.0})}
+    path = write_diagram(
+        blocks, "k/y -> v/u", "v/y -> x/u", "x/y -> k/u", stop_time=1e6, step=1e-2, sample_time=100.0
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-m", "armblocks", "run", path, "--solver", "rk4", "--out", "kept", "--no-figures"],
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    time.sleep(2.5)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130, stderr
+    assert "Traceback" not in stderr
+    assert "incomplete: stopped by Ctrl-C" in " ".join(stdout.split())
+    assert (tmp_path / "kept" / "report.html").is_file()
+
+
+def test_nothing_is_left_of_the_probe_of_the_folder(
+    invoke: Callable[..., Result], tmp_path: Path, write_diagram: Write
+) -> None:
+    path = write_diagram({"c": ("Constant", {"value": 1.0}), **SCOPE}, "c/y -> scope/u")
+    assert invoke("run", path, "--out", "here", "--no-figures").exit_code == 0
+    assert not [path for path in (tmp_path / "here").iterdir() if path.name.startswith(".")]

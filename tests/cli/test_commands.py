@@ -1,0 +1,137 @@
+"""What each command says and leaves behind."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import Result
+
+import armblocks as ab
+
+Invoke = Callable[..., Result]
+Spawn = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def test_help_names_every_command(invoke: Invoke) -> None:
+    result = invoke("--help")
+    assert result.exit_code == 0
+    for command in ("run", "show", "list", "bench"):
+        assert command in result.stdout
+
+
+def test_without_a_command_the_help_is_shown(invoke: Invoke) -> None:
+    assert "Usage" in invoke().output
+
+
+def test_the_version_is_that_of_the_package(spawn: Spawn) -> None:
+    from importlib.metadata import version
+
+    done = spawn("--version")
+    assert (done.returncode, done.stdout.strip()) == (0, f"armblocks {version('armblocks')}")
+
+
+@pytest.mark.parametrize("robot", ab.list_robots())
+def test_show_prints_every_shipped_robot(robot: str, invoke: Invoke) -> None:
+    result = invoke("show", robot)
+    assert result.exit_code == 0
+    described = ab.load_robot(robot).robot
+    assert f"{described.n} axis, {described.joint_letters}" in result.stdout
+    assert "grav = " in result.stdout
+    assert max(len(line) for line in result.stdout.splitlines()) <= 80
+
+
+def test_show_prints_the_table_of_the_toolbox(invoke: Invoke) -> None:
+    text = invoke("show", "kr180").stdout
+    assert "KR180 (4 axis, RRRR, stdDH)" in text
+    assert " KUKA Robotics; params of 8/95;" in text
+    assert "| j |     theta |         d |         a |     alpha |    offset |" in text
+    assert "|  1|         q1|       0.75|       0.35|      1.571|          0|" in text
+
+
+def test_show_names_the_links_whose_inertia_no_body_has(invoke: Invoke) -> None:
+    result = invoke("show", "kr180")
+    warned = [line for line in result.stderr.splitlines() if line.startswith("warning:")]
+    names = [link.name for link in ab.load_robot("kr180").robot.links]
+    assert [name for name in names if any(f"'{name}'" in line for line in warned)] == [names[0], names[2]]
+
+
+@pytest.mark.parametrize("kind", ["robots", "blocks", "examples"])
+def test_list_names_all_of_a_kind(kind: str, invoke: Invoke) -> None:
+    names = {"robots": ab.list_robots, "blocks": ab.list_blocks, "examples": ab.list_examples}[kind]()
+    result = invoke("list", kind)
+    assert result.exit_code == 0
+    assert set(names) <= set(result.stdout.split())
+
+
+def test_bench_tells_a_time_for_every_method(invoke: Invoke) -> None:
+    result = invoke("bench", "--robot", "twolink", "--samples", "64", "--threads", "2")
+    assert result.exit_code == 0
+    for method in ("fkine", "jacob0", "inertia", "rne", "accel"):
+        row = next(line.split() for line in result.stdout.splitlines() if line.startswith(method))
+        assert all(float(cell.replace(",", "")) >= 0 for cell in row[1:])
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> tuple["subprocess.CompletedProcess[str]", Path]:
+    """The main job, as a person runs it: in a process of its own."""
+    import sys
+
+    folder = tmp_path_factory.mktemp("run")
+    done = subprocess.run(
+        [sys.executable, "-m", "armblocks", "run", "kr180model", "--format", "npz", "--format", "mat"],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=300,
+    )
+    return done, folder / "kr180model-report"
+
+
+def test_run_succeeds_and_says_where_the_report_is(
+    report: tuple["subprocess.CompletedProcess[str]", Path],
+) -> None:
+    done, folder = report
+    assert done.returncode == 0, done.stderr
+    assert "kr180model-report" in done.stdout
+    assert (folder / "report.html").is_file()
+
+
+def test_run_shows_the_tool_at_the_end(report: tuple["subprocess.CompletedProcess[str]", Path]) -> None:
+    # The paper's last position, to the digits that the screen has.
+    assert "-2.94927874" in report[0].stdout
+    assert "2.34792904" in report[0].stdout
+
+
+def test_run_writes_data_that_python_reads_back(
+    report: tuple["subprocess.CompletedProcess[str]", Path],
+) -> None:
+    saved = {path.suffix for path in report[1].iterdir()}
+    assert {".csv", ".parquet", ".npz", ".mat"} <= saved
+    (archive,) = report[1].glob("*.npz")
+    with np.load(archive, allow_pickle=False) as data:
+        assert data["time"][-1] == 10.0
+
+
+def test_a_changed_parameter_changes_the_run(invoke: Invoke, tmp_path: Path) -> None:
+    motion = next(
+        name for name, block in ab.load_diagram("kr180model").blocks.items() if block.type_name() == "JTraj"
+    )
+    result = invoke(
+        "run", "kr180model", "--no-figures", "--out", "short", "--stop-time", "2", "--set", f"{motion}.tmax=2"
+    )
+    assert result.exit_code == 0, result.output
+    assert "-2.94927874" in result.stdout
+    assert (tmp_path / "short" / "report.html").is_file()
+
+
+def test_what_is_beyond_a_limit_stands_out(invoke: Invoke) -> None:
+    motion = next(
+        name for name, block in ab.load_diagram("kr180model").blocks.items() if block.type_name() == "JTraj"
+    )
+    result = invoke("run", "kr180model", "--no-figures", "--set", f"{motion}.qf=[3.5 0 1.57 0]")
+    assert result.exit_code == 0
+    assert "! joint 'link1' leaves its range" in result.stdout
