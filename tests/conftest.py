@@ -1,256 +1,26 @@
-"""Robots for the law tests: the published ones written out here, and random trees of every joint type."""
+"""Fixtures that several folders of tests use."""
 
 from __future__ import annotations
 
-from math import pi
-
-import numpy as np
 import pytest
 
-from armblocks.robot import (
-    Fixed,
-    FrictionModel,
-    JointLimits,
-    Link,
-    Motor,
-    Prismatic,
-    Revolute,
-    Robot,
-    serial_chain,
-    standard_dh,
-)
-from armblocks.spatial import Transform, rotation_about
+from armblocks.robot import Robot
+from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
 
 
-def build_puma560() -> Robot:
-    """Corke's set of 8/95, as the toolbox ships it (d1 = 0.67183)."""
-    alpha = (pi / 2, 0, -pi / 2, pi / 2, -pi / 2, 0)
-    a = (0, 0.4318, 0.0203, 0, 0, 0)
-    d = (0.67183, 0, 0.15005, 0.4318, 0, 0)
-    mass = (0, 17.4, 4.8, 0.82, 0.34, 0.09)
-    centre = (
-        (0, 0, 0),
-        (-0.3638, 0.006, 0.2275),
-        (-0.0203, -0.0141, 0.070),
-        (0, 0.019, 0),
-        (0, 0, 0),
-        (0, 0, 0.032),
-    )
-    inertia = (
-        (0, 0.35, 0),
-        (0.13, 0.524, 0.539),
-        (0.066, 0.086, 0.0125),
-        (1.8e-3, 1.3e-3, 1.8e-3),
-        (0.3e-3, 0.4e-3, 0.3e-3),
-        (0.15e-3, 0.15e-3, 0.04e-3),
-    )
-    motors = _puma_motors()
-    low = np.radians((-160, -45, -225, -110, -100, -266))
-    high = np.radians((160, 225, 45, 170, 100, 266))
-    return Robot(
-        name="puma560",
-        manufacturer="Unimation",
-        comment="params of 8/95",
-        links=serial_chain(
-            [
-                standard_dh(
-                    f"link{i + 1}",
-                    alpha=alpha[i],
-                    a=a[i],
-                    d=d[i],
-                    mass=mass[i],
-                    centre_of_mass=centre[i],
-                    inertia=inertia[i],
-                    motor=motors[i],
-                    limits=JointLimits(position=(low[i], high[i])),
-                )
-                for i in range(6)
-            ]
-        ),
-    )
-
-
-def build_kr180() -> Robot:
-    """The paper's palletising arm, exactly as printed."""
-    alpha = (pi / 2, 0, pi / 2, 0)
-    a = (0.35, 0, 1.6, 0)
-    d = (0.75, 1.25, 0, 2.6)
-    mass = (0, 150, 100, 50)
-    centre = ((0, 0, 0.3), (-0.1, -0.1, 0), (0.1, 0.05, 0), (0, 0, 0.18))
-    inertia = ((0, 0.35, 0), (0.13, 0.524, 0.539), (0.066, 0.086, 0.0125), (1.8e-3, 1.3e-3, 1.8e-3))
-    motors = _puma_motors()
-    ranges = ((-185, 185), (-39, 90), (-71, 109), (-270, 270))
-    speeds = (105, 105, 95, 300)
-    return Robot(
-        name="KR180",
-        manufacturer="KUKA Robotics",
-        links=serial_chain(
-            [
-                standard_dh(
-                    f"link{i + 1}",
-                    alpha=alpha[i],
-                    a=a[i],
-                    d=d[i],
-                    mass=mass[i],
-                    centre_of_mass=centre[i],
-                    inertia=inertia[i],
-                    motor=motors[i],
-                    limits=JointLimits(
-                        position=(np.radians(ranges[i][0]), np.radians(ranges[i][1])),
-                        speed=np.radians(speeds[i]),
-                    ),
-                )
-                for i in range(4)
-            ]
-        ),
-    )
-
-
-def _puma_motors() -> tuple[Motor, ...]:
-    Jm = (200e-6, 200e-6, 200e-6, 33e-6, 33e-6, 33e-6)
-    G = (-62.6111, 107.815, -53.7063, 76.0364, 71.923, 76.686)
-    B = (1.48e-3, 0.817e-3, 1.38e-3, 71.2e-6, 82.6e-6, 36.7e-6)
-    Tc = (
-        (0.395, -0.435),
-        (0.126, -0.071),
-        (0.132, -0.105),
-        (11.2e-3, -16.9e-3),
-        (9.26e-3, -14.5e-3),
-        (3.96e-3, -10.5e-3),
-    )
-    return tuple(
-        Motor(inertia=Jm[i], gear_ratio=G[i], viscous_friction=B[i], coulomb_friction=Tc[i]) for i in range(6)
-    )
-
-
-def build_twolink() -> Robot:
-    """Two uniform rods of 1 m and 1 kg in the vertical plane, y up."""
-    return Robot(
-        name="twolink",
-        gravity=(0, -9.81, 0),
-        links=serial_chain(
-            [
-                standard_dh(
-                    f"link{i}", a=1.0, mass=1.0, centre_of_mass=(-0.5, 0, 0), inertia=(0, 1 / 12, 1 / 12)
-                )
-                for i in (1, 2)
-            ]
-        ),
-    )
-
-
-def build_planar3r() -> Robot:
-    """Three joints with parallel axes, in a horizontal plane."""
-    return Robot(
-        name="planar3r",
-        links=serial_chain(
-            [
-                standard_dh(
-                    f"link{i + 1}",
-                    a=length,
-                    mass=2.0 - 0.5 * i,
-                    centre_of_mass=(-length / 2, 0.01, 0),
-                    inertia=(1e-3, 0.02, 0.02),
-                )
-                for i, length in enumerate((1.0, 0.8, 0.3))
-            ]
-        ),
-    )
-
-
-def random_rotation(random: np.random.Generator) -> np.ndarray:
-    axis = random.normal(size=3)
-    axis /= np.linalg.norm(axis)
-    return np.array(rotation_about(tuple(axis), random.uniform(-pi, pi)))
-
-
-def random_transform(random: np.random.Generator) -> Transform:
-    return Transform(rotation=random_rotation(random), translation=random.uniform(-0.5, 0.5, 3))
-
-
-def random_inertia(random: np.random.Generator) -> np.ndarray:
-    """The inertia of a cloud of points: physical by construction."""
-    points = random.normal(size=(6, 3)) * 0.2
-    points -= points.mean(axis=0)
-    scatter = points.T @ points / 6
-    return np.trace(scatter) * np.eye(3) - scatter
-
-
-def build_random_tree(seed: int, count: int = 7, *, chain: bool = False) -> Robot:
-    """A tree (or chain) of ``count`` links: revolute, prismatic and fixed joints about any axes, a turned base,
-    a tool, motors, listed in an order that does not follow the tree.
-    """
-    random = np.random.default_rng(seed)
-    links: list[Link] = []
-    kinds = (Revolute, Prismatic, Revolute, Fixed, Revolute, Revolute, Prismatic)
-    for i in range(count):
-        kind = kinds[i % len(kinds)] if chain else kinds[random.integers(len(kinds))]
-        parent = None if i == 0 else f"link{i if chain else random.integers(1, i + 1)}"
-        axes = ((1, 0, 0), (0, 1, 0), (0, 0, -1), tuple(random.normal(size=3)))
-        links.append(
-            Link(
-                name=f"link{i + 1}",
-                parent=parent,
-                joint=kind(axis=axes[random.integers(4)], offset=random.uniform(-1, 1)),
-                before=random_transform(random),
-                after=random_transform(random),
-                mass=random.uniform(0.5, 3),
-                centre_of_mass=random.uniform(-0.3, 0.3, 3),
-                inertia=random_inertia(random),
-                motor=Motor(
-                    inertia=random.uniform(1e-4, 1e-3),
-                    gear_ratio=random.choice((-1, 1)) * random.uniform(5, 20),
-                    viscous_friction=random.uniform(0, 1e-2),
-                    coulomb_friction=(random.uniform(0, 0.1), -random.uniform(0, 0.1)),
-                )
-                if random.random() < 0.7
-                else None,
-            )
-        )
-    if not any(link.joint.moves for link in links):
-        links[0] = Link(name="link1", joint=Revolute(), mass=1.0, inertia=np.eye(3) * 0.1)
-    tip = links[-1]
-    rest = links[:-1]
-    shuffled = [rest[i] for i in random.permutation(len(rest))] if not chain else rest
-    return Robot(
-        name=f"random{seed}{'chain' if chain else 'tree'}",
-        links=(*shuffled, tip),
-        base=random_transform(random),
-        tool=random_transform(random),
-        gravity=tuple(random.uniform(-10, 10, 3)),
-        friction_model=FrictionModel.SQUARED_GEAR,
-    )
-
-
-ROBOTS: dict[str, Robot] = {
-    robot.name: robot
-    for robot in (
-        build_puma560(),
-        build_kr180(),
-        build_twolink(),
-        build_planar3r(),
-        build_random_tree(1),
-        build_random_tree(2),
-        build_random_tree(3, chain=True),
-        build_random_tree(4, 9),
-    )
-}
-"""Every robot that the laws are checked on."""
-
-
-@pytest.fixture(params=ROBOTS.values(), ids=ROBOTS.keys())
+@pytest.fixture(params=LAW_ROBOTS.values(), ids=LAW_ROBOTS.keys())
 def robot(request: pytest.FixtureRequest) -> Robot:
-    """Each robot of the law tests in turn."""
+    """Each robot of the law tests in turn: every shipped one, and random trees."""
     return request.param
 
 
 @pytest.fixture
 def puma560() -> Robot:
-    """Corke's Puma 560."""
-    return ROBOTS["puma560"]
+    """Corke's Puma 560 of 8/95, written out in Python."""
+    return build_puma560()
 
 
 @pytest.fixture
 def kr180() -> Robot:
-    """The paper's arm."""
-    return ROBOTS["KR180"]
+    """The paper's arm, written out in Python."""
+    return build_kr180()

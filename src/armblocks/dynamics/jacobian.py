@@ -52,7 +52,7 @@ def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[C
 
 def jacobian_matrix(columns: Sequence[Column]) -> SX:
     """(6, n): rows linear, then angular."""
-    return horzcat(*(vertcat(*v, *w) for v, w in columns))
+    return SX(horzcat(*(vertcat(*v, *w) for v, w in columns)))
 
 
 def yoshikawa(columns: Sequence[Column]) -> SX:
@@ -68,12 +68,12 @@ def yoshikawa(columns: Sequence[Column]) -> SX:
     if n > MOST_COLUMNS_BY_MINORS:
         rows = list(zip(*entries))
         gram = [[_dot(a, b) for b in rows] for a in rows]
-        return sqrt(fmax(_minors(gram)[0], 0.0))
+        return SX(sqrt(fmax(_minors(gram)[0], 0.0)))
     short = entries if n <= 6 else [list(row) for row in zip(*entries)]
     minors = _minors(short)
     if len(minors) == 1:
-        return fabs(minors[0])
-    return sqrt(_dot(minors, minors))
+        return SX(fabs(minors[0]))
+    return SX(sqrt(_dot(minors, minors)))
 
 
 def _minors(rows: Sequence[Sequence[Scalar]]) -> list[SX]:

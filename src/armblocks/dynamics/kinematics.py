@@ -38,7 +38,7 @@ class Pose(NamedTuple):
     def matrix(self) -> SX:
         """The homogeneous matrix, (4, 4)."""
         columns = [vertcat(*column, 0.0) for column in (self.x, self.y, self.z)]
-        return horzcat(*columns, vertcat(*self.p, 1.0))
+        return SX(horzcat(*columns, vertcat(*self.p, 1.0)))
 
 
 class _TurnedPose(NamedTuple):

@@ -1,0 +1,181 @@
+"""What must hold for any arm: over every shipped robot and random trees of all joint types."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from casadi import SX, Function, jacobian, jtimes
+from numpy.testing import assert_allclose
+
+from armblocks.dynamics import TRACES
+from armblocks.robot import Fixed, Link, Robot
+from armblocks.spatial import Transform
+from robots_for_tests import evaluate, random_states
+
+
+def scaled(actual: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
+    """Equal to ``tolerance`` relative to the largest entry (single entries may cancel to nothing)."""
+    size = max(1.0, float(np.abs(expected).max(initial=0.0)))
+    assert_allclose(actual, expected, rtol=0, atol=tolerance * size)
+
+
+def test_forward_dynamics_undoes_inverse_dynamics(robot: Robot):
+    for q, qd, qdd in random_states(robot):
+        tau = evaluate(robot, "rne", q, qd, qdd)
+        back = evaluate(robot, "accel", q, qd, tau)
+        condition = np.linalg.cond(evaluate(robot, "inertia", q))
+        # Rounding of tau grows by the condition of M.
+        scaled(back, qdd, max(1e-10, 1e3 * condition * np.finfo(float).eps))
+
+
+def test_mass_matrix_is_symmetric_and_positive_definite(robot: Robot):
+    for q, _, _ in random_states(robot):
+        M = evaluate(robot, "inertia", q)
+        scaled(M, M.T, 1e-14)
+        assert np.linalg.eigvalsh(M).min() > 0
+
+
+def test_mass_matrix_is_unit_acceleration_torques(robot: Robot):
+    still = np.zeros(robot.n)
+    for q, _, _ in random_states(robot, 2):
+        at_rest = evaluate(robot, "rne", q, still, still)
+        columns = [evaluate(robot, "rne", q, still, unit) - at_rest for unit in np.eye(robot.n)]
+        scaled(evaluate(robot, "inertia", q), np.column_stack(columns), 1e-12)
+
+
+def test_mass_matrix_rate_less_twice_coriolis_is_skew(robot: Robot):
+    traced = TRACES["inertia"](robot)
+    qd = SX.sym("qd", robot.n)
+    rate = Function("Mdot", [traced.arguments[0], qd], [jtimes(traced.results[0], traced.arguments[0], qd)])
+    for q, v, _ in random_states(robot):
+        Mdot = np.asarray(rate(q, v)).reshape(robot.n, robot.n)
+        N = Mdot - 2 * evaluate(robot, "coriolis", q, v)
+        scaled(N, -N.T, 1e-12)
+
+
+def test_coriolis_and_gravity_are_the_torque_of_unaccelerated_motion(robot: Robot):
+    smooth = robot.nofriction()
+    for q, qd, qdd in random_states(robot):
+        C = evaluate(robot, "coriolis", q, qd)
+        g = evaluate(robot, "gravload", q)
+        scaled(evaluate(smooth, "rne", q, qd, 0 * qd), C @ qd + g, 1e-12)
+        M = evaluate(robot, "inertia", q)
+        friction = evaluate(robot, "friction", qd)
+        scaled(evaluate(robot, "rne", q, qd, qdd), M @ qdd + C @ qd + g + friction, 1e-12)
+
+
+def test_kinetic_energy_is_half_the_quadratic_form_of_the_mass_matrix(robot: Robot):
+    for q, qd, _ in random_states(robot):
+        expected = 0.5 * qd @ evaluate(robot, "inertia", q) @ qd
+        scaled(evaluate(robot, "kinetic_energy", q, qd), expected, 1e-13)
+
+
+def test_gravity_load_is_the_slope_of_potential_energy(robot: Robot):
+    traced = TRACES["potential_energy"](robot)
+    slope = Function("g", [traced.arguments[0]], [jacobian(traced.results[0], traced.arguments[0])])
+    for q, _, _ in random_states(robot):
+        scaled(evaluate(robot, "gravload", q), np.asarray(slope(q)).ravel(), 1e-12)
+
+
+def test_power_of_the_torques_is_the_rate_of_energy(robot: Robot):
+    smooth = robot.nofriction()
+    T, V = TRACES["kinetic_energy"](smooth), TRACES["potential_energy"](smooth)
+    q, qd = T.arguments
+    (q_of_V,) = V.arguments
+    qdd = SX.sym("qdd", robot.n)
+    kinetic = jtimes(T.results[0], q, qd) + jtimes(T.results[0], qd, qdd)
+    rate = Function("Edot", [q, qd, qdd], [kinetic])
+    climb = Function("Vdot", [q_of_V, qd], [jtimes(V.results[0], q_of_V, qd)])
+    for position, speed, acceleration in random_states(robot):
+        power = evaluate(smooth, "rne", position, speed, acceleration) @ speed
+        change = float(rate(position, speed, acceleration)) + float(climb(position, speed))
+        assert power == pytest.approx(change, rel=1e-11, abs=1e-9)
+
+
+def test_energy_stays_constant_without_friction(robot: Robot):
+    smooth = robot.nofriction()
+    random = np.random.default_rng(3)
+    q, qd = random.uniform(-1, 1, robot.n), random.uniform(-0.5, 0.5, robot.n)
+    idle = np.zeros(robot.n)
+
+    def energy() -> float:
+        return float(evaluate(smooth, "kinetic_energy", q, qd) + evaluate(smooth, "potential_energy", q))
+
+    def slope(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return qd, evaluate(smooth, "accel", q, qd, idle)
+
+    start, h = energy(), 5e-4
+    exchanged = float(evaluate(smooth, "kinetic_energy", q, qd))
+    for _ in range(100):
+        a1, b1 = slope(q, qd)
+        a2, b2 = slope(q + h / 2 * a1, qd + h / 2 * b1)
+        a3, b3 = slope(q + h / 2 * a2, qd + h / 2 * b2)
+        a4, b4 = slope(q + h * a3, qd + h * b3)
+        q, qd = q + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), qd + h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
+        exchanged = max(exchanged, float(evaluate(smooth, "kinetic_energy", q, qd)))
+    # Fourth order at h = 0.5 ms leaves 1e-9 of the energy that moves.
+    assert abs(energy() - start) < 1e-8 * exchanged
+
+
+def test_centre_of_mass_is_where_gravity_pulls(robot: Robot):
+    mass = sum(link.mass for link in robot.links)
+    for q, _, _ in random_states(robot):
+        expected = -mass * np.array(robot.gravity) @ evaluate(robot, "centre_of_mass", q)
+        scaled(evaluate(robot, "potential_energy", q), expected, 1e-13)
+
+
+def test_centre_of_mass_is_the_weighted_mean_of_the_links(robot: Robot):
+    mass = np.array([link.mass for link in robot.links])
+    for q, _, _ in random_states(robot, 2):
+        poses = evaluate(robot, "link_poses", q)[1:-1]
+        centres = np.array([T[:3, :3] @ link.r + T[:3, 3] for T, link in zip(poses, robot.links)])
+        scaled(evaluate(robot, "centre_of_mass", q), mass @ centres / mass.sum(), 1e-13)
+
+
+def test_wrench_at_the_tip_is_felt_through_the_jacobian_of_the_last_link(robot: Robot):
+    at_link = replace(robot, tool=Transform())
+    random = np.random.default_rng(5)
+    for q, qd, qdd in random_states(robot, 2):
+        wrench = random.uniform(-20, 20, 6)
+        load = evaluate(robot, "rne_loaded", q, qd, qdd, wrench, np.zeros(10))
+        free = evaluate(robot, "rne", q, qd, qdd)
+        scaled(load - free, evaluate(at_link, "jacobe", q).T @ wrench, 1e-11)
+
+
+def test_payload_equals_a_link_of_that_mass_on_the_tool(robot: Robot):
+    random = np.random.default_rng(6)
+    mass, centre = 12.0, random.uniform(-0.2, 0.2, 3)
+    second = np.array((0.4, 0.5, 0.6, 0.01, -0.02, 0.03))
+    grown = replace(
+        robot,
+        links=(
+            *robot.links,
+            Link(
+                name="payload",
+                parent=robot.links[-1].name,
+                joint=Fixed(),
+                before=robot.tool,
+                mass=mass,
+                centre_of_mass=centre,
+                inertia=second,
+            ),
+        ),
+    )
+    payload = np.concatenate(([mass], centre, second))
+    for q, qd, qdd in random_states(robot, 2):
+        no_wrench = np.zeros(6)
+        loaded = evaluate(robot, "rne_loaded", q, qd, qdd, no_wrench, payload)
+        scaled(loaded, evaluate(grown, "rne", q, qd, qdd), 1e-11)
+        back = evaluate(robot, "accel_loaded", q, qd, loaded, no_wrench, payload)
+        condition = np.linalg.cond(evaluate(grown, "inertia", q))
+        scaled(back, qdd, max(1e-10, 1e3 * condition * np.finfo(float).eps))
+
+
+def test_loaded_forms_without_load_are_the_unloaded_ones(robot: Robot):
+    for q, qd, tau in random_states(robot, 2):
+        nothing = (np.zeros(6), np.zeros(10))
+        scaled(evaluate(robot, "rne_loaded", q, qd, tau, *nothing), evaluate(robot, "rne", q, qd, tau), 1e-11)
+        expected = evaluate(robot, "accel", q, qd, tau)
+        condition = np.linalg.cond(evaluate(robot, "inertia", q))
+        tolerance = max(1e-10, 1e3 * condition * np.finfo(float).eps)
+        scaled(evaluate(robot, "accel_loaded", q, qd, tau, *nothing), expected, tolerance)
