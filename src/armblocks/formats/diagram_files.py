@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike, fspath
 from pathlib import Path
 
 from armblocks.diagram import BlockLibrary, Diagram
@@ -20,16 +21,16 @@ def list_examples() -> tuple[str, ...]:
 
 
 def load_diagram(
-    name_or_path: str | Path, library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
+    name_or_path: str | PathLike[str], library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
 ) -> Diagram:
     """A shipped diagram by its name, ``"kr180model"``, or a diagram file by its path.
 
     What holds a path separator or ends in ``.json`` is a path, everything else a name. Raises
     ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`.
     """
-    text = str(name_or_path)
-    if isinstance(name_or_path, Path) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
-        return read_diagram(name_or_path, library, resolve_robot)
+    text = fspath(name_or_path)
+    if not isinstance(name_or_path, str) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
+        return read_diagram(text, library, resolve_robot)
     known = list_examples()
     if text not in known:
         raise UnknownNameError("shipped diagram", text, known)
@@ -37,7 +38,7 @@ def load_diagram(
 
 
 def read_diagram(
-    path: str | Path, library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
+    path: str | PathLike[str], library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
 ) -> Diagram:
     """The checked diagram of a file; ``library`` holds the block types that it may use.
 
@@ -46,14 +47,19 @@ def read_diagram(
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, ``DiagramError`` for a
     diagram that cannot be built. All name the file, and the line where the fault has one.
     """
-    data = read_bounded(path, MOST_BYTES)
-    return diagram_from_bytes(data, str(path), library, resolve_robot, folder=Path(path).parent)
+    data = read_bounded(fspath(path), MOST_BYTES)
+    return diagram_from_bytes(data, fspath(path), library, resolve_robot, folder=Path(path).parent)
 
 
-def write_diagram(diagram: Diagram, path: str | Path, resolve_robot: ResolveRobot = load_robot) -> None:
-    """Write the canonical file of a diagram, all or nothing. Reading it gives an equal diagram.
+def write_diagram(
+    path: str | PathLike[str], diagram: Diagram, resolve_robot: ResolveRobot = load_robot
+) -> Path:
+    """Write the canonical file of a diagram, all or nothing, and return its path.
 
-    Robots are written as references, the whole robot only where it is neither shipped nor from a file.
-    Raises ``FormatError`` where the folder cannot be written or a value has no place in JSON.
+    Reading it gives an equal diagram. Robots are written as references, the whole robot only where it is
+    neither shipped nor from a file. Raises ``FormatError`` where the folder cannot be written or a value has
+    no place in JSON.
     """
-    write_atomically(path, diagram_to_bytes(diagram, resolve_robot, folder=Path(path).parent))
+    target = Path(fspath(path))
+    write_atomically(target, diagram_to_bytes(diagram, resolve_robot, folder=target.parent))
+    return target

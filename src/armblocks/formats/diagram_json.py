@@ -24,7 +24,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
@@ -48,13 +48,13 @@ from armblocks.formats.json_document import (
     read_document,
     split_members,
 )
-from armblocks.formats.robot_references import ResolveRobot, reference_of_robot, robot_of_reference
+from armblocks.formats.robot_references import ResolveRobot, RobotReader, RobotWriter
 from armblocks.robot import Robot
 
 FORMAT_VERSION = 1
 MOST_BYTES = 16 * 2**20
 
-_DOCUMENT_KEYS = ("format", "name", "blocks", "connections", "layout", "settings")
+_DOCUMENT_KEYS = ("format", "name", "blocks", "connections", "layout", "robots", "settings")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _WIRE = re.compile(r"([^/]+)/([^/\s]+) -> ([^/]+)/([^/\s]+)")
@@ -80,10 +80,9 @@ def diagram_from_bytes(
     members = _split(root, _DOCUMENT_KEYS, extras, "")
     _check_version(root, members)
     settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
+    robots = RobotReader(members.get("robots"), folder, resolve_robot)
     block_nodes = members["blocks"].members() if "blocks" in members else {}
-    blocks = {
-        key: _block(key, node, library, resolve_robot, folder, extras) for key, node in block_nodes.items()
-    }
+    blocks = {key: _block(key, node, library, robots, extras) for key, node in block_nodes.items()}
     placements = _layout(members["layout"], set(blocks), extras) if "layout" in members else {}
     builder = DiagramBuilder(
         members["name"].text() if "name" in members else Path(name).stem, settings=settings, extras=extras
@@ -104,15 +103,17 @@ def diagram_from_bytes(
 def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: Path | None = None) -> bytes:
     """The canonical document of a diagram. Reading it gives an equal diagram.
 
-    A robot is written as the shortest reference that gives an equal robot, its path relative to ``folder``.
+    A robot is written as the shortest reference that gives an equal one, its path relative to ``folder``.
     Raises ``FormatError`` where a value has no place in JSON.
     """
     extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
     block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
 
+    robots = RobotWriter(folder, resolve_robot)
+
     def value_of(rule: Parameter, value: object) -> object:
         if isinstance(value, Robot):
-            return reference_of_robot(value, folder, resolve_robot)
+            return robots.reference(value)
         return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
 
     blocks = {
@@ -140,6 +141,7 @@ def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: P
         "connections": [str(wire) for wire in diagram.connections],
         "layout": layout,
         "settings": {**extras.get("settings", {}), **settings},
+        **({"robots": robots.table} if robots.table else {}),
     }
     return canonical_bytes(document, one_line=_is_placement)
 
@@ -164,7 +166,7 @@ def _with_texts_for_infinities(value: object) -> object:
 
 
 @contextmanager
-def _located(node: Node) -> Iterator[None]:
+def _located(node: Node) -> Generator[None]:
     """Give the errors of what a node describes the node's file and line; kinds and texts stay."""
     try:
         yield
@@ -220,14 +222,7 @@ def _settings(node: Node, extras: Extras) -> SimulationOptions:
     return dataclasses.replace(SimulationOptions(), **values)  # pyright: ignore[reportArgumentType]
 
 
-def _block(
-    key: str,
-    node: Node,
-    library: BlockLibrary,
-    resolve_robot: ResolveRobot,
-    folder: Path | None,
-    extras: Extras,
-) -> Block:
+def _block(key: str, node: Node, library: BlockLibrary, robots: RobotReader, extras: Extras) -> Block:
     members = _split(node, ("type", "parameters"), extras, "blocks", key)
     if "type" not in members:
         raise node.error("the key 'type' is missing", allowed="a block type", fix='add "type": "Gain"')
@@ -239,7 +234,7 @@ def _block(
     for name, member in given.items():
         if name not in rules:
             raise UnknownNameError(f"parameter of {kind.type_name()}", name, rules, where=member.where)
-        values[name] = _parameter(rules[name], member, resolve_robot, folder)
+        values[name] = _parameter(rules[name], member, robots)
     missing = [name for name, rule in rules.items() if rule.required and name not in values]
     if missing:
         raise node.error(
@@ -251,10 +246,10 @@ def _block(
         return kind(**values)
 
 
-def _parameter(rule: Parameter, node: Node, resolve_robot: ResolveRobot, folder: Path | None) -> object:
+def _parameter(rule: Parameter, node: Node, robots: RobotReader) -> object:
     """The checked value of one parameter, so that what is wrong is said at its own line."""
     if rule.kind is ParameterKind.ROBOT:
-        return robot_of_reference(node, folder, resolve_robot)
+        return robots.robot(node)
     value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value
     with _located(node):
         return rule.check(value, "")

@@ -150,8 +150,8 @@ def read_document(data: bytes, name: str, most_bytes: int) -> Node:
 def canonical_bytes(value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False) -> bytes:
     """The one way to write a document of dicts, lists, texts, numbers, booleans and ``None``.
 
-    ``one_line`` says of the path of an object or array whether it is kept on one line. Raises ``FormatError`` for
-    numbers that are not finite, texts that are no Unicode, keys that are no texts, and foreign types.
+    ``one_line`` says of the path of an object or array whether it is kept on one line. Raises ``FormatError``
+    for numbers that are not finite, texts that are no Unicode, keys that are no texts, and foreign types.
     """
     pieces: list[str] = []
     _write(value, (), 0, one_line, pieces.append)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from os import PathLike, fspath
 from pathlib import Path
 
 from armblocks.errors import FormatError, UnknownNameError
@@ -27,7 +28,7 @@ def list_robots() -> tuple[str, ...]:
 
 
 def load_robot(
-    name_or_path: str | Path, *, name: str | None = None, friction_model: FrictionModel | None = None
+    name_or_path: str | PathLike[str], *, name: str | None = None, friction_model: FrictionModel | None = None
 ) -> Robot:
     """A shipped robot by its name, ``"kr180"``, or a robot file by its path.
 
@@ -41,14 +42,15 @@ def load_robot(
     (``InertiaWarning``) of inertias in a user's file that no body can have; the shipped robots' are told by
     ``armblocks show``.
     """
-    if is_path(name_or_path):
-        robot = _pick(_read_file(Path(name_or_path)), str(name_or_path), name)
-        robot = replace(robot, source=str(name_or_path))
+    text = fspath(name_or_path)
+    if not isinstance(name_or_path, str) or is_path(text):
+        robot = _pick(_read_file(Path(text)), text, name)
+        robot = replace(robot, source=text)
         warn_of_inertias(robot)
     else:
-        robot = shipped_robot(str(name_or_path))
+        robot = shipped_robot(text)
         if name is not None:
-            robot = _pick({robot.name: robot}, str(name_or_path), name)
+            robot = _pick({text: robot}, text, name)
     return robot if friction_model is None else robot.with_friction_model(friction_model)
 
 
@@ -63,10 +65,8 @@ def shipped_robot(name: str) -> Robot:
     return replace(robot, source=name)
 
 
-def is_path(name_or_path: str | Path) -> bool:
+def is_path(name_or_path: str) -> bool:
     """Whether a path is meant, and not the name of something shipped."""
-    if isinstance(name_or_path, Path):
-        return True
     suffixes = tuple(suffix for format in ROBOT_FORMATS for suffix in format.suffixes)
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(suffixes)
 

@@ -1,18 +1,23 @@
 """How a diagram file says which robot a block means.
 
-``"kr180"`` a shipped robot; ``"arms/mine.m"`` a robot file, relative to the diagram's folder; or an object::
+A block's parameter names a robot: ``"kr180"`` a shipped one; ``"arms/mine.m"`` a robot file, relative to the
+diagram's folder; or a robot of the diagram's own table ``robots``, so that what several blocks share is said
+once::
 
-    {"robot": "puma560", "friction": "none"}
+    "robots": {
+      "arm": {"robot": "puma560", "friction": "none"},
+      "Pendulum": {"format": 1, "name": "Pendulum", "links": […]}
+    }
 
-``robot`` may be a name, a path or a whole robot document. ``friction`` is ``"none"``, ``"viscous"`` (Coulomb
-friction is left out) or ``"coulomb"`` (viscous friction is left out); ``friction_model`` names the formula;
-``name`` picks one of several robots of a script.
+An entry is a whole robot document, or a variant: ``robot`` a shipped name or a path; ``friction`` ``"none"``,
+``"viscous"`` (only viscous friction is kept) or ``"coulomb"`` (only Coulomb friction is kept);
+``friction_model`` the name of the formula.
 """
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from armblocks.errors import ArmblocksError, UnknownNameError
@@ -22,7 +27,10 @@ from armblocks.formats.robot_json import robot_from, robot_to
 from armblocks.robot import FrictionModel, Robot
 
 ResolveRobot = Callable[[str], Robot]
-"""From a shipped name or an absolute path to a robot: ``load_robot``."""
+"""From a shipped name or a path to a robot: ``load_robot``."""
+
+OWN = "#"
+"""What the ``source`` of a robot of the diagram's own table starts with; the rest is its key there."""
 
 _FRICTION: dict[str, Callable[[Robot], Robot]] = {
     "none": lambda robot: robot.nofriction(),
@@ -31,50 +39,89 @@ _FRICTION: dict[str, Callable[[Robot], Robot]] = {
 }
 
 
-def robot_of_reference(node: Node, folder: Path | None, resolve_robot: ResolveRobot) -> Robot:
-    """The robot that a reference means. Raises ``FormatError`` or ``UnknownNameError`` with file and line."""
-    if isinstance(node.value, str):
-        return _resolved(node, folder, resolve_robot)
-    members = closed_members(node, ("robot", "friction", "friction_model"), required=("robot",))
-    inner = members["robot"]
-    robot = robot_from(inner) if isinstance(inner.value, dict) else _resolved(inner, folder, resolve_robot)
-    if "friction_model" in members:
-        model = members["friction_model"].choice([model.value for model in FrictionModel])
-        robot = robot.with_friction_model(FrictionModel(model))
-    if "friction" in members:
-        robot = _FRICTION[members["friction"].choice(_FRICTION)](robot)
-    return robot
+class RobotReader:
+    """Finds the robots of one document. Raises ``FormatError`` or ``UnknownNameError`` with file and line."""
+
+    def __init__(self, table: Node | None, folder: Path | None, resolve_robot: ResolveRobot) -> None:
+        self._folder = folder
+        self._resolve_robot = resolve_robot
+        self._own: dict[str, Robot] = {}
+        for key, node in ({} if table is None else table.members()).items():
+            self._own[key] = replace(self._entry(node), source=OWN + key)
+
+    def robot(self, node: Node) -> Robot:
+        """The robot that a block's parameter means."""
+        name = node.text()
+        return self._own[name] if name in self._own else self._resolved(node)
+
+    def _entry(self, node: Node) -> Robot:
+        if "robot" not in node.members():
+            return robot_from(node)
+        members = closed_members(node, ("robot", "friction", "friction_model"))
+        robot = self._resolved(members["robot"])
+        if "friction_model" in members:
+            model = members["friction_model"].choice([model.value for model in FrictionModel])
+            robot = robot.with_friction_model(FrictionModel(model))
+        if "friction" in members:
+            robot = _FRICTION[members["friction"].choice(_FRICTION)](robot)
+        return robot
+
+    def _resolved(self, node: Node) -> Robot:
+        reference = node.text()
+        try:
+            if self._folder is not None and is_path(reference):
+                return self._resolve_robot(str(self._folder / reference))
+            return self._resolve_robot(reference)
+        except UnknownNameError as error:
+            known = [*error.known, *self._own]
+            raise UnknownNameError(error.kind, error.name, known, where=node.where) from error
+        except ArmblocksError as error:
+            what = f"{error.where}: {error.what}" if error.where else error.what
+            raise node.error(what, allowed=error.allowed, fix=error.fix) from error
 
 
-def reference_of_robot(robot: Robot, folder: Path | None, resolve_robot: ResolveRobot) -> object:
-    """The shortest reference that gives an equal robot: a shipped name, a path, or the whole document.
+class RobotWriter:
+    """Says which robots the blocks of one document mean, and collects its ``table``."""
 
-    A path is tried where the robot says that it came from a file that still exists.
-    """
+    def __init__(self, folder: Path | None, resolve_robot: ResolveRobot) -> None:
+        self._folder = folder
+        self._resolve_robot = resolve_robot
+        self._known: dict[Robot, str] = {}
+        self.table: dict[str, object] = {}
+
+    def reference(self, robot: Robot) -> str:
+        """A shipped name or a path that gives an equal robot, else a key of the table."""
+        if robot not in self._known:
+            entry = _shortest(robot, self._folder, self._resolve_robot)
+            if isinstance(entry, str):
+                self._known[robot] = entry
+            else:
+                self._known[robot] = self._new_key(robot)
+                self.table[self._known[robot]] = entry
+        return self._known[robot]
+
+    def _new_key(self, robot: Robot) -> str:
+        """The key that the robot had, or its name, made unlike every other robot that can be meant."""
+        wish = robot.source.removeprefix(OWN) if robot.source.startswith(OWN) else robot.name
+        taken = {*self.table, *list_robots()}
+        stem = "robot" if is_path(wish) or not wish else wish
+        keys = (stem if number == 1 else f"{stem} {number}" for number in range(1, len(taken) + 2))
+        return next(key for key in keys if key not in taken)
+
+
+def _shortest(robot: Robot, folder: Path | None, resolve_robot: ResolveRobot) -> str | Mapping[str, object]:
+    """The shortest way to say a robot. A path is tried where the robot's file still gives the same."""
     for reference, base in _candidates(robot, folder, resolve_robot):
         modelled = base.with_friction_model(robot.friction_model)
-        extra: dict[str, object] = {}
+        model: dict[str, object] = {}
         if robot.friction_model is not base.friction_model:
-            extra["friction_model"] = robot.friction_model.value
+            model["friction_model"] = robot.friction_model.value
         if modelled == robot:
-            return {"robot": reference, **extra} if extra else reference
+            return {"robot": reference, **model} if model else reference
         for word, without in _FRICTION.items():
             if without(modelled) == robot:
-                return {"robot": reference, "friction": word, **extra}
-    return {"robot": robot_to(robot)}
-
-
-def _resolved(node: Node, folder: Path | None, resolve_robot: ResolveRobot) -> Robot:
-    reference = node.text()
-    try:
-        if folder is not None and is_path(reference):
-            return resolve_robot(str(folder / reference))
-        return resolve_robot(reference)
-    except UnknownNameError as error:
-        raise UnknownNameError(error.kind, error.name, error.known, where=node.where) from error
-    except ArmblocksError as error:
-        what = f"{error.where}: {error.what}" if error.where else error.what
-        raise node.error(what, allowed=error.allowed, fix=error.fix) from error
+                return {"robot": reference, "friction": word, **model}
+    return robot_to(robot)
 
 
 def _candidates(
@@ -98,7 +145,7 @@ def _relative(source: str, folder: Path | None) -> str:
     if folder is None:
         return Path(source).as_posix()
     try:
-        inside = Path(os.path.abspath(source)).relative_to(os.path.abspath(folder))
+        inside = Path(source).resolve().relative_to(folder.resolve()).as_posix()
     except ValueError:
-        return Path(os.path.abspath(source)).as_posix()
-    return inside.as_posix()
+        return Path(source).resolve().as_posix()
+    return inside
