@@ -24,11 +24,24 @@ from armblocks.diagram.port import PortRef
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
 from armblocks.diagram.units import infer_units
 from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, signature
+from armblocks.errors import ArmblocksError, DiagramError
 
 
 def diagram_equations(diagram: Diagram, shapes: DiagramShapes) -> Mapping[str, BlockEquations]:
-    """The traced equations of every block, by block name."""
-    return {name: block_equations(block, shapes.inputs[name]) for name, block in diagram.blocks.items()}
+    """The traced equations of every block, by block name.
+
+    Raises ``DiagramError`` naming the block whose parameters allow no equations (a robot without mass).
+    """
+    equations: dict[str, BlockEquations] = {}
+    for name, block in diagram.blocks.items():
+        try:
+            equations[name] = block_equations(block, shapes.inputs[name])
+        except DiagramError:
+            raise
+        except ArmblocksError as error:
+            where = ", ".join(filter(None, (f"block '{name}' ({block.title})", error.where)))
+            raise DiagramError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
+    return equations
 
 
 def trace_diagram(diagram: Diagram) -> HybridSystem:

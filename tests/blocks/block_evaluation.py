@@ -1,0 +1,20 @@
+"""One block, evaluated with numbers through CasADi."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armblocks.blocks import Constant
+from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+
+
+def evaluate(block: Block, *inputs: ArrayLike, t: float = 0.0, x: ArrayLike = ()) -> dict[str, np.ndarray]:
+    """All outputs and records of a block whose inputs are constant, at time ``t`` and states ``x``."""
+    builder = DiagramBuilder("one block")
+    sources = [builder.add(f"in{k}", Constant(value=value)) for k, value in enumerate(inputs)]
+    builder.add("block", block, *sources)
+    system = trace_diagram(builder.build())
+    (y,) = system.signals(t, x, system.parameter_values)
+    values = system.signals_layout.unpack(y)
+    return {path.removeprefix("block/"): value for path, value in values.items() if path[:6] == "block/"}

@@ -1,0 +1,209 @@
+"""What every block of the library promises: a new block is tested by existing."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from casadi import SX, Function
+
+from armblocks.blocks import BLOCKS, Constant, Derivative
+from armblocks.diagram import (
+    Block,
+    DiagramBuilder,
+    ParameterKind,
+    Shapes,
+    block_equations,
+    shape_of,
+    trace_diagram,
+)
+from armblocks.diagram.block_equations import SlotKind, natural, spread, tunable_slots
+from armblocks.equations import Slot
+from armblocks.errors import InputError
+from armblocks.robot import Robot, serial_chain, standard_dh
+from armblocks.spatial import Transform
+
+ROBOT = Robot(
+    name="pair",
+    base=Transform(translation=(0.1, 0.2, 0.3)),
+    links=serial_chain(
+        [
+            standard_dh(
+                "one", alpha=1.0, a=0.7, mass=2.0, centre_of_mass=(-0.2, 0.1, 0), inertia=(1, 2, 2.5)
+            ),
+            standard_dh("two", d=0.3, a=0.5, mass=1.0, centre_of_mass=(-0.1, 0, 0.2), inertia=(1, 1, 1)),
+        ]
+    ),
+)
+
+pytestmark = pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+
+
+def make(kind: type[Block], **values: object) -> Block:
+    """A block with its defaults, and the little robot where it needs one."""
+    robots = {rule.name: ROBOT for rule in kind.parameters() if rule.kind is ParameterKind.ROBOT}
+    return kind(**(robots | values))
+
+
+def fitting_shapes(block: Block) -> Iterator[Shapes]:
+    """Input shapes that the block takes, of a few that are tried."""
+    for open_shape in ((), (2,), (4,), (3, 3)):
+        shapes = {port.name: open_shape if port.shape is None else port.shape for port in block.input_ports()}
+        try:
+            block.output_shapes(shapes)
+        except InputError:
+            continue
+        yield shapes
+
+
+def numbers(block: Block, shapes: Shapes, values: Block | None = None) -> list[np.ndarray]:
+    """All that the block's equations give at fixed pseudo-random t, x, u and the parameters of ``values``."""
+    random = np.random.default_rng(1)
+    ends = [
+        [Slot(state.name, state.shape) for state in block.states(shapes)],
+        [Slot(name, shape) for name, shape in shapes.items()],
+        list(tunable_slots(block)),
+    ]
+    t, *symbols = SX.sym("t"), *(SX.sym("s", sum(slot.size for slot in slots)) for slots in ends)
+    x, u, p = (natural(slots, symbol) for slots, symbol in zip(ends, symbols))
+    found = [block.outputs(t, x, u, p), block.derivatives(t, x, u, p), block.records(t, x, u, p)]
+    found += [block.initial_states(p), dict(enumerate(map(SX, block.breakpoints(p))))]
+    function = Function("f", [t, *symbols], [SX(value) for group in found for value in group.values()])
+    tunables = [
+        np.ravel((values or block).parameter_value(rule.name)) for rule in block.parameters() if rule.tunable
+    ]
+    points = [0.37, *(random.uniform(0.1, 0.9, symbol.numel()) for symbol in symbols[:2])]
+    points.append(np.concatenate([*tunables, []]))
+    return [np.asarray(value) for value in function.call([np.asarray(point) for point in points])]
+
+
+def test_it_says_what_it_is(kind: type[Block]) -> None:
+    assert kind.summary().endswith((".", "…"))
+    assert "\n" not in kind.summary()
+    assert kind.family
+    assert kind.title
+    assert BLOCKS[kind.type_name()] is kind
+
+
+def test_it_is_final_and_frozen(kind: type[Block]) -> None:
+    assert kind.__bases__ == (Block,)
+    assert kind.__subclasses__() == []
+    block = make(kind)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        block.anything = 1  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_it_is_a_value(kind: type[Block]) -> None:
+    one, other = make(kind), make(kind)
+    assert one == other
+    assert hash(one) == hash(other)
+    assert dataclasses.replace(one) == one
+
+
+def test_its_ports_and_parameters_are_documented(kind: type[Block]) -> None:
+    block = make(kind)
+    for ports in (block.input_ports(), (*block.output_ports(), *block.record_ports())):
+        names = [port.name for port in ports]
+        assert len(names) == len(set(names))
+        assert all(port.doc and not set(port.name) & set("/. ") for port in ports)
+    assert all(rule.doc for rule in kind.parameters())
+    assert all(port.shape is not None for port in block.record_ports())
+
+
+def test_its_parameters_survive_being_read_and_given_again(kind: type[Block]) -> None:
+    block = make(kind)
+    values = {rule.name: block.parameter_value(rule.name) for rule in kind.parameters()}
+    assert kind(**values) == block
+
+
+def test_its_equations_have_the_shapes_that_it_infers(kind: type[Block]) -> None:
+    block = make(kind)
+    tried = list(fitting_shapes(block))
+    assert tried, "no input shapes fit"
+    for shapes in tried:
+        equations = block_equations(block, shapes)
+        stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
+        inferred = {**stated, **block.output_shapes(shapes)}
+        assert set(inferred) == {port.name for port in block.output_ports()}
+        traced = {
+            slot.name: slot.shape
+            for group in equations.groups
+            for slot in group.slots
+            if slot.kind is SlotKind.OUTPUT
+        }
+        assert traced == {name: inferred[name] for name in inferred if name not in block.time_derivatives}
+
+
+def test_its_equations_are_pure_and_read_tunable_parameters_from_p_only(kind: type[Block]) -> None:
+    block = make(kind)
+    other = make(
+        kind,
+        **{
+            rule.name: np.asarray(block.parameter_value(rule.name)) * 1.5 + 0.25
+            for rule in kind.parameters()
+            if rule.tunable
+        },
+    )
+    for shapes in fitting_shapes(block):
+        first = numbers(block, shapes)
+        for again in (numbers(block, shapes), numbers(other, shapes, values=block)):
+            for one, two in zip(first, again, strict=True):
+                assert np.array_equal(one, two, equal_nan=True)
+
+
+def test_its_start_values_fit_its_states(kind: type[Block]) -> None:
+    block = make(kind)
+    slots = list(tunable_slots(block))
+    p = natural(slots, SX.sym("p", sum(slot.size for slot in slots)))
+    for shapes in fitting_shapes(block):
+        states = block.states(shapes)
+        start = block.initial_states(p)
+        assert set(start) == {state.name for state in states}
+        for state in states:
+            assert spread(SX(start[state.name]), state.shape).numel() == Slot("", state.shape).size
+            assert state.doc
+
+
+def test_every_choice_has_equations(kind: type[Block]) -> None:
+    for rule in kind.parameters():
+        for choice in rule.choices:
+            block = make(kind, **{rule.name: choice})
+            for shapes in fitting_shapes(block):
+                assert all(np.isfinite(value).all() for value in numbers(block, shapes))
+
+
+def test_its_views_show_signals_that_exist(kind: type[Block]) -> None:
+    block = make(kind)
+    known = {port.name for port in (*block.input_ports(), *block.output_ports(), *block.record_ports())}
+    for view in block.views():
+        assert view.signals
+        assert set(view.signals) <= known
+        assert not view.labels or len(view.labels) == len(view.signals)
+
+
+def test_outputs_that_are_said_to_be_rates_are_rates(
+    kind: type[Block], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    claims, block, random = kind.output_rates, make(kind), np.random.default_rng(2)
+    monkeypatch.setattr(kind, "output_rates", {})  # so that the derivative is worked out
+    for port, rate in claims.items():
+        builder = DiagramBuilder("d")
+        shapes = next(fitting_shapes(block))
+        sources = [
+            builder.add(name, Constant(value=random.uniform(0.1, 0.9, shape)))
+            for name, shape in shapes.items()
+        ]
+        builder.add("derivative", Derivative(), builder.add("block", block, *sources)[port])
+        system = trace_diagram(builder.build())
+        (y,) = system.signals(0.37, random.uniform(0.1, 0.9, system.states.size), system.parameter_values)
+        signals = system.signals_layout.unpack(y)
+        # the same quantity by another order of operations
+        assert signals["derivative/y"] == pytest.approx(signals[f"block/{rate}"], rel=1e-13)
+
+
+def test_the_shape_of_a_default_is_the_shape_of_its_symbol(kind: type[Block]) -> None:
+    block = make(kind)
+    for slot in tunable_slots(block):
+        assert slot.shape == shape_of(block.parameter_value(slot.name))

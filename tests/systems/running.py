@@ -1,0 +1,18 @@
+"""Run a diagram the way users do: traced, compiled, simulated."""
+
+from __future__ import annotations
+
+from armblocks.compiler.system import compile_system
+from armblocks.diagram import Diagram, trace_diagram
+from armblocks.equations import SimulationOptions
+from armblocks.simulation import SimulationResult, simulate
+
+
+def run(
+    diagram: Diagram, stop_time: float, *, rtol: float = 1e-10, atol: float = 1e-12, solver: str = "auto"
+) -> SimulationResult:
+    """All signals at 101 instants."""
+    options = SimulationOptions(
+        stop_time=stop_time, sample_time=stop_time / 100, rtol=rtol, atol=atol, solver=solver
+    )
+    return simulate(compile_system(trace_diagram(diagram)), options)
