@@ -1,0 +1,99 @@
+"""The numbered tree, and a joint type that only this file knows."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armblocks.robot import Fixed, Joint, Link, Motor, Prismatic, Revolute, Robot, serial_chain
+from armblocks.robot.tree import BASE, KinematicTree
+from robots_for_tests import evaluate, random_inertia, random_states, random_transform
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screw(Joint):
+    """Turns and advances 5 cm a radian: what a newcomer's file would hold."""
+
+    letter: ClassVar[str] = "H"
+    unit: ClassVar[str] = "rad"
+
+    @property
+    def turn(self) -> float:
+        return 1.0
+
+    @property
+    def slide(self) -> float:
+        return 0.05
+
+
+def test_bodies_are_numbered_parents_first_and_know_their_joint():
+    robot = Robot(
+        name="r",
+        links=(
+            Link(name="hand", parent="arm", joint=Prismatic()),
+            Link(name="stand", joint=Fixed(), mass=7.0),
+            Link(name="arm", parent="stand", mass=1.0),
+            Link(name="box", parent="arm", joint=Fixed(), mass=2.0),
+        ),
+    )
+    tree = KinematicTree.of(robot)
+    assert [body.link for body in tree.bodies] == ["arm", "hand"]
+    assert [body.joint for body in tree.bodies] == [1, 0]
+    assert [body.parent for body in tree.bodies] == [BASE, 0]
+    assert [frame.body for frame in tree.links] == [1, BASE, 0, 0]
+    assert tree.bodies[0].inertia.mass == 3.0
+    assert tree.grounded.mass == 7.0
+    assert tree.ancestors(1) == (0,)
+    assert tree.ancestors(BASE) == ()
+
+
+@pytest.mark.parametrize(
+    "axis", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (0.6, 0, 0.8), (1, 2, 3)]
+)
+def test_any_axis_turns_as_described(axis: tuple[float, float, float]):
+    for kind in (Revolute, Prismatic, Screw):
+        arm = Robot(name="arm", links=(Link(name="l", joint=kind(axis=axis, offset=0.3)),))
+        expected = arm.links[0].pose(0.5).matrix
+        assert_allclose(evaluate(arm, "fkine", [0.5]), expected, rtol=0, atol=1e-15)
+
+
+def test_a_new_joint_type_works_in_every_algorithm():
+    random = np.random.default_rng(8)
+    screws = Robot(
+        name="screws",
+        links=serial_chain(
+            [
+                Link(
+                    name=f"l{i}",
+                    joint=kind(axis=tuple(random.normal(size=3))),
+                    before=random_transform(random),
+                    mass=1.5,
+                    centre_of_mass=random.uniform(-0.2, 0.2, 3),
+                    inertia=random_inertia(random),
+                    motor=Motor(inertia=1e-4, gear_ratio=30),
+                )
+                for i, kind in enumerate((Screw, Revolute, Screw))
+            ]
+        ),
+    )
+    assert screws.joint_letters == "HRH"
+    for q, qd, qdd in random_states(screws):
+        tau = evaluate(screws, "rne", q, qd, qdd)
+        M = evaluate(screws, "inertia", q)
+        C = evaluate(screws, "coriolis", q, qd)
+        assert_allclose(tau, M @ qdd + C @ qd + evaluate(screws, "gravload", q), rtol=0, atol=1e-12)
+        assert_allclose(evaluate(screws, "accel", q, qd, tau), qdd, rtol=0, atol=1e-11)
+        assert evaluate(screws, "kinetic_energy", q, qd) == pytest.approx(qd @ M @ qd / 2, rel=1e-13)
+        step = 1e-6
+        for j in range(screws.n):
+            ahead, behind = (evaluate(screws, "fkine", q + s * step * np.eye(screws.n)[j]) for s in (1, -1))
+            velocity = (ahead[:3, 3] - behind[:3, 3]) / (2 * step)
+            assert_allclose(evaluate(screws, "jacob0", q)[:3, j], velocity, rtol=0, atol=1e-8)
+
+
+def test_gravity_is_told_in_base_axes(puma560: Robot):
+    T = random_transform(np.random.default_rng(3))
+    tree = KinematicTree.of(replace(puma560, base=T))
+    assert_allclose(tree.gravity, T.R.T @ (0, 0, -9.81), rtol=0, atol=1e-15)

@@ -1,0 +1,53 @@
+"""Transforms form a group, are values, and say why a matrix is none."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armblocks.errors import InputError
+from armblocks.spatial import Transform, transl, trotx, troty, trotz
+from robots_for_tests import random_transform
+
+RANDOM = np.random.default_rng(0)
+A, B, C = (random_transform(RANDOM) for _ in range(3))
+
+
+def test_composition_is_the_matrix_product():
+    assert_allclose((A @ B).matrix, A.matrix @ B.matrix, rtol=0, atol=1e-15)
+    assert_allclose(((A @ B) @ C).matrix, (A @ (B @ C)).matrix, rtol=0, atol=1e-15)
+    assert_allclose(A.apply((1.0, 2.0, 3.0)), (A.matrix @ (1, 2, 3, 1))[:3], rtol=0, atol=1e-15)
+
+
+def test_inverse_undoes():
+    assert_allclose((A @ A.inverse()).matrix, np.eye(4), rtol=0, atol=1e-15)
+    assert Transform().is_identity
+    assert not A.is_identity
+
+
+def test_is_a_value():
+    again = Transform.from_matrix(A.matrix)
+    assert again == A
+    assert hash(again) == hash(A)
+    assert A != B
+    assert_allclose(again.R, A.rotation)
+    assert_allclose(again.p, A.translation)
+
+
+def test_quarter_turns_stay_exact_through_products():
+    turn = trotx(np.pi / 2) @ trotz(-np.pi / 2) @ troty(np.pi)
+    assert set(turn.R.ravel()) <= {0.0, 1.0, -1.0}
+    assert turn @ turn.inverse() == Transform()
+    assert transl(1, 2, 3).p.tolist() == [1, 2, 3]
+
+
+def test_matrix_that_is_no_pose_is_refused():
+    with pytest.raises(InputError, match=r"a transform has shape \(3, 3\)\. Allowed: shape \(4, 4\)"):
+        Transform.from_matrix(np.eye(3))
+    with pytest.raises(InputError, match=r"the last row of a transform is \[0.0, 0.0, 0.0, 2.0\]"):
+        Transform.from_matrix(np.diag((1, 1, 1, 2)))
+    with pytest.raises(
+        InputError, match=r"should be a rotation is not: R'R differs from the identity by 0\.21"
+    ):
+        Transform(rotation=np.diag((1.1, 1, 1)))
+    with pytest.raises(InputError, match="should be a rotation is a mirror"):
+        Transform(rotation=np.diag((1, 1, -1)))
