@@ -166,9 +166,47 @@ class Body:
         """Disjunction of conditions."""
         return self.let(f"or {self.bit} {a}, {b}")
 
+    def rarely(
+        self, condition: str, usual: Sequence[tuple[str, str]], write: Callable[[], Sequence[str]]
+    ) -> list[str]:
+        """One lane: ``usual`` (types and values), or what ``write`` emits where the rare condition holds."""
+        before, rare, after = self.fresh("usual"), self.fresh("rare"), self.fresh("after")
+        self.module.declare("i1", "llvm.expect.i1", "i1", "i1")
+        self.do(f"br label %{before}")
+        self.label(before)
+        expected = self.let(f"call i1 @llvm.expect.i1(i1 {condition}, i1 false)")
+        self.do(f"br i1 {expected}, label %{rare}, label %{after}")
+        self.label(rare)
+        values = write()
+        self.do(f"br label %{after}")
+        self.label(after)
+        return [
+            self.let(f"phi {kind} [ {value}, %{before} ], [ {other}, %{rare} ]")
+            for (kind, value), other in zip(usual, values)
+        ]
+
     def doubt(self, condition: str) -> None:
         """Mark lanes in which this body's results are wrong and must be worked out with one lane."""
         self.undecided = condition if self.undecided is None else self.either(self.undecided, condition)
+
+    # Sums and products without error, as unevaluated pairs.
+
+    def two_sum(self, a: str, b: str) -> tuple[str, str]:
+        """``a + b`` and its rounding error."""
+        total = self.add(a, b)
+        part = self.subtract(total, a)
+        rest = self.subtract(a, self.subtract(total, part))
+        return total, self.add(rest, self.subtract(b, part))
+
+    def fast_two_sum(self, a: str, b: str) -> tuple[str, str]:
+        """``a + b`` and its rounding error, where ``|a| >= |b|`` or ``a`` is zero."""
+        total = self.add(a, b)
+        return total, self.add(self.subtract(a, total), b)
+
+    def two_product(self, a: str, b: str) -> tuple[str, str]:
+        """``a b`` and its rounding error."""
+        product = self.multiply(a, b)
+        return product, self.fma(a, b, self.negate(product))
 
     # Bits.
 

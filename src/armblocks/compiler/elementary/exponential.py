@@ -1,0 +1,159 @@
+"""Exponentials and hyperbolic functions.
+
+``x = k ln 2 + r`` with ``|r| <= ln(2)/2`` in two parts; ``exp r - 1`` comes as an unevaluated pair, so that what is
+small stays exact to its own last place; the power of two is applied in two halves, which meets overflow and
+subnormal results without a case of its own.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from armblocks.compiler.elementary.coefficients import EXPONENTIAL, LN2, LOG2_E, ROUNDER
+from armblocks.compiler.ir_text import Body
+
+_BEYOND = 800.0  # exp overflows from 710 on and vanishes below -746
+
+
+class _Power(NamedTuple):
+    """``exp x = (1 + high + low) scale[0] scale[1]``."""
+
+    high: str
+    low: str
+    count: str
+    """The power of two as a number."""
+    scale: tuple[str, str]
+
+
+def exponential(body: Body, x: str) -> str:
+    """``exp x``."""
+    return exponential_of_sum(body, _limited(body, x), body.number(0.0))
+
+
+def exponential_of_sum(body: Body, high: str, low: str) -> str:
+    """``exp(high + low)`` for ``|high| <= 800``, ``low`` of a rounding error's size."""
+    power = _reduce(body, high, low)
+    one, rest = body.fast_two_sum(body.number(1.0), power.high)
+    return _scaled(body, power, body.add(one, body.add(rest, power.low)))
+
+
+def exponential_minus_one(body: Body, x: str) -> str:
+    """``exp x - 1``."""
+    limited = _limited(body, x)
+    high, low, power = _minus_one(body, limited)
+    near = body.add(high, low)
+    one, rest = body.fast_two_sum(body.number(1.0), power.high)
+    far = _scaled(body, power, body.add(one, body.add(rest, power.low)))
+    # From 2**60 on the 1 does not show, and the pair may overflow early.
+    result = body.select(body.compare("ogt", x, body.number(42.0)), far, near)
+    # Arguments that are their own result keep the sign of zero and every subnormal bit.
+    tiny = body.compare("olt", body.absolute(x), body.number(2.0**-54))
+    return body.select(tiny, x, result)
+
+
+def hyperbolic_sine(body: Body, x: str) -> str:
+    """``sinh x = (m + m / (m + 1)) / 2`` with ``m = exp |x| - 1``; by halves of exp where that overflows."""
+    magnitude = body.absolute(x)
+    high, low, _ = _minus_one(body, _limited(body, magnitude))
+    over, over_rest = body.two_sum(high, body.number(1.0))
+    over_rest = body.add(over_rest, low)
+    quotient = body.divide(high, over)
+    left = body.fma(body.negate(quotient), over, high)
+    left = body.add(left, body.fma(body.negate(quotient), over_rest, low))
+    quotient_rest = body.divide(left, over)
+    total, rest = body.fast_two_sum(high, quotient)
+    total = body.add(total, body.add(rest, body.add(low, quotient_rest)))
+    near = body.multiply(total, body.number(0.5))
+    result = body.select(
+        body.compare("ogt", magnitude, body.number(42.0)), _half_exponential(body, magnitude), near
+    )
+    tiny = body.compare("olt", magnitude, body.number(2.0**-28))
+    return body.intrinsic("copysign", body.select(tiny, magnitude, result), x)
+
+
+def hyperbolic_cosine(body: Body, x: str) -> str:
+    """``cosh x = (exp |x| + exp -|x|) / 2``."""
+    magnitude = body.absolute(x)
+    high, low, _ = _minus_one(body, _limited(body, magnitude))
+    over, over_rest = body.two_sum(high, body.number(1.0))
+    over_rest = body.add(over_rest, low)
+    inverse = body.divide(body.number(1.0), over)
+    left = body.fma(body.negate(inverse), over, body.number(1.0))
+    inverse_rest = body.multiply(inverse, body.fma(body.negate(inverse), over_rest, left))
+    total, rest = body.fast_two_sum(over, inverse)
+    total = body.add(total, body.add(rest, body.add(over_rest, inverse_rest)))
+    near = body.multiply(total, body.number(0.5))
+    far = body.compare("ogt", magnitude, body.number(42.0))
+    return body.select(far, _half_exponential(body, magnitude), near)
+
+
+def hyperbolic_tangent(body: Body, x: str) -> str:
+    """``tanh x = m / (m + 2)`` with ``m = exp 2|x| - 1``."""
+    magnitude = body.absolute(x)
+    ceiling = body.number(40.0)  # tanh is 1 to the last place from 19.1 on
+    limited = body.select(body.compare("ogt", magnitude, ceiling), ceiling, magnitude)
+    high, low, _ = _minus_one(body, body.add(limited, limited))
+    under, under_rest = body.two_sum(high, body.number(2.0))
+    under_rest = body.add(under_rest, low)
+    quotient = body.divide(high, under)
+    left = body.fma(body.negate(quotient), under, high)
+    left = body.add(left, body.fma(body.negate(quotient), under_rest, low))
+    result = body.add(quotient, body.divide(left, under))
+    tiny = body.compare("olt", magnitude, body.number(2.0**-28))
+    return body.intrinsic("copysign", body.select(tiny, magnitude, result), x)
+
+
+def _limited(body: Body, x: str) -> str:
+    """``x`` brought into the range of the reduction; NaN stays."""
+    beyond, below = body.number(_BEYOND), body.number(-_BEYOND)
+    x = body.select(body.compare("ogt", x, beyond), beyond, x)
+    return body.select(body.compare("olt", x, below), below, x)
+
+
+def _reduce(body: Body, high: str, low: str) -> _Power:
+    rounder = body.number(ROUNDER)
+    count = body.subtract(body.fma(high, body.number(LOG2_E), rounder), rounder)
+    first = body.fma(count, body.number(-LN2[0]), high)
+    angle = body.fma(count, body.number(-LN2[1]), first)
+    rest = body.fma(count, body.number(-LN2[1]), body.subtract(first, angle))
+    rest = body.add(rest, low)
+    square = body.multiply(angle, angle)
+    tail = body.multiply(angle, body.polynomial(angle, EXPONENTIAL))
+    curve = body.multiply(square, body.add(tail, body.number(0.5)))
+    # exp(angle + rest) - 1 to first order in the rest
+    total, error = body.fast_two_sum(angle, curve)
+    slope = body.fma(rest, total, rest)
+    rounded_half = body.fma(count, body.number(0.5), rounder)
+    half = body.subtract(rounded_half, rounder)
+    rounded_other = body.add(body.subtract(count, half), rounder)
+    scale = (_power_of_two(body, rounded_half), _power_of_two(body, rounded_other))
+    return _Power(total, body.add(error, slope), count, scale)
+
+
+def _power_of_two(body: Body, rounded: str) -> str:
+    """``2**k`` where ``rounded`` is k plus the rounder: k stands in its lowest bits."""
+    biased = body.word_op("add", body.bits(rounded), body.integer(1023))
+    return body.from_bits(body.word_op("shl", biased, body.integer(52)))
+
+
+def _scaled(body: Body, power: _Power, value: str) -> str:
+    return body.multiply(body.multiply(value, power.scale[0]), power.scale[1])
+
+
+def _minus_one(body: Body, x: str) -> tuple[str, str, _Power]:
+    """``exp x - 1`` as an unevaluated pair, right up to 2**60, and the power it comes from."""
+    power = _reduce(body, x, body.number(0.0))
+    high, low = _scaled(body, power, power.high), _scaled(body, power, power.low)
+    whole = body.multiply(power.scale[0], power.scale[1])
+    base, base_rest = body.two_sum(whole, body.number(-1.0))
+    total, rest = body.two_sum(base, high)
+    return (*body.fast_two_sum(total, body.add(rest, body.add(base_rest, low))), power)
+
+
+def _half_exponential(body: Body, x: str) -> str:
+    """``exp(x) / 2`` without overflow before its time."""
+    power = _reduce(body, _limited(body, x), body.number(0.0))
+    one, rest = body.fast_two_sum(body.number(1.0), power.high)
+    value = body.add(one, body.add(rest, power.low))
+    halved = body.multiply(value, body.number(0.5))
+    return body.multiply(body.multiply(halved, power.scale[0]), power.scale[1])

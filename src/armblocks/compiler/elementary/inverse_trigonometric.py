@@ -1,0 +1,116 @@
+"""Inverse sine, cosine, tangent: one polynomial each on a small interval, the rest by exact identities.
+
+The parts (a multiple of pi/4 in two doubles, the reduced argument with its rounding error, the polynomial's
+share) are added smallest first.
+"""
+
+from __future__ import annotations
+
+from armblocks.compiler.elementary.coefficients import ARC_SINE, ARC_TANGENT, HALF_PI, QUARTER_PI, TAN_PI_8
+from armblocks.compiler.ir_text import Body
+
+
+def arc_sine(body: Body, x: str) -> str:
+    """``asin x``: ``pi/2 - 2 asin sqrt((1 - |x|) / 2)`` above one half. NaN beyond 1."""
+    magnitude, small, s, curve = _arc_sine_parts(body, x)
+    zero = body.number(0.0)
+    base = body.select(small, zero, body.number(HALF_PI[0]))
+    base_rest = body.select(small, zero, body.number(HALF_PI[1]))
+    factor = body.select(small, body.number(1.0), body.number(-2.0))
+    total, error = body.fast_two_sum(base, body.multiply(factor, s))
+    rest = body.add(error, body.fma(factor, curve, base_rest))
+    tiny = body.compare("olt", magnitude, body.number(2.0**-28))
+    return body.intrinsic("copysign", body.select(tiny, magnitude, body.add(total, rest)), x)
+
+
+def arc_cosine(body: Body, x: str) -> str:
+    """``acos x``: ``pi/2 - asin x``, above one half ``2 asin sqrt((1 - x) / 2)``, below minus one half pi less that."""
+    _, small, s, curve = _arc_sine_parts(body, x)
+    negative = body.compare("olt", x, body.number(0.0))
+
+    def choose(middle: float, right: float, left: float) -> str:
+        outer = body.select(negative, body.number(left), body.number(right))
+        return body.select(small, body.number(middle), outer)
+
+    base = choose(HALF_PI[0], 0.0, 2.0 * HALF_PI[0])
+    base_rest = choose(HALF_PI[1], 0.0, 2.0 * HALF_PI[1])
+    inner = body.select(negative, body.number(1.0), body.number(-1.0))
+    outer = body.select(negative, body.number(-2.0), body.number(2.0))
+    factor = body.select(small, inner, outer)
+    total, error = body.fast_two_sum(base, body.multiply(factor, s))
+    return body.add(total, body.add(error, body.fma(factor, curve, base_rest)))
+
+
+def _arc_sine_parts(body: Body, x: str) -> tuple[str, str, str, str]:
+    """``|x|``, whether it is below one half, and s, c with ``asin = s + c`` of it or of sqrt((1 - |x|) / 2)."""
+    magnitude = body.absolute(x)
+    small = body.compare("ole", magnitude, body.number(0.5))
+    outer = body.multiply(body.subtract(body.number(1.0), magnitude), body.number(0.5))
+    root = body.intrinsic("sqrt", outer)
+    left = body.fma(body.negate(root), root, outer)
+    root_rest = body.divide(left, body.add(root, root))
+    at_end = body.compare("oeq", outer, body.number(0.0))
+    unneeded = body.either(small, at_end)
+    rest = body.select(unneeded, body.number(0.0), root_rest)
+    s = body.select(small, magnitude, root)
+    z = body.select(small, body.multiply(magnitude, magnitude), outer)
+    curve = body.fma(body.multiply(s, z), body.polynomial(z, ARC_SINE), rest)
+    return magnitude, small, s, curve
+
+
+def arc_tangent(body: Body, x: str) -> str:
+    """``atan x``."""
+    return arc_tangent_of_quotient(body, x, body.number(1.0))
+
+
+def arc_tangent_of_quotient(body: Body, y: str, x: str) -> str:
+    """``atan2(y, x)``: the angle of the point (x, y), by octants; zeros and infinities as in C99."""
+    across, along = body.absolute(y), body.absolute(x)
+    steep = body.compare("ogt", across, along)
+    over, under = body.select(steep, along, across), body.select(steep, across, along)
+    over, under = _tame(body, over, under)
+
+    # In the upper half of the octant, turn by pi/4: t = (over - under) / (over + under).
+    upper = body.compare("ogt", over, body.multiply(body.number(TAN_PI_8), under))
+    difference, difference_rest = body.two_sum(over, body.negate(under))
+    total, total_rest = body.two_sum(over, under)
+    zero = body.number(0.0)
+    top, top_rest = body.select(upper, difference, over), body.select(upper, difference_rest, zero)
+    bottom, bottom_rest = body.select(upper, total, under), body.select(upper, total_rest, zero)
+    t = body.divide(top, bottom)
+    minus = body.negate(t)
+    left = body.add(body.fma(minus, bottom, top), body.fma(minus, bottom_rest, top_rest))
+    t_rest = body.divide(left, bottom)
+    z = body.multiply(t, t)
+    curve = body.fma(body.multiply(t, z), body.polynomial(z, ARC_TANGENT), t_rest)
+
+    # angle = eighths pi/4 + sign (t + curve)
+    backward = body.word_test("slt", body.bits(x), body.integer(0))
+    eighths = body.select(upper, body.number(1.0), zero)
+    eighths = body.select(steep, body.subtract(body.number(2.0), eighths), eighths)
+    eighths = body.select(backward, body.subtract(body.number(4.0), eighths), eighths)
+    turned = body.let(f"xor {body.bit} {steep}, {backward}")
+    t = body.select(turned, body.negate(t), t)
+    curve = body.select(turned, body.negate(curve), curve)
+    base, base_rest = body.two_product(eighths, body.number(QUARTER_PI[0]))
+    base_rest = body.fma(eighths, body.number(QUARTER_PI[1]), base_rest)
+    total, error = body.fast_two_sum(base, t)
+    angle = body.add(total, body.add(error, body.add(curve, base_rest)))
+    angle = body.intrinsic("copysign", angle, y)
+    nan = body.compare("uno", y, x)
+    return body.select(nan, body.add(y, x), angle)
+
+
+def _tame(body: Body, over: str, under: str) -> tuple[str, str]:
+    """The same quotient (0 <= over <= under) without zero by zero, infinities, overflow or lost digits."""
+    infinity = body.number(float("inf"))
+    one, zero = body.number(1.0), body.number(0.0)
+    endless = body.compare("oeq", under, infinity)
+    both = body.compare("oeq", over, infinity)
+    over = body.select(endless, body.select(both, one, zero), over)
+    void = body.compare("oeq", under, zero)
+    under = body.select(body.either(endless, void), one, under)
+    large = body.compare("ogt", under, body.number(2.0**1000))
+    small = body.compare("olt", under, body.number(2.0**-800))
+    scale = body.select(large, body.number(2.0**-100), body.select(small, body.number(2.0**200), one))
+    return body.multiply(over, scale), body.multiply(under, scale)

@@ -1,0 +1,172 @@
+"""Logarithms and inverse hyperbolic functions, all from the logarithm of an unevaluated pair.
+
+``ln(2**k m) = k ln 2 + ln m`` with ``m`` between sqrt(1/2) and sqrt(2), and ``ln m = 2 atanh s``, ``s = (m - 1) / (m +
+1)``. Every leading term is carried with its rounding error, so that the result is right to about 2**-65 of itself,
+near 1 as well; the argument may itself be such a pair.
+"""
+
+from __future__ import annotations
+
+from armblocks.compiler.elementary.coefficients import LN2, LOGARITHM, THIRD
+from armblocks.compiler.ir_text import Body
+
+_INFINITY = float("inf")
+_SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
+_SMALLEST_NORMAL = 2.0**-1022
+
+
+def logarithm(body: Body, x: str) -> str:
+    """``ln x``; -inf at zero, NaN below."""
+    return _ends(body, x, body.add(*logarithm_of_pair(body, x, None)))
+
+
+def logarithm_of_one_plus(body: Body, x: str) -> str:
+    """``ln(1 + x)``; -inf at -1, NaN below."""
+    total, rest = body.two_sum(body.number(1.0), x)
+    rest = _finite_or_zero(body, rest)
+    result = _ends(body, total, body.add(*logarithm_of_pair(body, total, rest)))
+    tiny = body.compare("olt", body.absolute(x), body.number(2.0**-54))
+    return body.select(tiny, x, result)
+
+
+def inverse_hyperbolic_sine(body: Body, x: str) -> str:
+    """``asinh x = ln(|x| + sqrt(x x + 1))`` with the sign of x; ``ln |x| + ln 2`` where the square overflows."""
+    magnitude = body.absolute(x)
+    square, square_rest = body.two_product(magnitude, magnitude)
+    under, under_rest = body.two_sum(square, body.number(1.0))
+    root, root_rest = _square_root(body, under, body.add(under_rest, square_rest))
+    total, rest = body.two_sum(root, magnitude)
+    rest = body.add(rest, root_rest)
+    huge = body.compare("ogt", magnitude, body.number(2.0**500))
+    total, rest = body.select(huge, magnitude, total), body.select(huge, body.number(0.0), rest)
+    high, low = logarithm_of_pair(body, *body.fast_two_sum(total, rest), doubled=huge)
+    result = _ends(body, magnitude, body.add(high, low))
+    # asinh x = x - x**3 / 6 + …
+    cubed = body.multiply(body.multiply(magnitude, magnitude), magnitude)
+    near = body.fma(cubed, body.number(-1.0 / 6.0), magnitude)
+    small = body.compare("olt", magnitude, body.number(2.0**-18))
+    return body.intrinsic("copysign", body.select(small, near, result), x)
+
+
+def inverse_hyperbolic_cosine(body: Body, x: str) -> str:
+    """``acosh x = ln(x + sqrt(x x - 1))``; NaN below 1."""
+    square, square_rest = body.two_product(x, x)
+    under, under_rest = body.two_sum(square, body.number(-1.0))
+    under, under_rest = body.fast_two_sum(under, body.add(under_rest, square_rest))
+    root, root_rest = _square_root(body, under, under_rest)
+    total, rest = body.two_sum(x, root)
+    rest = body.add(rest, root_rest)
+    huge = body.compare("ogt", x, body.number(2.0**500))
+    total, rest = body.select(huge, x, total), body.select(huge, body.number(0.0), rest)
+    high, low = logarithm_of_pair(body, *body.fast_two_sum(total, rest), doubled=huge)
+    result = _ends(body, x, body.add(high, low))
+    outside = body.compare("olt", x, body.number(1.0))
+    return body.select(outside, body.number(float("nan")), result)
+
+
+def inverse_hyperbolic_tangent(body: Body, x: str) -> str:
+    """``atanh x = ln((1 + x) / (1 - x)) / 2``; infinite at -1 and 1, NaN beyond."""
+    magnitude = body.absolute(x)
+    over, over_rest = body.two_sum(body.number(1.0), magnitude)
+    under, under_rest = body.two_sum(body.number(1.0), body.negate(magnitude))
+    quotient = body.divide(over, under)
+    minus = body.negate(quotient)
+    left = body.fma(minus, under, over)
+    left = body.add(left, body.fma(minus, under_rest, over_rest))
+    rest = _finite_or_zero(body, body.divide(left, under))
+    high, low = logarithm_of_pair(body, *body.fast_two_sum(quotient, rest))
+    half = body.multiply(body.add(high, low), body.number(0.5))
+    result = _ends(body, quotient, half)
+    cubed = body.multiply(body.multiply(magnitude, magnitude), magnitude)
+    near = body.fma(cubed, body.number(1.0 / 3.0), magnitude)
+    small = body.compare("olt", magnitude, body.number(2.0**-18))
+    result = body.select(small, near, result)
+    outside = body.compare("ogt", magnitude, body.number(1.0))
+    result = body.select(outside, body.number(float("nan")), result)
+    return body.intrinsic("copysign", result, x)
+
+
+def logarithm_of_pair(
+    body: Body, high: str, low: str | None, *, doubled: str | None = None
+) -> tuple[str, str]:
+    """``ln(high + low)`` as an unevaluated pair, for a positive finite sum; of twice that where ``doubled`` holds.
+
+    Without ``low`` the argument is ``high`` alone. A subnormal ``high`` must be alone.
+    """
+    subnormal = body.compare("olt", high, body.number(_SMALLEST_NORMAL))
+    raised = body.select(subnormal, body.multiply(high, body.number(2.0**54)), high)
+    bits = body.bits(raised)
+    # The exponent of the number divided by sqrt(1/2) leaves m between sqrt(1/2) and sqrt(2).
+    offset = body.word_op("sub", bits, body.integer(_SQRT_HALF_BITS))
+    exponent = body.word_op("ashr", offset, body.integer(52))
+    removed = body.word_op("shl", exponent, body.integer(52))
+    m = body.from_bits(body.word_op("sub", bits, removed))
+    m_low = None if low is None else _scaled_low(body, high, low, removed)
+    count = body.let(f"sitofp {body.word} {exponent} to {body.real}")
+    count = body.select(subnormal, body.subtract(count, body.number(54.0)), count)
+    if doubled is not None:
+        count = body.select(doubled, body.add(count, body.number(1.0)), count)
+
+    # s = (m - 1) / (m + 1), its rounding error, its square
+    over = body.subtract(m, body.number(1.0))
+    under, under_rest = body.two_sum(m, body.number(1.0))
+    over_rest = body.number(0.0)
+    if m_low is not None:
+        over, over_rest = body.two_sum(over, m_low)
+        under_rest = body.add(under_rest, m_low)
+    s = body.divide(over, under)
+    minus = body.negate(s)
+    left = body.add(body.fma(minus, under, over), body.fma(minus, under_rest, over_rest))
+    s_low = body.divide(left, under)
+    z, z_low = body.two_product(s, s)
+    z_low = body.fma(body.add(s, s), s_low, z_low)
+
+    # atanh(s) / s - 1 = z/3 + z z f(z)
+    tail = body.multiply(body.multiply(z, z), body.polynomial(z, LOGARITHM))
+    third, third_low = body.two_product(z, body.number(THIRD[0]))
+    third_low = body.fma(z, body.number(THIRD[1]), body.fma(z_low, body.number(THIRD[0]), third_low))
+    curve, curve_low = body.fast_two_sum(third, tail)
+    curve_low = body.add(curve_low, third_low)
+
+    # k ln 2 + 2 s + 2 s curve
+    twice, twice_low = body.add(s, s), body.add(s_low, s_low)
+    bend, bend_low = body.two_product(twice, curve)
+    bend_low = body.fma(twice, curve_low, body.fma(twice_low, curve, bend_low))
+    shift, shift_low = body.two_product(count, body.number(LN2[0]))
+    shift_low = body.fma(count, body.number(LN2[1]), shift_low)
+    total, error = body.two_sum(shift, twice)
+    total, more = body.two_sum(total, bend)
+    small = body.add(body.add(error, more), body.add(body.add(shift_low, twice_low), bend_low))
+    return body.fast_two_sum(total, small)
+
+
+def _scaled_low(body: Body, high: str, low: str, removed: str) -> str:
+    """``low`` divided by the power of two that ``high`` was divided by."""
+    inverse = body.from_bits(body.word_op("sub", body.integer(1023 << 52), removed))
+    # The power has no reciprocal at the top of the range, where a low part does not matter.
+    large = body.compare("ogt", high, body.number(2.0**1000))
+    return body.select(large, body.number(0.0), body.multiply(low, inverse))
+
+
+def _square_root(body: Body, high: str, low: str) -> tuple[str, str]:
+    """Square root of an unevaluated pair, as such a pair."""
+    root = body.intrinsic("sqrt", high)
+    left = body.add(body.fma(body.negate(root), root, high), low)
+    rest = body.divide(left, body.add(root, root))
+    return root, body.select(body.compare("oeq", high, body.number(0.0)), body.number(0.0), rest)
+
+
+def _finite_or_zero(body: Body, x: str) -> str:
+    """``x``, or zero where it is infinite or NaN."""
+    finite = body.compare("olt", body.absolute(x), body.number(_INFINITY))
+    return body.select(finite, x, body.number(0.0))
+
+
+def _ends(body: Body, argument: str, result: str) -> str:
+    """The logarithm's values at zero, infinity, NaN and below zero."""
+    zero = body.compare("oeq", argument, body.number(0.0))
+    result = body.select(zero, body.number(-_INFINITY), result)
+    endless = body.compare("oeq", argument, body.number(_INFINITY))
+    result = body.select(endless, body.number(_INFINITY), result)
+    valid = body.compare("oge", argument, body.number(0.0))
+    return body.select(valid, result, body.number(float("nan")))

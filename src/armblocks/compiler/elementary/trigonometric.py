@@ -1,0 +1,225 @@
+"""Sine, cosine, tangent.
+
+The argument is brought to ``|r| <= pi/4`` by subtracting ``k pi/2`` in three parts with fused multiply-adds (Cody
+and Waite): the first difference is exact, and what the second rounds off is kept beside ``r``. That holds up to
+``|x| = 2**31``. Beyond, ``2/pi`` is multiplied bit by bit around the binary point (Payne and Hanek 1983), in one
+lane; a block of samples with such an angle is evaluated again with one lane.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from armblocks.compiler.elementary.coefficients import (
+    COSINE,
+    HALF_PI,
+    ROUNDER,
+    SINE,
+    TWO_OVER_PI,
+    TWO_OVER_PI_WORDS,
+)
+from armblocks.compiler.ir_text import Body, Module
+
+_MODERATE = 2.0**31
+_SIGN_BIT = 1 << 63
+_HUGE = "armblocks_reduce_huge_angle"
+_HUGE_TYPE = "{ double, double, i64 }"
+
+
+class _Reduced(NamedTuple):
+    """``|x| = quarter pi/2 + angle + rest``; the quarter's two lowest bits count."""
+
+    angle: str
+    rest: str
+    quarter: str
+
+
+def sine_cosine(body: Body, x: str) -> tuple[str, str]:
+    """``sin x, cos x``."""
+    reduced = _reduce(body, body.absolute(x))
+    squared = body.multiply(reduced.angle, reduced.angle)
+    high, low = _sine_parts(body, reduced, squared)
+    one, rest = _cosine_parts(body, reduced, squared)
+    plain_sine, plain_cosine = body.add(high, low), body.add(one, rest)
+    odd = _is_odd(body, reduced.quarter)
+    sine = _signed(body, body.select(odd, plain_cosine, plain_sine), _sine_sign(body, x, reduced.quarter))
+    cosine = _signed(body, body.select(odd, plain_sine, plain_cosine), _cosine_sign(body, reduced.quarter))
+    return sine, cosine
+
+
+def sine(body: Body, x: str) -> str:
+    """``sin x``."""
+    return sine_cosine(body, x)[0]
+
+
+def cosine(body: Body, x: str) -> str:
+    """``cos x``."""
+    return sine_cosine(body, x)[1]
+
+
+def tangent(body: Body, x: str) -> str:
+    """``tan x``: sine by cosine, both with what their last addition rounds off."""
+    reduced = _reduce(body, body.absolute(x))
+    squared = body.multiply(reduced.angle, reduced.angle)
+    sine, sine_rest = body.fast_two_sum(*_sine_parts(body, reduced, squared))
+    cosine, cosine_rest = body.fast_two_sum(*_cosine_parts(body, reduced, squared))
+    odd = _is_odd(body, reduced.quarter)
+    over, over_rest = body.select(odd, cosine, sine), body.select(odd, cosine_rest, sine_rest)
+    under, under_rest = body.select(odd, sine, cosine), body.select(odd, sine_rest, cosine_rest)
+    quotient = body.divide(over, under)
+    minus = body.negate(quotient)
+    left = body.fma(minus, under, over)
+    left = body.add(left, body.fma(minus, under_rest, over_rest))
+    result = body.add(quotient, body.divide(left, under))
+    flipped = body.word_op("shl", reduced.quarter, body.integer(63))
+    return _signed(body, result, body.word_op("xor", flipped, _sign_of(body, x)))
+
+
+def _reduce(body: Body, magnitude: str) -> _Reduced:
+    rounded = body.fma(magnitude, body.number(TWO_OVER_PI), body.number(ROUNDER))
+    count = body.subtract(rounded, body.number(ROUNDER))
+    first = body.fma(count, body.number(-HALF_PI[0]), magnitude)
+    angle = body.fma(count, body.number(-HALF_PI[1]), first)
+    rest = body.fma(count, body.number(-HALF_PI[1]), body.subtract(first, angle))
+    rest = body.fma(count, body.number(-HALF_PI[2]), rest)
+    quarter = body.bits(rounded)
+    huge = body.compare("ogt", magnitude, body.number(_MODERATE))
+    if body.lanes > 1:
+        body.doubt(huge)
+        return _Reduced(angle, rest, quarter)
+
+    def write() -> list[str]:
+        body.module.define(_HUGE, lambda: _write_huge(body.module))
+        parts = body.let(f"call {_HUGE_TYPE} @{_HUGE}(double {magnitude})")
+        return [body.let(f"extractvalue {_HUGE_TYPE} {parts}, {k}") for k in range(3)]
+
+    usual = (("double", angle), ("double", rest), ("i64", quarter))
+    return _Reduced(*body.rarely(huge, usual, write))
+
+
+def _sine_parts(body: Body, reduced: _Reduced, squared: str) -> tuple[str, str]:
+    cubed = body.multiply(reduced.angle, squared)
+    return reduced.angle, body.fma(cubed, body.polynomial(squared, SINE), reduced.rest)
+
+
+def _cosine_parts(body: Body, reduced: _Reduced, squared: str) -> tuple[str, str]:
+    factor = body.fma(squared, body.polynomial(squared, COSINE), body.number(-0.5))
+    slope = body.negate(body.multiply(reduced.angle, reduced.rest))
+    return body.number(1.0), body.fma(squared, factor, slope)
+
+
+def _is_odd(body: Body, quarter: str) -> str:
+    lowest = body.word_op("and", quarter, body.integer(1))
+    return body.word_test("ne", lowest, body.integer(0))
+
+
+def _sign_of(body: Body, x: str) -> str:
+    return body.word_op("and", body.bits(x), body.integer(_SIGN_BIT))
+
+
+def _sine_sign(body: Body, x: str, quarter: str) -> str:
+    """Sine is odd, and negative in quarters 2 and 3."""
+    moved = body.word_op("shl", quarter, body.integer(62))
+    return body.word_op("and", body.word_op("xor", moved, body.bits(x)), body.integer(_SIGN_BIT))
+
+
+def _cosine_sign(body: Body, quarter: str) -> str:
+    """Cosine is negative in quarters 1 and 2: where the two bits differ."""
+    next_one = body.word_op("add", quarter, body.integer(1))
+    moved = body.word_op("shl", next_one, body.integer(62))
+    return body.word_op("and", moved, body.integer(_SIGN_BIT))
+
+
+def _signed(body: Body, value: str, sign: str) -> str:
+    return body.from_bits(body.word_op("xor", body.bits(value), sign))
+
+
+def _write_huge(module: Module) -> str:
+    """Text of the reduction of ``|x| >= 2**31``, infinity and NaN included, for one lane.
+
+    With ``|x| = mantissa 2**exponent``, the bits of 2/pi that weigh 4 or more in the product change the quarter
+    by multiples of four, so that a window of 192 bits below them decides; the error is below 2**-137, and no
+    double is nearer to a multiple of pi/2 than 2**-61 of a quarter.
+    """
+    module.add(
+        "armblocks_two_over_pi",
+        f"@armblocks_two_over_pi = internal constant [{len(TWO_OVER_PI_WORDS) + 1} x i64] ["
+        + ", ".join(f"i64 {word}" for word in (0, *TWO_OVER_PI_WORDS))
+        + "]",
+    )
+    body = Body(module)
+    bits = body.bits("%x")
+    fraction = body.word_op("and", bits, str((1 << 52) - 1))
+    mantissa = body.word_op("or", fraction, str(1 << 52))
+    biased = body.word_op("lshr", bits, "52")
+    # One word of zeros stands before the table, so that the window may begin above the binary point.
+    begin = body.word_op("sub", biased, str(1075 + 2 - 64))
+    place, shift = body.word_op("lshr", begin, "6"), body.word_op("and", begin, "63")
+    words = [_table_word(body, place, k) for k in range(4)]
+    back = body.word_op("sub", "63", shift)
+    window = [
+        body.word_op(
+            "or",
+            body.word_op("shl", words[k], shift),
+            body.word_op("lshr", body.word_op("lshr", words[k + 1], "1"), back),
+        )
+        for k in range(3)
+    ]
+    high, middle, low = _low_192_bits(body, mantissa, window)
+    # Two bits of quarter, then the fraction of a quarter; rounding to the nearest quarter makes it signed.
+    # (Complementing all bits negates but for one unit of 2**-128.)
+    upper = body.word_op("or", body.word_op("shl", high, "2"), body.word_op("lshr", middle, "62"))
+    lower = body.word_op("or", body.word_op("shl", middle, "2"), body.word_op("lshr", low, "62"))
+    negative = body.word_op("ashr", upper, "63")
+    quarter = body.word_op("sub", body.word_op("lshr", high, "62"), negative)
+    upper, lower = body.word_op("xor", upper, negative), body.word_op("xor", lower, negative)
+    turn, rest = _sum_of_words(body, upper, lower)
+    angle, error = body.two_product(turn, body.number(HALF_PI[0]))
+    error = body.fma(turn, body.number(HALF_PI[1]), body.fma(rest, body.number(HALF_PI[0]), error))
+    angle, error = body.fast_two_sum(angle, error)
+    sign = body.word_op("and", negative, str(-(1 << 63)))
+    endless = body.compare("oeq", "%x", body.number(float("inf")))
+    angle = body.select(endless, body.number(float("nan")), _signed(body, angle, sign))
+    error = _signed(body, error, sign)
+    value = body.let(f"insertvalue {_HUGE_TYPE} poison, double {angle}, 0")
+    value = body.let(f"insertvalue {_HUGE_TYPE} {value}, double {error}, 1")
+    value = body.let(f"insertvalue {_HUGE_TYPE} {value}, i64 {quarter}, 2")
+    body.do(f"ret {_HUGE_TYPE} {value}")
+    head = f"define internal {_HUGE_TYPE} @{_HUGE}(double %x) noinline cold nounwind {{"
+    return "\n".join([head, "entry:", *body.lines, "}"])
+
+
+def _table_word(body: Body, place: str, offset: int) -> str:
+    index = body.word_op("add", place, str(offset))
+    address = body.let(f"getelementptr inbounds i64, ptr @armblocks_two_over_pi, i64 {index}")
+    return body.let(f"load i64, ptr {address}, align 8")
+
+
+def _low_192_bits(body: Body, factor: str, words: list[str]) -> tuple[str, str, str]:
+    """``factor`` times the 192-bit number of three words (highest first), modulo 2**192."""
+    wide = body.let(f"zext i64 {factor} to i128")
+    products = [
+        body.let(f"mul i128 {wide}, {body.let(f'zext i64 {word} to i128')}") for word in (words[1], words[2])
+    ]
+    carried = body.let(f"lshr i128 {products[1]}, 64")
+    low = body.let(f"trunc i128 {products[1]} to i64")
+    joined = body.let(f"add i128 {products[0]}, {carried}")
+    middle = body.let(f"trunc i128 {joined} to i64")
+    carry = body.let(f"trunc i128 {body.let(f'lshr i128 {joined}, 64')} to i64")
+    high = body.word_op("add", body.word_op("mul", factor, words[0]), carry)
+    return high, middle, low
+
+
+def _sum_of_words(body: Body, upper: str, lower: str) -> tuple[str, str]:
+    """``(upper 2**64 + lower) / 2**128`` as an unevaluated pair of doubles."""
+    pieces: list[str] = []
+    for word, exponent in ((upper, -32), (lower, -96)):
+        for part, scale in (
+            (body.word_op("lshr", word, "32"), 2.0**exponent),
+            (body.word_op("and", word, str((1 << 32) - 1)), 2.0 ** (exponent - 32)),
+        ):
+            number = body.let(f"uitofp i64 {part} to double")
+            pieces.append(body.multiply(number, body.number(scale)))
+    total, error = body.fast_two_sum(pieces[0], pieces[1])
+    total, more = body.two_sum(total, pieces[2])
+    return body.fast_two_sum(total, body.add(body.add(error, more), pieces[3]))
