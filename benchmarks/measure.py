@@ -1,0 +1,86 @@
+"""How the benchmarks measure: repeats in turn, medians, and what machine it was."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds of one unit of work over several repeats."""
+
+    median: float
+    best: float
+
+    def per(self, count: int) -> Timing:
+        return Timing(self.median / count, self.best / count)
+
+
+def in_turn(works: Sequence[Callable[[], object]], repeats: int, warm: int = 1) -> list[Timing]:
+    """Time the works A B A B …, so that a drift of the machine hits all of them alike."""
+    for work in works:
+        for _ in range(warm):
+            work()
+    seconds: list[list[float]] = [[] for _ in works]
+    for _ in range(repeats):
+        for place, work in enumerate(works):
+            start = time.perf_counter()
+            work()
+            seconds[place].append(time.perf_counter() - start)
+    return [Timing(statistics.median(row), min(row)) for row in seconds]
+
+
+def process_in_turn(
+    commands: Sequence[Sequence[str]], repeats: int, env: dict[str, str] | None = None
+) -> list[Timing]:
+    """Wall time of whole processes, in turn."""
+
+    def run(command: Sequence[str]) -> Callable[[], object]:
+        return lambda: subprocess.run(
+            command, check=True, env={**os.environ, **(env or {})}, stdout=subprocess.DEVNULL
+        )
+
+    return in_turn([run(command) for command in commands], repeats)
+
+
+def reachable_peak() -> float:
+    """Multiplies and adds per second that one core reaches in a large matrix product (a fma is two)."""
+    n = 1024
+    a, b = (np.random.default_rng(seed).standard_normal((n, n)) for seed in (0, 1))
+    with threadpool_limits(1):
+        [timing] = in_turn([lambda: a @ b], 7)
+    return 2.0 * n**3 / timing.best
+
+
+def cpu_name() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(":")[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def machine_lines(packages: Sequence[str]) -> list[str]:
+    """The machine and the versions, for the head of the table."""
+    versions = ", ".join(f"{name} {importlib.metadata.version(name)}" for name in packages)
+    return [
+        f"{cpu_name()}, {os.cpu_count()} cores, {platform.system()} {platform.release()}, "
+        f"Python {platform.python_version()}",
+        versions,
+        f"load average at the start {os.getloadavg()[0]:.2f}",
+    ]
+
+
+PYTHON = sys.executable

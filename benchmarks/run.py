@@ -1,0 +1,162 @@
+"""Run every measure beside the peers and write RESULTS.md.
+
+    python benchmarks/run.py [--quick] [--only dynamics,diagram,startup]
+
+Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake). Peers and armblocks run in turn, in one run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+from collections.abc import Sequence
+from pathlib import Path
+
+import paper_model
+import startup
+from measure import machine_lines, reachable_peak
+
+import dynamics
+
+HERE = Path(__file__).parent
+KERNELS = ("fkine", "jacob0", "rne", "inertia", "gravload", "coriolis", "accel")
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    return ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)]
+
+
+def nanoseconds(seconds: float) -> str:
+    return f"{seconds * 1e9:,.1f} ns"
+
+
+def comparison_rows(rows: Sequence[dynamics.Comparison]) -> list[list[str]]:
+    return [
+        [
+            row.what,
+            row.peer,
+            nanoseconds(row.theirs.median),
+            nanoseconds(row.ours.median),
+            f"{row.ratio:.1f} x",
+            f"{row.target:g} x",
+            "met" if row.ratio >= row.target else "missed",
+        ]
+        for row in rows
+    ]
+
+
+def dynamics_part(repeats: int) -> list[str]:
+    lines = ["## Robot kernels", ""]
+    comparisons, agreements, counts = [], [], []
+    peak = reachable_peak()
+    for name in ("puma560", "kr180"):
+        case = dynamics.Case(name)
+        agreements += [[row.what, f"{row.error:.1e}"] for row in case.agreement()]
+        comparisons += case.batches(repeats) + case.singles(4 * repeats)
+        counts += [[f"{name} {kernel}", *dynamics.share(case, kernel, peak, repeats)] for kernel in KERNELS]
+    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", ""]
+    lines += table(head, comparison_rows(comparisons))
+    lines += [
+        "",
+        "Per evaluation, medians. The robots are frictionless here, because Pinocchio has no friction.",
+    ]
+    lines += [
+        "",
+        "### The same numbers",
+        "",
+        *table(["what", "largest difference to Pinocchio, relative"], agreements),
+    ]
+    lines += ["", "### Operations per evaluation, and the share of the core's arithmetic peak", ""]
+    lines += table(
+        ["kernel", "multiplies", "adds", "fused", "divisions, roots", "functions", "batch", "share of peak"],
+        counts,
+    )
+    lines += [
+        "",
+        f"Peak: {peak / 1e9:.1f} G multiplies and adds per second, reached by one core in a 1024 x 1024 "
+        "matrix product. A fused operation counts as one multiply and one add; divisions, roots and the "
+        "arithmetic inside sin and cos are not counted, so the share is a lower bound.",
+    ]
+    return lines
+
+
+def diagram_part(repeats: int) -> list[str]:
+    theirs, ours = paper_model.compare(repeats)
+    ratio = theirs.median / ours.median
+    row = [
+        "kr180model, 10 s at 10 ms, run without compile",
+        "Drake, native systems",
+        f"{theirs.median * 1e3:.2f} ms",
+        f"{ours.median * 1e3:.4f} ms",
+        f"{ratio:.0f} x",
+        "500 x",
+        "met" if ratio >= 500 else "missed",
+    ]
+    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", ""]
+    return [
+        "## Block diagrams",
+        "",
+        *table(head, [row]),
+        "",
+        *(paper_model.__doc__ or "").strip().splitlines()[2:],
+    ]
+
+
+def startup_part(repeats: int) -> list[str]:
+    numpy, armblocks = startup.imports(3 * repeats)
+    cold, warm = startup.first_result(repeats)
+    report = startup.whole_report(repeats)
+    extra = armblocks.median - numpy.median
+    rows = [
+        ["`import armblocks`, beyond `import numpy`", f"{extra:.3f} s", "0.10 s", extra <= 0.10],
+        ["process start → first rne, empty cache", f"{cold.median:.3f} s", "0.8 s", cold.median <= 0.8],
+        ["process start → first rne, cached", f"{warm.median:.3f} s", "0.25 s", warm.median <= 0.25],
+        [
+            "`armblocks run kr180model`, cached, all figures",
+            f"{report.median:.2f} s",
+            "3 s",
+            report.median <= 3,
+        ],
+    ]
+    lines = [
+        "## Start-up",
+        "",
+        *table(
+            ["what", "armblocks", "target", ""], [[a, b, c, "met" if d else "missed"] for a, b, c, d in rows]
+        ),
+    ]
+    return [*lines, "", f"`import numpy` alone: {numpy.median:.3f} s. Whole processes, medians."]
+
+
+PARTS = {"dynamics": dynamics_part, "diagram": diagram_part, "startup": startup_part}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer repeats, result printed and not written")
+    parser.add_argument("--only", default=",".join(PARTS), help="parts, separated by commas")
+    arguments = parser.parse_args()
+    repeats = 3 if arguments.quick else 9
+    lines = [
+        "# Measured",
+        "",
+        f"{datetime.date.today().isoformat()}, by `python benchmarks/run.py`.",
+        "",
+        *[
+            f"- {line}"
+            for line in machine_lines(["armblocks", "numpy", "casadi", "llvmlite", "pin", "drake"])
+        ],
+    ]
+    for name in arguments.only.split(","):
+        lines += ["", *PARTS[name](repeats)]
+    notes = HERE / "NOTES.md"
+    if notes.exists():
+        lines += ["", notes.read_text().rstrip()]
+    text = "\n".join(lines) + "\n"
+    print(text)
+    if not arguments.quick and set(arguments.only.split(",")) == set(PARTS):
+        (HERE / "RESULTS.md").write_text(text)
+
+
+if __name__ == "__main__":
+    main()

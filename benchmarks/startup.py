@@ -1,0 +1,50 @@
+"""What a user waits for at the start: import, first result, the whole report."""
+
+from __future__ import annotations
+
+import tempfile
+
+from measure import PYTHON, Timing, process_in_turn
+
+FIRST_RNE = "import armblocks as ab; arm = ab.load_robot('puma560'); arm.rne([0]*6, [0]*6, [1]*6)"
+
+
+def imports(repeats: int) -> tuple[Timing, Timing]:
+    """Whole processes: ``import numpy``, ``import armblocks``."""
+    numpy, armblocks = process_in_turn(
+        [[PYTHON, "-c", "import numpy"], [PYTHON, "-c", "import armblocks"]], repeats
+    )
+    return numpy, armblocks
+
+
+def first_result(repeats: int) -> tuple[Timing, Timing]:
+    """Process start → first rne of the Puma: with an empty cache each time, and with a warm one."""
+    cold = []
+    for _ in range(repeats):
+        with tempfile.TemporaryDirectory() as folder:
+            [timing] = process_in_turn_cold(folder)
+            cold.append(timing.best)
+    cold.sort()
+    with tempfile.TemporaryDirectory() as folder:
+        [warm] = process_in_turn([[PYTHON, "-c", FIRST_RNE]], repeats, env={"ARMBLOCKS_CACHE_DIR": folder})
+    return Timing(cold[len(cold) // 2], cold[0]), warm
+
+
+def process_in_turn_cold(folder: str) -> list[Timing]:
+    """One process with an empty cache (no warm-up)."""
+    import os
+    import subprocess
+    import time
+
+    begin = time.perf_counter()
+    subprocess.run([PYTHON, "-c", FIRST_RNE], check=True, env={**os.environ, "ARMBLOCKS_CACHE_DIR": folder})
+    seconds = time.perf_counter() - begin
+    return [Timing(seconds, seconds)]
+
+
+def whole_report(repeats: int) -> Timing:
+    """``armblocks run kr180model`` with all figures, from process start to the end, caches warm."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [PYTHON, "-m", "armblocks", "run", "kr180model", "--out", f"{folder}/report"]
+        [timing] = process_in_turn([command], repeats)
+    return timing

@@ -1,0 +1,61 @@
+"""Robots and diagrams by name or path, and what is there to choose from."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram
+from armblocks.face.arm import Arm
+from armblocks.files import write_atomically
+from armblocks.robot import FrictionModel, Robot
+
+
+def load_robot(
+    name_or_path: str | PathLike[str],
+    *,
+    name: str | None = None,
+    friction_model: FrictionModel | str | None = None,
+) -> Arm:
+    """A shipped robot by name (``"kr180"``), or a robot from a file (``.json``, a toolbox script ``.m``).
+
+    ``name`` picks one of several robots in a script. ``friction_model``: the formula of another toolbox
+    release, see :class:`FrictionModel`; the file's own when left out. Raises UnknownNameError for a name that
+    is not shipped, FormatError for a file that cannot be read.
+    """
+    arm = Arm(formats.load_robot(name_or_path, name=name))
+    return arm if friction_model is None else arm.with_friction_model(friction_model)
+
+
+def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
+    """Write a robot as canonical JSON, all or nothing; returns the path."""
+    target = Path(path)
+    write_atomically(target, formats.write_robot(robot.robot if isinstance(robot, Arm) else robot))
+    return target
+
+
+def load_diagram(name_or_path: str | PathLike[str]) -> Diagram:
+    """A shipped example by name (``"kr180model"``), or a diagram from a ``.json`` file."""
+    return formats.load_diagram(name_or_path, BLOCKS)
+
+
+def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
+    """Write a diagram as canonical JSON, all or nothing; returns the path."""
+    return formats.write_diagram(path, diagram)
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names of the shipped robots."""
+    return formats.list_robots()
+
+
+def list_examples() -> tuple[str, ...]:
+    """Names of the shipped diagrams."""
+    return formats.list_examples()
+
+
+def list_blocks() -> tuple[str, ...]:
+    """Type names of all blocks."""
+    return tuple(BLOCKS)

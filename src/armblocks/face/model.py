@@ -1,0 +1,113 @@
+"""Running a diagram: traced and compiled once, run as often as wanted with other parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+import weakref
+from collections.abc import Mapping
+from functools import cached_property
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.compiler.system import CompiledSystem, compile_system
+from armblocks.diagram import Diagram, trace_diagram, with_parameters
+from armblocks.equations import HybridSystem, SimulationOptions
+from armblocks.errors import UnknownNameError
+from armblocks.face.loading import load_diagram
+from armblocks.simulation import SimulationResult
+from armblocks.simulation import simulate as run_system
+from armblocks.simulation.simulate import Progress
+
+
+class CompiledDiagram:
+    """A diagram with its equations and its native code, made when first needed."""
+
+    def __init__(self, diagram: Diagram) -> None:
+        self.diagram = diagram
+
+    @cached_property
+    def system(self) -> HybridSystem:
+        """The diagram as equations."""
+        return trace_diagram(self.diagram)
+
+    @cached_property
+    def compiled(self) -> CompiledSystem:
+        """The equations as native code."""
+        return compile_system(self.system)
+
+    def simulate(
+        self,
+        options: SimulationOptions | None = None,
+        *,
+        parameters: Mapping[str, object] | None = None,
+        progress: Progress | None = None,
+    ) -> SimulationResult:
+        """Run once; see :func:`simulate`."""
+        if not parameters:
+            return run_system(self.compiled, options or self.diagram.settings, progress=progress)
+        changed = with_parameters(self.diagram, parameters)
+        values = self._retuned(changed, parameters)
+        if values is None:
+            return CompiledDiagram(changed).simulate(options, progress=progress)
+        return run_system(
+            self.compiled, options or self.diagram.settings, parameters=values, progress=progress
+        )
+
+    def _retuned(self, changed: Diagram, parameters: Mapping[str, object]) -> NDArray[np.float64] | None:
+        """The parameter vector with the new values, or ``None`` where a structural parameter changes."""
+        layout, values = self.system.parameters, self.system.parameter_values.copy()
+        for path in parameters:
+            block, _, name = path.rpartition(".")
+            value: NDArray[np.float64] = np.asarray(changed.blocks[block].parameter_value(name))
+            if path not in layout.ranges or value.shape != layout[path].shape:
+                return None
+            values[layout.ranges[path]] = value.ravel()
+        return values
+
+
+_compiled: dict[int, CompiledDiagram] = {}
+
+
+def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
+    """The compiled form of a diagram, the same one as long as the diagram object lives."""
+    if not isinstance(diagram, Diagram):
+        return CompiledDiagram(load_diagram(diagram))
+    known = _compiled.get(id(diagram))
+    if known is None:
+        # By identity, because comparing by content would cost more than a run; forgotten with the diagram, of
+        # which the entry therefore holds a copy.
+        _compiled[id(diagram)] = known = CompiledDiagram(dataclasses.replace(diagram))
+        weakref.finalize(diagram, _compiled.pop, id(diagram), None)
+    return known
+
+
+def simulate(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    *,
+    parameters: Mapping[str, object] | None = None,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> SimulationResult:
+    """Run a diagram and return its recorded signals.
+
+    ``diagram`` an object, a shipped example's name or a path. ``settings`` override those of the diagram by
+    the names of :class:`SimulationOptions`: ``stop_time``, ``solver``, ``step``, ``sample_time``,
+    ``max_step``, ``rtol``, ``atol``. ``parameters`` gives other values to parameters of blocks,
+    ``{"jtraj.tmax": 5.0}``; tunable ones need no new compilation. ``progress(time, fraction,
+    real_time_factor)`` is called now and then during a long run.
+
+    Raises InputError for a setting out of range, UnknownNameError for an unknown one, SimulationError (with
+    the ``partial`` result) where the run cannot go on.
+    """
+    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    if not settings:
+        return model.simulate(parameters=parameters, progress=progress)
+    known = [field.name for field in dataclasses.fields(SimulationOptions)]
+    for name in settings:
+        if name not in known:
+            raise UnknownNameError("setting", name, known, where="simulate")
+    options = dataclasses.replace(model.diagram.settings, **settings)
+    return model.simulate(options, parameters=parameters, progress=progress)

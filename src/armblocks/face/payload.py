@@ -1,0 +1,37 @@
+"""What the tool carries: a run-time input of the dynamics, never a reason to compile again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Payload:
+    """A rigid body fixed to the tool.
+
+    ``mass`` kg; ``centre`` (3,) m: its centre of mass in the tool frame; ``inertia`` (6,) kg m2: xx yy zz xy
+    yz xz about that centre, along the tool axes (the toolbox's order).
+    """
+
+    mass: float
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        vector = self.vector()
+        if vector.shape != (10,) or not np.isfinite(vector).all():
+            raise InputError(
+                f"payload {self} is not made of 1 + 3 + 6 finite numbers",
+                allowed="mass, centre (x, y, z), inertia (xx, yy, zz, xy, yz, xz)",
+            )
+        if self.mass < 0:
+            raise InputError(f"payload mass {self.mass} kg is negative", allowed="zero or more")
+
+    def vector(self) -> NDArray[np.float64]:
+        """The ten numbers in the order that the compiled dynamics take."""
+        return np.array([self.mass, *self.centre, *self.inertia], dtype=np.float64)

@@ -1,0 +1,58 @@
+"""A robot as a notebook shows it: picture and table, in one piece of HTML that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from armblocks.robot import Link, Robot
+
+STYLE = """
+.ab-robot{font:13px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif;color:inherit}
+.ab-robot{display:flex;flex-wrap:wrap;gap:8px 24px;align-items:flex-start;max-width:1120px}
+.ab-robot h3{font-size:15px;margin:0 0 2px;font-weight:600}
+.ab-robot p{margin:0 0 8px;opacity:.78}
+.ab-robot table{border-collapse:collapse;font-variant-numeric:tabular-nums}
+.ab-robot th,.ab-robot td{text-align:right;padding:2px 8px;border-bottom:1px solid rgba(128,128,128,.3)}
+.ab-robot th:first-child,.ab-robot td:first-child{text-align:left}
+"""
+
+HEAD = ("link", "joint", "α °", "a m", "θ °", "d m", "range", "speed", "mass kg", "G")
+
+
+def robot_html(robot: Robot, picture_svg: str) -> str:
+    """``picture_svg`` beside a row for each link: D-H row, limits in degrees or m, mass, gear ratio."""
+    about = " · ".join(text for text in (robot.manufacturer, robot.comment) if text)
+    rows = "".join(_row("td", _cells(link)) for link in robot.links)
+    return (
+        f'<div class="ab-robot"><style>{STYLE}</style>{picture_svg}<div>'
+        f"<h3>{escape(robot.name)}</h3><p>{robot.n} joints {robot.joint_letters}"
+        f"{' · ' + escape(about) if about else ''}</p>"
+        f"<table>{_row('th', HEAD)}{rows}</table></div></div>"
+    )
+
+
+def _row(kind: str, cells: Sequence[str]) -> str:
+    return "<tr>" + "".join(f"<{kind}>{escape(cell)}</{kind}>" for cell in cells) + "</tr>"
+
+
+def _cells(link: Link) -> list[str]:
+    turns = link.joint.unit == "rad"
+    scale, unit = (180 / np.pi, "°") if turns else (1.0, " m")
+    limits = link.joint.limits
+    span = "" if limits.position is None else " … ".join(f"{end * scale:g}" for end in limits.position) + unit
+    speed = "" if limits.speed is None else f"{limits.speed * scale:g}{unit}/s"
+    gear = "" if link.motor is None else f"{link.motor.gear_ratio:g}"
+    return [link.name, link.joint.letter, *_dh_cells(link), span, speed, f"{link.mass:g}", gear]
+
+
+def _dh_cells(link: Link) -> list[str]:
+    """The D-H row, with q in the place of the joint variable; empty where the link has none."""
+    row = link.dh
+    if row is None:
+        return [""] * 4
+    theta = f"{np.degrees(row.theta):g}" if row.sigma else "q"
+    d = "q" if row.sigma else f"{row.d:g}"
+    return [f"{np.degrees(row.alpha):g}", f"{row.a:g}", theta, d]

@@ -1,0 +1,76 @@
+"""Joint-space trajectories as arrays: the toolbox's ``jtraj``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+from armblocks.trajectories import Quintic
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointTrajectory:
+    """Samples of a joint motion: ``t`` (N,) s, ``q`` (N, n) rad or m, ``qd`` and ``qdd`` (N, n) its rates."""
+
+    t: NDArray[np.float64]
+    q: NDArray[np.float64]
+    qd: NDArray[np.float64]
+    qdd: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+
+def jtraj(
+    q0: ArrayLike,
+    qf: ArrayLike,
+    t: ArrayLike | int,
+    qd0: ArrayLike | None = None,
+    qd1: ArrayLike | None = None,
+) -> JointTrajectory:
+    """Quintic motion from ``q0`` to ``qf`` (n,), zero acceleration at both ends.
+
+    ``t`` is either the instants (N,) in s, the first one 0 and the last one the end of the motion, or a count
+    N: then the time is the toolbox's normalised one, ``linspace(0, 1, N)``, and rates are per unit of it.
+    ``qd0``, ``qd1`` (n,): speeds at the ends, zero when left out. Same polynomial as the toolbox's ``jtraj``.
+    """
+    start, goal = _joint_vector("q0", q0), _joint_vector("qf", qf)
+    first = None if qd0 is None else _joint_vector("qd0", qd0)
+    last = None if qd1 is None else _joint_vector("qd1", qd1)
+    for name, vector in (("qf", goal), ("qd0", first), ("qd1", last)):
+        if vector is not None and vector.shape != start.shape:
+            raise InputError(
+                f"{name} has {vector.size} joints", where="jtraj", allowed=f"{start.size}, as q0"
+            )
+    times = _instants(t)
+    motion = Quintic(q0=start, qf=goal, tmax=times[-1:], qd0=first, qd1=last).at(times)
+    return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd)
+
+
+def _joint_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
+    vector = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    if vector.ndim != 1 or not np.isfinite(vector).all():
+        raise InputError(
+            f"{name} = {value!r}", where="jtraj", allowed="a vector of finite joint values, one per joint"
+        )
+    return vector
+
+
+def _instants(t: ArrayLike | int) -> NDArray[np.float64]:
+    if isinstance(t, int):
+        if t < 2:
+            raise InputError(f"t = {t} samples", where="jtraj", allowed="2 or more, or a vector of instants")
+        return np.linspace(0.0, 1.0, t)
+    times = np.asarray(t, dtype=np.float64)
+    rising = times.ndim == 1 and times.size >= 2 and bool((np.diff(times) > 0).all())
+    if not (rising and np.isfinite(times).all() and times[0] == 0.0):
+        raise InputError(
+            f"t of shape {times.shape}",
+            where="jtraj",
+            allowed="rising finite instants that start at 0, or a count of samples",
+            fix="use np.linspace(0, T, N)",
+        )
+    return times

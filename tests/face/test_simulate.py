@@ -1,0 +1,63 @@
+"""Running diagrams from Python."""
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.errors import DiagramError, UnknownNameError
+
+POSITIONS = {  # paper/specification.md: an independent plain-NumPy computation
+    0.0: (1.95, -1.25, -1.85),
+    2.0: (2.36963237462, -0.835183999087, -1.693963015984),
+    5.0: (1.252643063297, 3.318570240624, 0.041710789934),
+    10.0: (-2.949278739196, 1.254698768685, 2.347929043243),
+}
+
+
+@pytest.fixture(scope="module")
+def paper() -> ab.Diagram:
+    return ab.load_diagram("kr180model")
+
+
+def test_the_papers_positions(paper: ab.Diagram) -> None:
+    result = ab.simulate(paper)
+    assert len(result.time) == 1001
+    for t, expected in POSITIONS.items():
+        row = int(np.searchsorted(result.time, t))
+        found = [result[f"T2xyz/{axis}"][row] for axis in "xyz"]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def test_derivative_blocks_are_exact(paper: ab.Diagram) -> None:
+    """The torques fed by du/dt twice equal those of the trajectory's own rates."""
+    result = ab.simulate(paper)
+    path = ab.jtraj([0, 0, 0, 0], [3.14, 0, 1.57, 0], result.time)
+    arm = ab.load_robot("kr180")
+    np.testing.assert_allclose(result["rne/tau"], arm.rne(path.q, path.qd, path.qdd), rtol=1e-9, atol=1e-8)
+
+
+def test_tunable_parameters_reuse_the_compiled_system(paper: ab.Diagram) -> None:
+    model = ab.compile_diagram(paper)
+    compiled = model.compiled
+    shorter = ab.simulate(paper, parameters={"jtraj.tmax": 5.0})
+    assert ab.compile_diagram(paper).compiled is compiled
+    np.testing.assert_allclose(shorter["jtraj/q"][500], [3.14, 0, 1.57, 0], atol=1e-12)
+    np.testing.assert_array_equal(ab.simulate(paper)["jtraj/q"][-1], [3.14, 0, 1.57, 0])
+
+
+def test_unknown_settings_and_parameters_say_the_nearest(paper: ab.Diagram) -> None:
+    with pytest.raises(UnknownNameError, match=r"no setting named 'stoptime'.*did you mean 'stop_time'"):
+        ab.simulate(paper, stoptime=3)
+    with pytest.raises(UnknownNameError, match=r"no block named 'jtrai'.*did you mean 'jtraj'"):
+        ab.simulate(paper, parameters={"jtrai.tmax": 3})
+    with pytest.raises(UnknownNameError, match=r"no parameter named 'tmx'.*did you mean 'tmax'"):
+        ab.simulate(paper, parameters={"jtraj.tmx": 3})
+    with pytest.raises(DiagramError, match=r"jtraj.*tmax"):
+        ab.simulate(paper, parameters={"jtraj.tmax": -3})
+
+
+@pytest.mark.parametrize("name", ab.list_examples())
+def test_every_example_runs_and_shows_itself(name: str) -> None:
+    result = ab.simulate(name, stop_time=0.5)
+    assert result.run.complete
+    assert "<svg" in result._repr_html_()
