@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,8 +38,9 @@ def first_bad_signal(
     memory: a sum of squares that is finite proves them so.
     """
     flat = signals.reshape(-1)
-    if np.isfinite(np.dot(flat, flat)):
-        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        if math.isfinite(np.dot(flat, flat)):
+            return None
     finite = np.isfinite(signals)
     if finite.all():  # only their squares overflow
         return None
