@@ -98,6 +98,13 @@ def test_robot_without_mass_has_no_centre():
         TRACES["centre_of_mass"](bare)
 
 
+@pytest.mark.parametrize("name", TRACES)
+def test_robot_that_cannot_move_is_told(name: str):
+    pole = Robot(name="pole", links=(Link(name="pole", joint=Fixed(), mass=1.0),))
+    with pytest.raises(RobotError, match=f"robot 'pole': no joint moves, so there is no {name}"):
+        TRACES[name](pole)
+
+
 def test_load_on_a_link_that_stands_is_not_felt():
     arm = Robot(name="arm", links=(Link(name="rod", **ROD), Link(name="stand", joint=Fixed(), mass=1.0)))
     load = (np.ones(6), (1.0, 0, 0, 0, 1, 1, 1, 0, 0, 0))

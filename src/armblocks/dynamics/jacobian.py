@@ -8,8 +8,10 @@ from itertools import combinations
 
 from casadi import SX, fabs, fmax, horzcat, sqrt, vertcat
 
-from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose, in_frame
+from armblocks.dynamics.joint_motion import joint_motions
+from armblocks.dynamics.kinematics import Pose, body_poses, constant_pose, frame_pose
 from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.spatial import Transform
 from armblocks.spatial.vectors import ZERO, Scalar, Vector, add, cross, scale, subtract
 
 Column = tuple[Vector, Vector]
@@ -27,12 +29,27 @@ def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
     return _columns(tree, bodies, tool.p)
 
 
-def tool_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
-    """Columns of ``jacobe``: point is the tool's origin, axes are the tool's."""
-    ground = constant_pose(tree.base)
-    bodies = body_poses(tree, q, ground)
-    tool = frame_pose(tree.tool, bodies, ground)
-    return [(in_frame(tool, v), in_frame(tool, w)) for v, w in _columns(tree, bodies, tool.p)]
+def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
+    """Columns of ``jacobe``: point is the tool's origin, axes are the tool's.
+
+    Poses are carried from the tool inwards, so that no rotation into the world and back is formed.
+    """
+    columns: list[Column] = [(ZERO, ZERO)] * tree.n
+    carrier = tree.tool.body
+    joints = joint_motions(tree, q)
+    pose = constant_pose(tree.tool.pose.inverse())
+    for i in () if carrier == BASE else (carrier, *tree.ancestors(carrier)):
+        body, (c, s) = tree.bodies[i], joints[i].turn
+        w = scale(body.turn, pose.z)
+        # The tool's origin is the origin here: z x (0 - p) = p x z.
+        v = add(cross(pose.p, w), scale(body.slide, pose.z))
+        columns[body.joint] = (v, w)
+        x = subtract(scale(c, pose.x), scale(s, pose.y))
+        y = add(scale(s, pose.x), scale(c, pose.y))
+        unturned = Pose(x, y, pose.z, pose.p)
+        parent = unturned.after(Transform(rotation=body.placement.inverse().rotation))
+        pose = parent._replace(p=subtract(pose.p, parent.rotate(joints[i].p)))
+    return columns
 
 
 def _columns(tree: KinematicTree, bodies: Sequence[Pose], tip: Vector) -> list[Column]:
@@ -60,8 +77,8 @@ def yoshikawa(columns: Sequence[Column]) -> SX:
 
     ``sqrt(det(J J'))`` for six joints or more, ``sqrt(det(J' J))`` for fewer (where the toolbox's formula is
     zero). By Cauchy and Binet it is the root of the sum of all squared minors: no cancellation and no
-    division, so it is good to the last digits near a singularity. Source: Yoshikawa, *Manipulability of
-    Robotic Mechanisms*, IJRR 1985.
+    division, so it is good to the last digits near a singularity. Beyond eight joints there are too many of
+    them, and ``det(J J')`` itself is formed. Source: Yoshikawa, *Manipulability of Robotic Mechanisms*, IJRR 1985.
     """
     entries = [list(v + w) for v, w in columns]
     n = len(entries)

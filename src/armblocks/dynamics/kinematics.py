@@ -10,7 +10,7 @@ from casadi import SX, horzcat, vertcat
 from armblocks.dynamics.joint_motion import cos_sin
 from armblocks.robot.tree import BASE, Body, Frame, KinematicTree
 from armblocks.spatial import IDENTITY3, Transform
-from armblocks.spatial.vectors import ZERO, Matrix, Scalar, Turn, Vector, add, rotate, scale
+from armblocks.spatial.vectors import ZERO, Scalar, Turn, Vector, add, scale
 
 
 class Pose(NamedTuple):
@@ -95,14 +95,3 @@ def frame_pose(frame: Frame, bodies: Sequence[Pose], ground: Pose) -> Pose:
     """The pose of a frame that rides on a body or on the base."""
     carrier = ground if frame.body == BASE else bodies[frame.body]
     return carrier.after(frame.pose)
-
-
-def rotation_of(pose: Pose) -> Matrix:
-    """The rotation matrix, by rows."""
-    x, y, z = pose.x, pose.y, pose.z
-    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
-
-
-def in_frame(pose: Pose, a: Vector) -> Vector:
-    """A vector of the axes in which ``pose`` is given, in the axes of ``pose``: R' a."""
-    return rotate((pose.x, pose.y, pose.z), a)

@@ -79,7 +79,7 @@ def trace_jacobe(robot: Robot) -> TracedFunction:
     tree = KinematicTree.of(robot)
 
     def equations(q: SX) -> SX:
-        return jacobian_matrix(tool_columns(tree, entries(q)))
+        return jacobian_matrix(tool_columns(tree, q))
 
     return _trace("jacobe", robot, ("q",), ("J", (6, robot.n), ""), equations)
 
@@ -276,6 +276,12 @@ def _trace(
     output: tuple[str, tuple[int, ...], str],
     equations: Callable[..., SX],
 ) -> TracedFunction:
+    if robot.n == 0:
+        raise RobotError(
+            f"no joint moves, so there is no {name}",
+            where=f"robot '{robot.name}'",
+            allowed="at least one revolute or prismatic joint",
+        )
     return TracedFunction.trace(name, _inputs(robot, inputs), signature(output), equations)
 
 
