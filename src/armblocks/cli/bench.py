@@ -44,7 +44,6 @@ def bench(
         f"{arm.name}, {arm.n} joints; batches of {samples:,}; {os.cpu_count()} processors; "
         f"the least of {_REPEATS} repeats, ns per evaluation",
         style=STRONG,
-        markup=False,
     )
     columns = ("one call", "batch", f"{threads} threads", "multiplies", "adds", "fused", "others")
     rows = table(("method", "left"), *((name, "right") for name in columns))

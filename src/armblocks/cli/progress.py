@@ -50,4 +50,4 @@ class RunProgress:
             self._bar.update(self._task, total=1.0, completed=fraction, where=where)
         elif now - self._told >= _LINE_EVERY:
             self._told = now
-            self._console.print(f"{self._name}: {where} ({fraction:.0%})", markup=False)
+            self._console.print(f"{self._name}: {where} ({fraction:.0%})")

@@ -20,11 +20,16 @@ _DEGREE = float(np.pi / 180.0)
 
 def show(
     robot: Annotated[str, typer.Argument(help="A shipped robot's name, or the path of a robot file.")],
+    name: Annotated[str | None, typer.Option(help="Which robot of a script that makes several.")] = None,
 ) -> None:
     """Print a robot's D-H table, dynamics, limits, gravity, base and tool."""
     import armblocks as ab
+    from armblocks.robot import warn_of_inertias
 
-    print_robot(ab.load_robot(robot).robot, results_console())
+    described = ab.load_robot(robot, name=name).robot
+    # Loading a shipped robot is silent about what is known of it; here it belongs to what is shown.
+    warn_of_inertias(described)
+    print_robot(described, results_console())
 
 
 def print_robot(robot: Robot, console: Console) -> None:
@@ -44,10 +49,10 @@ def _print_heading(robot: Robot, console: Console) -> None:
     short = {"standard": ", stdDH", "modified": ", modDH"}
     rows = short[conventions.pop()] if len(conventions) == 1 else ""
     heading = f"{robot.name} ({robot.n} axis, {robot.joint_letters}{rows})"
-    console.print(heading, style=STRONG, markup=False)
+    console.print(heading, style=STRONG)
     notes = [text for text in (robot.manufacturer, robot.comment) if text]
     if notes:
-        console.print(f" {'; '.join(notes)};", markup=False)
+        console.print(f" {'; '.join(notes)};")
 
 
 def _print_kinematics(robot: Robot, console: Console) -> None:
@@ -55,7 +60,7 @@ def _print_kinematics(robot: Robot, console: Console) -> None:
     if any(link.dh is None for link in robot.links):
         _print_tree(robot, console)
         return
-    console.print("\n".join(dh_lines(robot)), markup=False, soft_wrap=True)
+    console.print("\n".join(dh_lines(robot)), soft_wrap=True)
     console.print("theta and alpha in rad, d and a in m")
 
 
@@ -122,7 +127,7 @@ _MOTORS: Sequence[Row] = (
 def _print_links(robot: Robot, console: Console, title: str, rows: Sequence[Row]) -> None:
     """One column a link, as many side by side as the terminal has room for."""
     width = max([10, *(len(link.name) + 2 for link in robot.links)])
-    fitting = max(1, (console.width - 18) // width)
+    fitting = max(1, (console.width - 16) // width)
     for start in range(0, len(robot.links), fitting):
         links = robot.links[start : start + fitting]
         numbers = table(("", "left"), ("", "left"), *((link.name, "right") for link in links))
@@ -136,20 +141,25 @@ def _print_links(robot: Robot, console: Console, title: str, rows: Sequence[Row]
 def _print_limits(robot: Robot, console: Console) -> None:
     if all(joint.limits == type(joint.limits)() for joint in robot.joints):
         return
+    speeds = any(joint.limits.speed is not None for joint in robot.joints)
+    torques = any(joint.limits.torque is not None for joint in robot.joints)
     limits = table(
-        ("joint", "left"), ("lowest", "right"), ("highest", "right"), ("speed", "right"), ("torque", "right")
+        ("joint", "left"),
+        ("lowest", "right"),
+        ("highest", "right"),
+        *((("speed", "right"),) if speeds else ()),
+        *((("torque", "right"),) if torques else ()),
     )
     for name, joint in zip(robot.joint_names, robot.joints):
         turns = joint.unit == "rad"
         scale, unit = (_DEGREE, "deg") if turns else (1.0, "m")
         low, high = joint.limits.position or (float("nan"), float("nan"))
-        limits.add_row(
-            name,
-            _with_unit(low / scale, unit),
-            _with_unit(high / scale, unit),
-            _with_unit(_or_nan(joint.limits.speed) / scale, f"{unit}/s"),
-            _with_unit(_or_nan(joint.limits.torque), "N m" if turns else "N"),
-        )
+        cells = [_with_unit(low / scale, unit), _with_unit(high / scale, unit)]
+        if speeds:
+            cells.append(_with_unit(_or_nan(joint.limits.speed) / scale, f"{unit}/s"))
+        if torques:
+            cells.append(_with_unit(_or_nan(joint.limits.torque), "N m" if turns else "N"))
+        limits.add_row(name, *cells)
     console.print()
     console.print("Limits", style=STRONG)
     console.print(limits)
@@ -158,11 +168,9 @@ def _print_limits(robot: Robot, console: Console) -> None:
 def _print_frames(robot: Robot, console: Console) -> None:
     console.print()
     gravity = " ".join(f"{_number(part)}" for part in robot.gravity)
-    console.print(
-        f"grav = {gravity} m/s², the acceleration of a falling body (toolbox files: the opposite sign)"
-    )
+    console.print(f"grav = {gravity} m/s², acceleration of a falling body (toolbox: opposite sign)")
     for name, pose in (("base", robot.base), ("tool", robot.tool)):
-        console.print(f"{name} = {_pose_text(pose)}", markup=False)
+        console.print(f"{name} = {_pose_text(pose)}")
 
 
 def _pose_text(pose: Transform) -> str:

@@ -136,4 +136,4 @@ def print_files(files: ReportFiles, console: Console) -> None:
         names.append(f"{len(files.figures)} figures in {files.figures[0].parent.name}")
     console.print()
     console.print(Text.assemble(("report: ", STRONG), str(files.page)), soft_wrap=True)
-    console.print(f"beside it: {', '.join(names)}", markup=False, soft_wrap=True)
+    console.print(f"beside it: {', '.join(names)}", soft_wrap=True)

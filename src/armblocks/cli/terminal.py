@@ -32,14 +32,19 @@ _UNWRAPPED = 100_000
 
 
 def results_console() -> Console:
-    """Standard output: 80 columns when it is no terminal, unless ``COLUMNS`` says otherwise."""
-    return Console(highlight=False)
+    """Standard output: 80 columns when it is no terminal, unless ``COLUMNS`` says otherwise.
+
+    Square brackets are plain text: messages and docstrings hold vectors, not markup.
+    """
+    return Console(highlight=False, markup=False, emoji=False)
 
 
 def messages_console() -> Console:
     """Standard error; lines are wrapped only for a terminal."""
-    console = Console(stderr=True, highlight=False)
-    return console if console.is_terminal else Console(stderr=True, highlight=False, width=_UNWRAPPED)
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    if not console.is_terminal:
+        console.width = _UNWRAPPED
+    return console
 
 
 def table(*columns: tuple[str, str], title: str | None = None) -> Table:
@@ -50,6 +55,7 @@ def table(*columns: tuple[str, str], title: str | None = None) -> Table:
         title_style=STRONG,
         box=box.SIMPLE_HEAD,
         header_style=STRONG,
+        padding=(0, 1, 0, 0),
         pad_edge=False,
         show_edge=False,
     )
