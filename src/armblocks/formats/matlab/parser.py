@@ -289,7 +289,7 @@ class _Parser:
                     row = []
                 continue
             if self._is(","):
-                if not row:
+                if not row or self.tokens[self.position - 1].text == ",":
                     raise self._unexpected("a value")
                 self.position += 1
                 continue
