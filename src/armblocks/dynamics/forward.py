@@ -53,6 +53,8 @@ def check_accelerations_exist(tree: KinematicTree) -> None:
     That is a pivot of the factored inertia matrix (what the joint feels while all joints beyond it are free)
     that is zero, or below it, at several random positions.
     """
+    if tree.n == 0:
+        return
     q = SX.sym("q", tree.n)
     M = crba(tree, joint_motions(tree, q))
     evaluate = Function("M", [q], [horzcat(*(vertcat(*(SX(entry) for entry in row)) for row in M))])

@@ -78,7 +78,8 @@ def yoshikawa(columns: Sequence[Column]) -> SX:
     ``sqrt(det(J J'))`` for six joints or more, ``sqrt(det(J' J))`` for fewer (where the toolbox's formula is
     zero). By Cauchy and Binet it is the root of the sum of all squared minors: no cancellation and no
     division, so it is good to the last digits near a singularity. Beyond eight joints there are too many of
-    them, and ``det(J J')`` itself is formed. Source: Yoshikawa, *Manipulability of Robotic Mechanisms*, IJRR 1985.
+    them, and ``det(J J')`` itself is formed. Source: Yoshikawa, *Manipulability of Robotic Mechanisms*, IJRR
+    1985.
     """
     entries = [list(v + w) for v, w in columns]
     n = len(entries)

@@ -1,0 +1,31 @@
+"""The native code of every quantity against CasADi's interpreter, over batches."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from armblocks.compiler import compile_function
+from armblocks.dynamics import TRACES
+from armblocks.robot import Robot
+from robots_for_tests import RANDOM_ROBOTS, build_puma560, evaluate
+
+BATCH = 11
+"""Not a multiple of any lane count."""
+
+
+@pytest.mark.parametrize("robot", [build_puma560(), RANDOM_ROBOTS[1]], ids=lambda robot: robot.name)
+@pytest.mark.parametrize("name", TRACES)
+def test_kernel_gives_the_traced_numbers(robot: Robot, name: str):
+    traced = TRACES[name](robot)
+    kernel = compile_function(traced)
+    random = np.random.default_rng(0)
+    batch = [random.uniform(-2, 2, (BATCH, *slot.shape)) for slot in traced.inputs]
+    together = np.asarray(kernel(*batch))
+    for k in range(BATCH):
+        sample = [values[k] for values in batch]
+        expected = evaluate(robot, name, *sample)
+        # Other sin and cos, and fused sums: a few roundings of the largest entry, times the condition of M.
+        tolerance = 1e-9 if name.startswith("accel") else 1e-12
+        size = max(1.0, float(np.abs(expected).max()))
+        assert_allclose(together[k], expected, rtol=0, atol=tolerance * size)
+        assert_array_equal(np.asarray(kernel(*sample)), together[k])
