@@ -227,6 +227,7 @@ def test_notebook_view_draws_every_signal_and_says_it_in_words(result: Simulatio
     ]
     assert pictures[0].attrib["role"] == "img"
     assert len(pictures[1].findall("polyline")) == 2
+    assert re.search(r"<i [^>]*>0</i> <i [^>]*>1</i>", html)  # which trace is which component
     assert "Incomplete" not in html
     assert "http" not in html  # nothing is fetched
     assert "Incomplete" in incomplete(result)._repr_html_()
@@ -248,6 +249,8 @@ def test_notebook_view_escapes_names_and_stays_small() -> None:
 
 
 def test_notebook_view_of_constants_wide_signals_and_nothing() -> None:
+    ticks = dataclasses.replace(named("a/y"), signals=np.array([[-1e-7, 0.0, 12_345.0]]))
+    assert drawings(ticks._repr_html_())[0].attrib["aria-label"] == "a/y: from −1e−7 to 12300"
     flat = dataclasses.replace(named("a/y"), signals=np.zeros((1, 3)))
     assert "−" not in drawings(flat._repr_html_())[0].attrib["aria-label"]
     wide = dataclasses.replace(

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.simulation.result import element_names
+
 if TYPE_CHECKING:
     from armblocks.equations import Slot
     from armblocks.simulation.result import SimulationResult
@@ -34,6 +36,8 @@ STYLE = """
 .ab-result figure{margin:0}
 .ab-result figcaption{font-weight:600;overflow-wrap:anywhere}
 .ab-result figcaption span{font-weight:400;opacity:.7}
+.ab-result figcaption b{float:right;font-size:11px}
+.ab-result figcaption i{font-style:normal;margin-left:3px}
 .ab-result svg{width:100%;height:auto;display:block}
 .ab-result svg text{font-size:10px;fill:currentColor;opacity:.75;font-variant-numeric:tabular-nums}
 """
@@ -49,12 +53,11 @@ def result_html(result: SimulationResult) -> str:
         f"{_seconds(report.wall_time)} · {report.real_time_factor:,.0f} × real time"
     )
     parts = [f'<div class="ab-result"><style>{STYLE}</style><h3>{escape(result.name)}</h3><p>{facts}</p>']
+    note = escape(report.message)
     if not report.complete:
-        parts.append(
-            '<p class="ab-note"><strong>Incomplete:</strong> the run did not reach its stop time.</p>'
-        )
-    if report.message:
-        parts.append(f'<p class="ab-note">{escape(report.message)}</p>')
+        note = f"<strong>Incomplete.</strong> {note or 'The run did not reach its stop time.'}"
+    if note:
+        parts.append(f'<p class="ab-note">{note}</p>')
     slots = list(result.signals_layout)
     parts.append('<div class="ab-panels">')
     parts += [_panel(result.time, result[slot.name], slot) for slot in slots[:MOST_PANELS]]
@@ -68,17 +71,30 @@ def result_html(result: SimulationResult) -> str:
 
 def _panel(time: Array, values: Array, slot: Slot) -> str:
     columns = values.reshape(time.size, slot.size)
-    shown = columns[:, _most_telling(columns)]
+    chosen = _most_telling(columns)
+    shown = columns[:, chosen]
     low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 0.0)
     unit = slot.unit or ""
-    shape = "×".join(map(str, slot.shape))
-    what = " · ".join(part for part in (unit, shape and f"{shape}") if part)
-    left_out = slot.size - shown.shape[1]
-    if left_out:
-        what += f" · {shown.shape[1]} of {slot.size} drawn"
+    what = " · ".join(part for part in (unit, "×".join(map(str, slot.shape))) if part)
+    if len(chosen) < slot.size:
+        what += f" · {len(chosen)} of {slot.size} drawn"
     spoken = f"{slot.name}{f' in {unit}' if unit else ''}: from {_tick(low)} to {_tick(high)}"
-    caption = f"<figcaption>{escape(slot.name)} <span>{escape(what)}</span></figcaption>"
+    caption = (
+        f"<figcaption>{escape(slot.name)} <span>{escape(what)}</span>{_legend(slot, chosen)}</figcaption>"
+    )
     return f"<figure>{caption}{_svg(time, shown, low, high, spoken)}</figure>"
+
+
+def _legend(slot: Slot, chosen: list[int]) -> str:
+    """The index of each component in the colour of its trace; nothing for a scalar."""
+    if not slot.shape:
+        return ""
+    names = element_names(slot)
+    labels = (
+        f'<i style="color:{TRACES[k % len(TRACES)]}">{names[component][len(slot.name) + 1 : -1]}</i>'
+        for k, component in enumerate(chosen)
+    )
+    return f" <b>{' '.join(labels)}</b>"
 
 
 def _most_telling(columns: Array) -> list[int]:
@@ -141,8 +157,14 @@ def _outline(time: Array, values: Array, pieces: int = 110) -> tuple[Array, Arra
 
 
 def _tick(value: float) -> str:
-    """Three significant digits, with a real minus sign."""
-    return f"{0.0 if abs(value) < 1e-300 else value:.3g}".replace("-", "−")
+    """Three significant digits, written out from 0.001 to 100 000, with a real minus sign."""
+    rounded = float(f"{0.0 if abs(value) < 1e-300 else value:.3g}")
+    if rounded == 0.0 or 1e-3 <= abs(rounded) < 1e5:
+        text = np.format_float_positional(rounded, trim="-")
+    else:
+        mantissa, _, exponent = f"{rounded:e}".partition("e")
+        text = f"{float(mantissa):g}e{int(exponent)}"
+    return text.replace("-", "−")
 
 
 def _seconds(value: float) -> str:

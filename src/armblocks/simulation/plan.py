@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import SupportsFloat
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -75,7 +75,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
 def _number(
     name: str, value: object, allowed: str, least: float | None = None, above: float | None = None
 ) -> float:
-    if isinstance(value, SupportsFloat) and not isinstance(value, str):
+    if isinstance(value, Real):
         number = float(value)
         high_enough = (least is None or number >= least) and (above is None or number > above)
         if math.isfinite(number) and high_enough:
