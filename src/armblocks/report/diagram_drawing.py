@@ -1,0 +1,229 @@
+"""A diagram as a drawing: blocks that say what they do, wires around them."""
+
+from __future__ import annotations
+
+from armblocks.diagram import Connection, Diagram, PortRef, ViewKind, infer_shapes
+from armblocks.equations import Shape
+from armblocks.report import block_faces
+from armblocks.report.block_faces import FaceShape, Room, Trend
+from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes
+from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text
+from armblocks.report.style import Theme, Tone
+from armblocks.report.svg import svg_file
+from armblocks.report.text_width import shorten, text_width
+from armblocks.report.wire_routing import Net, Obstacle, Point, RoutedNet, WireEnd, route
+from armblocks.simulation.result import SimulationResult
+
+_MARGIN = 22.0
+_ROUNDING = 5.0
+
+
+def diagram_picture(diagram: Diagram, result: SimulationResult | None = None) -> Picture:
+    """The diagram, its sinks showing what the run gave them if a result is given."""
+    placed = boxes(diagram)
+    nets, wires = _nets(diagram, placed)
+    routed = route([_obstacle(box) for box in placed.values()], nets)
+    shapes = infer_shapes(diagram)
+    marks: list[Mark] = []
+    for (source, _), net in zip(wires.items(), routed):
+        marks += _wire(net, shapes.outputs[source.block][source.port], _wire_title(source, wires[source]))
+    for name, box in placed.items():
+        marks.append(Group(tuple(_block(box, _trend(name, box, result))), title=_block_title(name, box)))
+    left, top, right, bottom = _extent(placed, routed)
+    picture = Picture(
+        width=right - left + 2 * _MARGIN,
+        height=bottom - top + 2 * _MARGIN,
+        title=f"Diagram {diagram.name}",
+        description=_in_words(diagram),
+    )
+    sheet = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(sheet, _MARGIN - left, _MARGIN - top)
+    return picture
+
+
+def diagram_svg(
+    diagram: Diagram, result: SimulationResult | None = None, *, theme: Theme | None = None
+) -> str:
+    """:func:`diagram_picture` as an SVG document; ``theme`` ``None`` follows the reader's preference."""
+    return svg_file(diagram_picture(diagram, result), theme=theme)
+
+
+def _nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
+    wires: dict[PortRef, list[PortRef]] = {}
+    for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
+        wires.setdefault(wire.source, []).append(wire.target)
+    nets = [
+        Net(
+            _end(placed[source.block].outputs, source.port),
+            tuple(_end(placed[target.block].inputs, target.port) for target in targets),
+        )
+        for source, targets in wires.items()
+    ]
+    return nets, wires
+
+
+def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
+    spot = next(spot for spot in spots if spot.name == port)
+    return WireEnd(spot.x, spot.y, spot.dx, spot.dy)
+
+
+def _obstacle(box: Box) -> Obstacle:
+    return Obstacle(box.x, box.y, box.width, box.height, _label(box))
+
+
+def _label(box: Box) -> tuple[float, float, float, float]:
+    """The rectangle of the block's name: below it; above for round sums, which wires enter from below."""
+    width = box.name_width
+    if _shape(box) is FaceShape.CIRCLE:
+        return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
+    return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
+
+
+def _shape(box: Box) -> FaceShape:
+    return block_faces.face_size(box.block)[0]
+
+
+def _trend(name: str, box: Box, result: SimulationResult | None) -> Trend | None:
+    wanted = {ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE}
+    view = next((view for view in box.block.views() if view.kind in wanted), None)
+    if result is None or view is None:
+        return None
+    count = len(result.time)
+    return Trend(
+        time=result.time, inputs=tuple(result[f"{name}/{s}"].reshape(count, -1) for s in view.signals)
+    )
+
+
+def _block(box: Box, trend: Trend | None) -> list[Mark]:
+    shape = _shape(box)
+    marks: list[Mark] = [block_faces.outline(shape, box.x, box.y, box.width, box.height, box.flipped)]
+    room = Room(box.x, box.y, box.width, box.height)
+    if shape is FaceShape.CARD:
+        names, room = _port_names(box)
+        marks += names
+    elif shape is FaceShape.CIRCLE:
+        marks += _signs(box)
+    if shape is not FaceShape.BAR:
+        marks += block_faces.face(box.block, room, trend)
+    lx, ly, lw, _ = _label(box)
+    name = shorten(box.name, NAME_SIZE, lw + 1)
+    if shape is FaceShape.CIRCLE:
+        marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
+    else:
+        marks.append(Text(lx + lw / 2, ly + NAME_SIZE + 1, name, NAME_SIZE, Tone.MUTED, "middle"))
+    return marks
+
+
+def _port_names(box: Box) -> tuple[list[Mark], Room]:
+    """Names inside the edges where a side has more than one port, and the room that they leave."""
+    marks: list[Mark] = []
+    taken = {"left": 0.0, "right": 0.0}
+    into, out = block_faces.port_labels(box.block)
+    for spots, labels, side in (
+        (box.inputs, into, "right" if box.flipped else "left"),
+        (box.outputs, out, "left" if box.flipped else "right"),
+    ):
+        if not labels:
+            continue
+        taken[side] = max(text_width(label, PORT_TEXT) for label in labels) + 5
+        for spot, label in zip(spots, labels):
+            x = box.x + 5 if side == "left" else box.x + box.width - 5
+            anchor = "start" if side == "left" else "end"
+            marks.append(Text(x, spot.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))
+    width = box.width - taken["left"] - taken["right"]
+    return marks, Room(box.x + taken["left"], box.y, width, box.height)
+
+
+def _signs(box: Box) -> list[Mark]:
+    """Plus and minus of a sum beside its ports, inside the circle."""
+    signs = str(getattr(box.block, "signs", ""))
+    marks: list[Mark] = []
+    for sign, spot in zip(signs, box.inputs):
+        x, y = spot.x + 8.0 * spot.dx, spot.y + 8.0 * spot.dy
+        marks.append(Polyline([(x - 3, y), (x + 3, y)], stroke=Tone.INK, width=1.3))
+        if sign == "+":
+            marks.append(Polyline([(x, y - 3), (x, y + 3)], stroke=Tone.INK, width=1.3))
+    return marks
+
+
+def _wire(net: RoutedNet, shape: Shape, title: str) -> list[Mark]:
+    """A scalar is a thin line, a vector a heavy one, a matrix (or a stack of them) a double one."""
+    marks: list[Mark] = []
+    weight = (1.2, 2.3, 3.8)[min(len(shape), 2)]
+    lines = [_rounded(_shortened(path, 5.0)) for path in net.paths]
+    marks += [Curve(line, stroke=Tone.WIRE, width=weight) for line in lines]
+    if len(shape) >= 2:
+        marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
+    marks += [_arrow_head(path) for path in net.paths]
+    marks += [Disc(x, y, 2.6 + 0.3 * min(len(shape), 2), fill=Tone.WIRE) for x, y in net.dots]
+    return [Group(tuple(marks), title=title)]
+
+
+def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
+    """The path without its last px, which the arrow's head covers."""
+    (ax, ay), (bx, by_) = path[-2], path[-1]
+    length = abs(bx - ax) + abs(by_ - ay)
+    share = max(length - by, 0.0) / length if length else 0.0
+    return (*path[:-1], (ax + (bx - ax) * share, ay + (by_ - ay) * share))
+
+
+def _rounded(path: tuple[Point, ...]) -> tuple[tuple[str | float, ...], ...]:
+    """Straight pieces with small round corners."""
+    commands: list[tuple[str | float, ...]] = [("M", *path[0])]
+    for before, corner, after in zip(path, path[1:], path[2:]):
+        radius = min(_ROUNDING, _distance(before, corner) / 2, _distance(corner, after) / 2)
+        commands.append(("L", *_towards(corner, before, radius)))
+        commands.append(("Q", *corner, *_towards(corner, after, radius)))
+    commands.append(("L", *path[-1]))
+    return tuple(commands)
+
+
+def _distance(a: Point, b: Point) -> float:
+    return abs(a[0] - b[0]) + abs(a[1] - b[1])
+
+
+def _towards(a: Point, b: Point, length: float) -> Point:
+    total = _distance(a, b)
+    share = length / total if total else 0.0
+    return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
+
+
+def _arrow_head(path: tuple[Point, ...]) -> Mark:
+    (ax, ay), (bx, by) = path[-2], path[-1]
+    length = _distance((ax, ay), (bx, by)) or 1.0
+    dx, dy = (bx - ax) / length, (by - ay) / length
+    back = (bx - 8 * dx, by - 8 * dy)
+    corners = [(bx, by), (back[0] - 3.7 * dy, back[1] + 3.7 * dx), (back[0] + 3.7 * dy, back[1] - 3.7 * dx)]
+    return Polyline(corners, stroke=None, fill=Tone.WIRE, closed=True)
+
+
+def _extent(placed: dict[str, Box], routed: list[RoutedNet]) -> tuple[float, float, float, float]:
+    xs: list[float] = []
+    ys: list[float] = []
+    for box in placed.values():
+        lx, ly, lw, lh = _label(box)
+        xs += [box.x, box.x + box.width, lx, lx + lw]
+        ys += [box.y, box.y + box.height, ly, ly + lh]
+    for net in routed:
+        for path in net.paths:
+            xs += [x for x, _ in path]
+            ys += [y for _, y in path]
+    return min(xs, default=0.0), min(ys, default=0.0), max(xs, default=1.0), max(ys, default=1.0)
+
+
+def _wire_title(source: PortRef, targets: list[PortRef]) -> str:
+    return f"{source} to {', '.join(str(target) for target in targets)}"
+
+
+def _block_title(name: str, box: Box) -> str:
+    return f"{name} ({box.block.title})"
+
+
+def _in_words(diagram: Diagram) -> str:
+    """The drawing for those who cannot see it: every wire once."""
+
+    def words(wire: Connection) -> str:
+        return f"{wire.source} to {wire.target}"
+
+    listed = "; ".join(words(wire) for wire in diagram.connections)
+    return f"{len(diagram.blocks)} blocks. Wires: {listed}." if listed else f"{len(diagram.blocks)} blocks."

@@ -1,0 +1,246 @@
+"""Which figures a run asks for: those of its arms, and one for every sink of the diagram."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.diagram import Diagram, View, ViewKind
+from armblocks.report.arm_picture import moments_picture
+from armblocks.report.charts import Panel, Trace, time_chart
+from armblocks.report.motion import Motion
+from armblocks.report.numbers import axis_number, si_prefix
+from armblocks.report.path_chart import path_chart, side_by_side
+from armblocks.report.picture import Picture
+from armblocks.report.style import FIGURE_WIDTH
+from armblocks.simulation.result import SimulationResult
+
+_Array = NDArray[np.float64]
+
+_DEGREES = 180 / math.pi
+_SPELLED = {"m/s2": "m/s²", "rad/s2": "rad/s²", "deg/s2": "deg/s²", "kg m2": "kg m²"}
+_FIRST_ENTRIES = 12
+"""A matrix has many entries; a chart names at most so many, as more lines are not told apart."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Figure:
+    """One picture of the report: ``name`` of its files, ``section`` it stands in, a caption in words."""
+
+    name: str
+    section: str
+    caption: str
+    picture: Picture
+    narrow: bool = False
+    """Stands beside others of its kind, not across the whole page."""
+
+
+def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
+    """The arm at six moments, the three projections of its tool's path, its joints over time."""
+    robot = motion.robot
+    yield Figure(
+        name=f"{prefix}moments",
+        section="motion",
+        caption=f"{robot.name} at six moments of the run, with the path of its tool.",
+        picture=moments_picture(robot, motion.time, motion.poses),
+    )
+    yield Figure(
+        name=f"{prefix}tool-path",
+        section="motion",
+        caption="Path of the tool in the planes XY, XZ and YZ, all at one scale.",
+        picture=_projections(motion),
+    )
+    yield Figure(
+        name=f"{prefix}joints",
+        section="motion",
+        caption="Joints over time. Dashed: the limits that a joint comes near to.",
+        picture=_joints(motion),
+    )
+
+
+def view_figures(diagram: Diagram, result: SimulationResult) -> Iterator[Figure]:
+    """A figure for every Scope and XY Graph of the diagram, in the order of their names."""
+    for block, view in diagram.views():
+        if view.kind is ViewKind.TRACES:
+            yield Figure(
+                name=f"scope-{file_name(block)}",
+                section="scopes",
+                caption=view.title or block,
+                picture=_scope(block, view, result),
+            )
+        elif view.kind is ViewKind.PATH:
+            yield Figure(
+                name=f"xy-{file_name(block)}",
+                section="graphs",
+                caption=view.title or block,
+                picture=_xy_graph(block, view, result),
+                narrow=True,
+            )
+
+
+def file_name(name: str) -> str:
+    """A name that every file system takes, near to that of a block."""
+    kept = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
+    return kept[:48] or "unnamed"
+
+
+def for_people(values: _Array, unit: str) -> tuple[_Array, str]:
+    """Values and unit as people read them: degrees for radians, SI prefixes instead of long zeros."""
+    if unit.startswith("rad"):
+        unit = "deg" + unit.removeprefix("rad")
+        return values * _DEGREES, _SPELLED.get(unit, unit)
+    finite = np.abs(values[np.isfinite(values)])
+    factor, prefix = si_prefix(float(finite.max(initial=0.0)))
+    # Prefixes of a bare number or of a unit with powers would mislead; small and usual numbers need none.
+    if not unit or unit.startswith("kg") or unit == "s" or 1e-3 < factor < 1e3:
+        return values, _SPELLED.get(unit, unit)
+    return values * factor, prefix + _SPELLED.get(unit, unit)
+
+
+def _projections(motion: Motion) -> Picture:
+    tool = motion.tool
+    span = float(np.ptp(tool, axis=0).max())
+    width = (FIGURE_WIDTH - 24) / 3
+    pictures = [
+        path_chart(
+            tool[:, a],
+            tool[:, b],
+            x_label=f"{'xyz'[a]}, m",
+            y_label=f"{'xyz'[b]}, m",
+            width=width,
+            height=width + 6,
+            equal=True,
+            span=span,
+        )
+        for a, b in ((0, 1), (0, 2), (1, 2))
+    ]
+    start, end = (", ".join(axis_number(round(float(v), 3)) for v in p) for p in (tool[0], tool[-1]))
+    return side_by_side(
+        pictures,
+        title=f"Tool path of {motion.robot.name} in three projections",
+        description=f"From ({start}) m to ({end}) m.",
+    )
+
+
+def _joints(motion: Motion) -> Picture:
+    robot = motion.robot
+    panels: list[Panel] = []
+    quantities: list[tuple[str, str, _Array, str]] = [
+        ("position", "", motion.q, "position"),
+        ("speed", "/s", motion.qd, "speed"),
+        ("acceleration", "/s2", motion.qdd, ""),
+    ]
+    units = sorted(set(robot.joint_units), reverse=True)  # rad before m
+    for quantity, suffix, values, limit in quantities:
+        for unit in units:
+            name = {"rad": "angle", "m": "position"}[unit] if quantity == "position" else quantity
+            panels.append(_joint_panel(motion, f"Joint {name}", unit, unit + suffix, values, limit))
+    if motion.tau is not None:
+        for unit in units:
+            torque, shown = ("Joint torque", "N m") if unit == "rad" else ("Joint force", "N")
+            panels.append(_joint_panel(motion, torque, unit, shown, motion.tau, "torque"))
+    named = ", ".join(panel.quantity.lower() for panel in panels)
+    return time_chart(
+        motion.time,
+        panels,
+        title=f"Joints of {robot.name} over time",
+        description=f"Line charts of {named} over {axis_number(float(motion.time[-1]))} s.",
+    )
+
+
+def _joint_panel(
+    motion: Motion, quantity: str, joint_unit: str, unit: str, values: _Array, limit: str
+) -> Panel:
+    robot = motion.robot
+    chosen = [j for j, own in enumerate(robot.joint_units) if own == joint_unit]
+    shown, shown_unit = for_people(values[:, chosen], unit)
+    factor = _factor(unit, shown_unit, values[:, chosen])
+    traces: list[Trace] = []
+    for column, j in enumerate(chosen):
+        limits = robot.joints[j].limits
+        bounds: tuple[float, float] | None = None
+        if limit == "position":
+            bounds = limits.position
+        elif limit == "speed" and limits.speed is not None:
+            bounds = (-limits.speed, limits.speed)
+        elif limit == "torque" and limits.torque is not None:
+            bounds = (-limits.torque, limits.torque)
+        scaled = None if bounds is None else (bounds[0] * factor, bounds[1] * factor)
+        traces.append(Trace(label=robot.joint_names[j], values=shown[:, column], index=j, limits=scaled))
+    return Panel(quantity=quantity, unit=shown_unit, traces=tuple(traces))
+
+
+def _factor(unit: str, shown_unit: str, values: _Array) -> float:
+    """What :func:`for_people` multiplied by."""
+    if unit.startswith("rad"):
+        return _DEGREES
+    if shown_unit == _SPELLED.get(unit, unit):
+        return 1.0
+    return si_prefix(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))[0]
+
+
+def _scope(block: str, view: View, result: SimulationResult) -> Picture:
+    panels: list[Panel] = []
+    for number, signal in enumerate(view.signals):
+        label = view.labels[number] if number < len(view.labels) else ""
+        path = result.resolve(f"{block}/{signal}")
+        slot = result.signals_layout[path]
+        flat = result[path].reshape(len(result.time), -1)
+        values, unit = for_people(flat[:, :_FIRST_ENTRIES], slot.unit)
+        name = label or path
+        entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
+        short = name.rpartition("/")[2]
+        traces = tuple(
+            Trace(
+                label=f"{short}[{','.join(map(str, index))}]" if index else short,
+                values=values[:, k],
+                index=k if len(entries) > 1 else number,
+            )
+            for k, index in enumerate(entries)
+        )
+        panels.append(Panel(quantity=name, unit=unit, traces=traces))
+    panels = _merged(panels)
+    return time_chart(
+        result.time,
+        panels,
+        title=f"Scope {block}",
+        description=f"Traces over time of {', '.join(panel.quantity for panel in panels)}.",
+        height=128.0,
+    )
+
+
+def _merged(panels: list[Panel]) -> list[Panel]:
+    """Scalar traces of one unit share a panel: they are there to be compared."""
+    scalars = [panel for panel in panels if len(panel.traces) == 1]
+    if len(scalars) < 2 or len(scalars) != len(panels) or len({panel.unit for panel in scalars}) != 1:
+        return panels
+    traces = tuple(
+        Trace(label=panel.quantity, values=panel.traces[0].values, index=k) for k, panel in enumerate(scalars)
+    )
+    return [Panel(quantity=", ".join(p.quantity for p in scalars), unit=scalars[0].unit, traces=traces)]
+
+
+def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
+    paths = [result.resolve(f"{block}/{signal}") for signal in view.signals[:2]]
+    flats = [result[path].reshape(len(result.time), -1)[:, 0] for path in paths]
+    (x, x_unit), (y, y_unit) = (for_people(flat, result.units[path]) for flat, path in zip(flats, paths))
+    labels = [
+        (view.labels[k] if k < len(view.labels) and view.labels[k] else path) + (f", {unit}" if unit else "")
+        for k, (path, unit) in enumerate(zip(paths, (x_unit, y_unit)))
+    ]
+    picture = path_chart(
+        x,
+        y,
+        x_label=labels[0],
+        y_label=labels[1],
+        width=FIGURE_WIDTH / 2 - 6,
+        height=390.0,
+        equal=bool(x_unit) and x_unit == y_unit,
+    )
+    picture.title = f"XY graph {block}"
+    picture.description = f"{labels[1]} over {labels[0]}."
+    return picture

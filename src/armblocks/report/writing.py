@@ -1,0 +1,132 @@
+"""The report folder: page, figures, data."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from armblocks.diagram import Diagram
+from armblocks.errors import FormatError, UnknownNameError
+from armblocks.report.analysis import MotionSummary, summarise
+from armblocks.report.diagram_drawing import diagram_picture
+from armblocks.report.figures import Figure, file_name, motion_figures, view_figures
+from armblocks.report.motion import Motion, motions
+from armblocks.report.page import ReportContents, report_page
+from armblocks.report.svg import svg_file
+from armblocks.simulation.result import SimulationResult
+
+FIGURE_FORMATS = ("svg", "png")
+DATA_FORMATS = ("csv", "parquet", "npz", "mat")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportFiles:
+    """Where everything of a report lies."""
+
+    folder: Path
+    page: Path
+    diagram: Path
+    figures: tuple[Path, ...]
+    data: tuple[Path, ...]
+
+
+def write_report(
+    folder: str | os.PathLike[str],
+    diagram: Diagram,
+    result: SimulationResult,
+    *,
+    formats: Sequence[str] = FIGURE_FORMATS,
+    data: Sequence[str] = ("csv", "parquet"),
+) -> ReportFiles:
+    """Write ``report.html``, ``diagram.svg``, ``figures/*`` and ``data.*`` into a folder, made if absent.
+
+    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. Each file is there completely or
+    not at all; the page comes last. Raises UnknownNameError for another format and FormatError where the
+    folder cannot be written.
+    """
+    for name in formats:
+        if name not in FIGURE_FORMATS:
+            raise UnknownNameError("figure format", name, FIGURE_FORMATS, where="write_report")
+    for name in data:
+        if name not in DATA_FORMATS:
+            raise UnknownNameError("data format", name, DATA_FORMATS, where="write_report")
+    place = Path(folder)
+    _make_folder(place / "figures")
+    found = motions(diagram, result) if result.time.size > 1 else ()
+    summaries = tuple(_summary(motion) for motion in found)
+    figures = _figures(diagram, result, found)
+    drawing = diagram_picture(diagram, result)
+    written: list[Path] = []
+    for figure in figures:
+        for kind in formats:
+            path = place / "figures" / f"{figure.name}.{kind}"
+            _write(path, _encoded(figure, kind))
+            written.append(path)
+    diagram_path = place / "diagram.svg"
+    _write(diagram_path, svg_file(drawing).encode())
+    data_paths = tuple(place / f"data.{kind}" for kind in data)
+    for path in data_paths:
+        result.save(path)
+    contents = ReportContents(
+        diagram=diagram,
+        result=result,
+        motions=found,
+        summaries=summaries,
+        figures=tuple(figures),
+        drawing=drawing,
+        files=tuple(path.relative_to(place).as_posix() for path in (diagram_path, *data_paths, *written)),
+    )
+    page = place / "report.html"
+    _write(page, report_page(contents).encode())
+    return ReportFiles(folder=place, page=page, diagram=diagram_path, figures=tuple(written), data=data_paths)
+
+
+def _summary(motion: Motion) -> MotionSummary:
+    return summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
+
+
+def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]) -> list[Figure]:
+    if result.time.size < 2:
+        return []
+    figures: list[Figure] = []
+    for number, motion in enumerate(found):
+        prefix = "" if len(found) == 1 else f"{file_name(motion.robot.name)}-{number + 1}-"
+        figures += motion_figures(motion, prefix)
+    return figures + list(view_figures(diagram, result))
+
+
+def _encoded(figure: Figure, kind: str) -> bytes:
+    if kind == "svg":
+        return svg_file(figure.picture).encode()
+    from armblocks.report.png import picture_png
+
+    return picture_png(figure.picture)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _refusal(folder, error) from error
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Beside its place first, then renamed: a reader never sees half a file."""
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        temporary.write_bytes(data)
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise _refusal(path, error) from error
+
+
+def _refusal(path: Path, error: OSError) -> FormatError:
+    return FormatError(
+        f"the report cannot be written ({error.strerror or error})",
+        where=str(path),
+        allowed="a folder that you may write to, on a disk with room",
+        fix="give another folder or change its permissions",
+    )
