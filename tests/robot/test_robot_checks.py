@@ -123,6 +123,11 @@ def test_sound_friction_is_not_warned_of():
         make(Link(name="l", motor=Motor(viscous_friction=1e-3, coulomb_friction=(0.1, -0.2))))
 
 
+def test_position_limits_are_a_pair():
+    with refused("the position limits are 3 numbers. Allowed: a pair, or None where unknown"):
+        JointLimits(position=(1, 2, 3))
+
+
 def test_sigma_is_zero_or_one():
     with refused("sigma of a D-H row is 2. Allowed: 0 for a revolute, 1 for a prismatic joint"):
         DhRow(sigma=2)

@@ -15,7 +15,6 @@ Robots of inadmissible values do not get here: :class:`armblocks.robot.Robot` re
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 from casadi import SX, jacobian, vertcat
 
@@ -27,17 +26,14 @@ from armblocks.dynamics.friction import joint_friction, rotor_torques
 from armblocks.dynamics.jacobian import jacobian_matrix, tool_columns, world_columns, yoshikawa
 from armblocks.dynamics.joint_motion import entries, joint_motions
 from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
-from armblocks.dynamics.rnea import Wrench, rnea
+from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, at_tip, carrying
+from armblocks.dynamics.rnea import rnea
 from armblocks.equations import Signature, TracedFunction, signature
 from armblocks.equations.signature import Slot
 from armblocks.errors import RobotError
 from armblocks.robot.robot import Robot
-from armblocks.robot.tree import BASE, KinematicTree
-from armblocks.spatial.inertia import RigidInertia
-from armblocks.spatial.vectors import Scalar, Symmetric, Vector, add, cross, rotate, scale
-
-WRENCH_SLOT = Slot("wrench", (6,), "N, N m")
-PAYLOAD_SLOT = Slot("payload", (10,), "kg, m, kg m2")
+from armblocks.robot.tree import KinematicTree
+from armblocks.spatial.vectors import Scalar, add, rotate, scale
 
 
 def trace_fkine(robot: Robot) -> TracedFunction:
@@ -112,9 +108,9 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
 
     def equations(q: SX, qd: SX, qdd: SX, wrench: SX, payload: SX) -> SX:
         rates, accelerations = entries(qd), entries(qdd)
-        loaded = _carrying(tree, payload)
+        loaded = carrying(tree, payload)
         rigid = rnea(
-            loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, _at_tip(tree, wrench)
+            loaded, joint_motions(loaded, q), rates, accelerations, tree.gravity, at_tip(tree, wrench)
         )
         return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
 
@@ -197,13 +193,13 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
     """
     tree = regrouped(KinematicTree.of(robot))
     some_payload = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    check_accelerations_exist(_carrying(tree, some_payload))
+    check_accelerations_exist(carrying(tree, some_payload))
 
     def equations(q: SX, qd: SX, tau: SX, wrench: SX, payload: SX) -> SX:
         rates = entries(qd)
         left_over = _difference(entries(tau), joint_friction(robot, rates))
-        loaded = _carrying(tree, payload)
-        return _sum(forward_dynamics(loaded, q, rates, left_over, _at_tip(tree, wrench)))
+        loaded = carrying(tree, payload)
+        return _sum(forward_dynamics(loaded, q, rates, left_over, at_tip(tree, wrench)))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
     return _trace("accel_loaded", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
@@ -300,31 +296,6 @@ def _inputs(robot: Robot, names: Sequence[str]) -> Signature:
         "payload": PAYLOAD_SLOT,
     }
     return Signature(tuple(known[name] for name in names))
-
-
-def _carrying(tree: KinematicTree, payload: SX) -> KinematicTree:
-    """The tree with a payload on its tool (none where the tool is fixed to the base)."""
-    tool = tree.tool
-    if tool.body == BASE:
-        return tree
-    mass, x, y, z, *second = entries(payload)
-    load = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)).moved(tool.pose)
-    bodies = list(tree.bodies)
-    carrier = bodies[tool.body]
-    bodies[tool.body] = replace(carrier, inertia=carrier.inertia.plus(load))
-    return replace(tree, bodies=tuple(bodies))
-
-
-def _at_tip(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:
-    """The wrench of the last link's frame, on the body that carries it."""
-    tip = tree.tip
-    if tip.body == BASE:
-        return {}
-    fx, fy, fz, nx, ny, nz = entries(wrench)
-    R, p = tip.pose.rotation, tip.pose.translation
-    force = rotate(R, (fx, fy, fz))
-    moment: Vector = add(rotate(R, (nx, ny, nz)), cross(p, force))
-    return {tip.body: Wrench(force, moment)}
 
 
 def _body_of_joint(tree: KinematicTree) -> list[int]:

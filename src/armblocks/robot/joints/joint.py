@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from armblocks.errors import RobotError
 from armblocks.spatial import Transform, Vector3, rotation_about, vector3
 
 
@@ -24,8 +25,13 @@ class JointLimits:
 
     def __post_init__(self) -> None:
         if self.position is not None:
-            low, high = self.position
-            object.__setattr__(self, "position", (float(low), float(high)))
+            position = tuple(float(limit) for limit in self.position)
+            if len(position) != 2:
+                raise RobotError(
+                    f"the position limits are {len(position)} numbers",
+                    allowed="a pair, or None where unknown",
+                )
+            object.__setattr__(self, "position", position)
         for name in ("speed", "torque"):
             value = getattr(self, name)
             if value is not None:

@@ -1,0 +1,44 @@
+"""Loads that are known at run time only: a wrench at the tip and a payload on the tool."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from casadi import SX
+
+from armblocks.dynamics.joint_motion import entries
+from armblocks.dynamics.rnea import Wrench
+from armblocks.equations import Slot
+from armblocks.robot.tree import BASE, KinematicTree
+from armblocks.spatial.inertia import RigidInertia
+from armblocks.spatial.vectors import Symmetric, Vector, add, cross, rotate
+
+WRENCH_SLOT = Slot("wrench", (6,), "N, N m")
+"""Force, then moment, that the tip exerts on its surroundings, about the last link's origin in its axes."""
+PAYLOAD_SLOT = Slot("payload", (10,), "kg, m, kg m2")
+"""Mass, centre x y z, inertia xx yy zz xy yz xz about that centre, all in the tool frame."""
+
+
+def carrying(tree: KinematicTree, payload: SX) -> KinematicTree:
+    """The tree with a payload on its tool (none where the tool is fixed to the base)."""
+    tool = tree.tool
+    if tool.body == BASE:
+        return tree
+    mass, x, y, z, *second = entries(payload)
+    load = RigidInertia.at_centre(mass, Symmetric(*second)).shifted((x, y, z)).moved(tool.pose)
+    bodies = list(tree.bodies)
+    carrier = bodies[tool.body]
+    bodies[tool.body] = replace(carrier, inertia=carrier.inertia.plus(load))
+    return replace(tree, bodies=tuple(bodies))
+
+
+def at_tip(tree: KinematicTree, wrench: SX) -> dict[int, Wrench]:
+    """The wrench of the last link's frame, on the body that carries it."""
+    tip = tree.tip
+    if tip.body == BASE:
+        return {}
+    fx, fy, fz, nx, ny, nz = entries(wrench)
+    R, p = tip.pose.rotation, tip.pose.translation
+    force = rotate(R, (fx, fy, fz))
+    moment: Vector = add(rotate(R, (nx, ny, nz)), cross(p, force))
+    return {tip.body: Wrench(force, moment)}
