@@ -1,7 +1,7 @@
 """From traced equations to machine code: tape, LLVM IR, kernels, the disk cache.
 
-No module here knows of robots, diagrams or blocks, and only :mod:`armblocks.compiler.from_casadi` knows CasADi's
-graphs. ``llvmlite`` is imported when something is first compiled or loaded.
+No module here knows of robots, diagrams or blocks, and only :mod:`armblocks.compiler.from_casadi` knows
+CasADi's graphs. ``llvmlite`` is imported when something is first compiled or loaded.
 """
 
 from armblocks.compiler.kernel import Kernel, compile_function

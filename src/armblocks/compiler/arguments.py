@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,7 +76,7 @@ def new_outputs(
     if out is None:
         fresh = [np.empty(shape) for shape in shapes]
         return fresh, fresh
-    given: tuple[object, ...] = (out,) if len(signature) == 1 and not isinstance(out, tuple) else _tuple(out)
+    given = cast("tuple[object, ...]", out) if isinstance(out, tuple) else (out,)
     if len(given) != len(signature):
         raise InputError(
             f"out= holds {len(given)} arrays", where=name, allowed=f"one per output: {_listing(signature)}"
@@ -89,24 +91,20 @@ def new_outputs(
     return written, handed
 
 
-def _tuple(out: object) -> tuple[object, ...]:
-    return tuple(out) if isinstance(out, (tuple, list)) else (out,)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-
-
 def _check_output(name: str, slot: Slot, shape: Shape, array: object) -> Array:
-    found = ""
+    given = cast("Array", array)
     if not isinstance(array, np.ndarray):
         found = f"is a {type(array).__name__}"
-    elif array.dtype != np.float64 or not array.dtype.isnative:
-        found = f"holds {array.dtype.str}"
-    elif array.shape != shape:
-        found = f"has shape {array.shape}"
-    elif not array.flags.c_contiguous or not array.flags.aligned:
+    elif given.dtype != np.float64 or not given.dtype.isnative:
+        found = f"holds {given.dtype.str}"
+    elif given.shape != shape:
+        found = f"has shape {given.shape}"
+    elif not given.flags.c_contiguous or not given.flags.aligned:
         found = "is not C-contiguous"
-    elif not array.flags.writeable:
+    elif not given.flags.writeable:
         found = "is read-only"
     else:
-        return array  # pyright: ignore[reportUnknownVariableType]
+        return given
     raise InputError(
         f"out= for '{slot.name}' {found}",
         where=name,
@@ -117,9 +115,13 @@ def _check_output(name: str, slot: Slot, shape: Shape, array: object) -> Array:
 
 def check_threads(name: str, threads: object) -> int:
     """The number of threads. Raises :class:`InputError` unless it is a whole number from 1 up."""
-    if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
+    try:
+        count = 0 if isinstance(threads, bool) else operator.index(cast("int", threads))
+    except TypeError:
+        count = 0
+    if count < 1:
         raise InputError(f"threads={threads!r}", where=name, allowed="a whole number from 1 up")
-    return int(threads)
+    return count
 
 
 def _allowed(slot: Slot) -> str:

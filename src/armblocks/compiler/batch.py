@@ -2,49 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum
-
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import load_rows, store_rows
+from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.llvm_ir import Registers, emit_operations
 from armblocks.compiler.tape import Tape
 
-
-class Layout(Enum):
-    """How the samples of one slot lie in memory."""
-
-    ROWS = "R"
-    """``(N, size)``: one sample after the other, as users have them."""
-    COLUMNS = "C"
-    """``(size, N)``: one quantity after the other."""
-    SHARED = "S"
-    """``(size,)``: the same for all samples (inputs only)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class BatchLayout:
-    """The layouts of all inputs and outputs."""
-
-    inputs: tuple[Layout, ...]
-    outputs: tuple[Layout, ...]
-
-    @property
-    def key(self) -> str:
-        """Short text that identifies the layout."""
-        inputs, outputs = (
-            "".join(layout.value for layout in layouts) for layouts in (self.inputs, self.outputs)
-        )
-        return f"{inputs}>{outputs}"
+__all__ = ["BatchLayout", "Layout", "emit_batch"]
 
 
 def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str) -> None:
     """Add ``void @name(i64 start, i64 stop, i64 columns, ptr in0, …, ptr out0, …)``.
 
-    It evaluates the samples ``start`` to ``stop - 1``. ``columns`` is N, the length of a line of the arrays in
-    column layout. Outputs must not overlap inputs. What only depends on shared inputs is worked out once.
-    Samples that do not fill a register, and blocks with a sample that a vector function leaves undecided (the
-    sine of a huge angle), are evaluated with one lane: the bits are the same.
+    It evaluates the samples ``start`` to ``stop - 1``. ``columns`` is N, the length of a line of the arrays
+    in column layout. Outputs must not overlap inputs. What only depends on shared inputs is worked out
+    once. Samples that do not fill a register, and blocks with a sample that a vector function leaves
+    undecided (the sine of a huge angle), are evaluated with one lane: the bits are the same.
     """
     pointers = [f"%i{k}" for k in range(len(tape.input_sizes))] + [f"%o{k}" for k in range(len(tape.outputs))]
     passed = ", ".join(["i64 %columns", *(f"ptr {pointer}" for pointer in pointers)])

@@ -14,7 +14,7 @@ import contextlib
 import hashlib
 import os
 import sys
-import tempfile
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -121,14 +121,14 @@ def store(name: str, content: bytes) -> None:
     path = _path(root, name)
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(prefix=f"{name[:16]}-", suffix=".tmp", dir=path.parent)
+        writer = f"{os.getpid()}-{threading.get_ident()}-{time.monotonic_ns()}"
+        temporary = path.with_name(f"{name[:16]}-{writer}.tmp")
         try:
-            with os.fdopen(handle, "wb") as file:
+            with temporary.open("xb") as file:
                 file.write(_MAGIC + hashlib.sha256(content).digest() + content)
-            os.replace(temporary, path)
+            temporary.replace(path)
         except OSError:
-            with contextlib.suppress(OSError):
-                os.unlink(temporary)
+            temporary.unlink(missing_ok=True)
             raise
         _prune_now_and_then(root)
 
@@ -148,7 +148,7 @@ def _prune_now_and_then(root: Path) -> None:
 
 
 def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
-    """Remove the files used least recently until three quarters of ``limit`` bytes are left, if they exceed it.
+    """If the files exceed ``limit`` bytes, remove those used least recently until three quarters are left.
 
     Remains of writers that were killed are removed after a day.
     """

@@ -25,8 +25,8 @@ Values = NDArray[np.float64]
 def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) -> list[Values]:
     """Evaluate ``tape`` for samples.
 
-    ``inputs[k]`` has shape ``(..., size of slot k)``; the leading shapes broadcast against each other. Gives one
-    array ``(..., size)`` per output slot. With ``fused=False`` a multiply-add is rounded twice.
+    ``inputs[k]`` has shape ``(..., size of slot k)``; the leading shapes broadcast against each other.
+    Gives one array ``(..., size)`` per output slot. With ``fused=False`` a multiply-add is rounded twice.
     Raises :class:`InputError` when the count of inputs or the size of one is wrong.
     """
     arrays = [np.asarray(value, dtype=np.float64) for value in inputs]
@@ -112,8 +112,8 @@ def _exact_multiply_add(a: float, b: float, c: float) -> float:
     return math.copysign(rounded, exact)
 
 
-def _condition(value: Values) -> NDArray[np.bool_]:
-    return value != 0.0
+def _select(condition: Values, yes: Values, no: Values) -> Values:
+    return np.where(condition != 0.0, yes, no)
 
 
 def _minimum(a: Values, b: Values) -> Values:
@@ -162,10 +162,10 @@ _RULES: dict[Opcode, Callable[..., Any]] = {
     Opcode.LESS_EQUAL: np.less_equal,
     Opcode.EQUAL: np.equal,
     Opcode.NOT_EQUAL: np.not_equal,
-    Opcode.NOT: lambda a: a == 0.0,
-    Opcode.AND: lambda a, b: _condition(a) & _condition(b),
-    Opcode.OR: lambda a, b: _condition(a) | _condition(b),
-    Opcode.SELECT: lambda c, a, b: np.where(_condition(c), a, b),
+    Opcode.NOT: np.logical_not,
+    Opcode.AND: np.logical_and,
+    Opcode.OR: np.logical_or,
+    Opcode.SELECT: _select,
     Opcode.SIN: np.sin,
     Opcode.COS: np.cos,
     Opcode.TAN: np.tan,

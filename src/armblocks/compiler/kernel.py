@@ -7,9 +7,8 @@ import itertools
 import os
 import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,14 +20,15 @@ from armblocks.compiler.arguments import (
     new_outputs,
     read_input,
 )
-from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
-from armblocks.compiler.entry import ENTRY, TABLE, emit_entry, make_entry
-from armblocks.compiler.ir_text import Module
-from armblocks.compiler.llvm_ir import emit_function
+from armblocks.compiler.entry import ENTRY, TABLE, make_entry
+from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.tape import OperationCount, Tape
 from armblocks.compiler.target import host_target
 from armblocks.equations import Shape, Signature, TracedFunction
+
+if TYPE_CHECKING:
+    from concurrent.futures import ThreadPoolExecutor
 
 Array = NDArray[np.float64]
 
@@ -105,21 +105,21 @@ class Kernel:
     def __call__(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
         """Evaluate one sample or a batch.
 
-        Each input has its slot's shape, or ``(N, *shape)``; an input without the samples' axis serves all samples.
-        Any float or integer dtype and any strides are taken; C-contiguous float64 is read in place. ``out`` takes
-        the result: an array as the call would give, or a tuple of them where there are several outputs; it may be
-        one of the inputs. ``threads`` spreads a batch over that many threads.
+        Each input has its slot's shape, or ``(N, *shape)``; an input without the samples' axis serves all
+        samples. Any float or integer dtype and any strides are taken; C-contiguous float64 is read in
+        place. ``out`` takes the result: an array as the call would give, or a tuple of them where there are
+        several outputs; it may be one of the inputs. ``threads`` spreads a batch over that many threads.
 
-        Gives one array per output, of the slot's shape or ``(N, *shape)``; a ``numpy.float64`` for one scalar.
-        Raises :class:`~armblocks.errors.InputError` for wrong counts, shapes, dtypes and options.
+        Gives one array per output, of the slot's shape or ``(N, *shape)``; a ``numpy.float64`` for one
+        scalar. Raises :class:`~armblocks.errors.InputError` for wrong counts, shapes, dtypes and options.
         """
         return self._run(arrays, out, threads, columns=False)
 
     def columns(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
         """Evaluate a batch into arrays of column layout: ``(*shape, N)`` for each output.
 
-        Inputs as in a call; at least one must have the samples' axis. An input ``(N, n)`` that is the transpose of
-        a C-contiguous ``(n, N)`` array is read in place too.
+        Inputs as in a call; at least one must have the samples' axis. An input ``(N, n)`` that is the
+        transpose of a C-contiguous ``(n, N)`` array is read in place too.
         """
         return self._run(arrays, out, threads, columns=True)
 
@@ -163,6 +163,10 @@ class Kernel:
     @cached_property
     def _single(self) -> NativeCode:
         def write() -> str:
+            from armblocks.compiler.entry_ir import emit_entry
+            from armblocks.compiler.ir_text import Module
+            from armblocks.compiler.llvm_ir import emit_function
+
             module = Module()
             emit_function(module, self.tape, "evaluate", linkage="")
             emit_entry(module, self.inputs, self.outputs, "evaluate")
@@ -190,6 +194,9 @@ class Kernel:
         return function
 
     def _write_batch(self, layout: BatchLayout) -> str:
+        from armblocks.compiler.batch import emit_batch
+        from armblocks.compiler.ir_text import Module
+
         module = Module()
         emit_batch(module, self.tape, layout, host_target().lanes, "batch")
         return module.text
@@ -239,6 +246,8 @@ def _share(batch: Callable[..., None], samples: int, addresses: Sequence[int], w
 
 @cache
 def _pool() -> ThreadPoolExecutor:
+    from concurrent.futures import ThreadPoolExecutor
+
     return ThreadPoolExecutor(max_workers=max(64, os.cpu_count() or 1), thread_name_prefix="armblocks")
 
 

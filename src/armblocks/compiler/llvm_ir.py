@@ -11,14 +11,14 @@ For those who write native code around compiled equations (an integrator's loop)
     code = load_code(("loop", tape.digest), write)       # armblocks.compiler.native, with the disk cache
     address = code.address("loop")
 
-Each pointer is to the flat ``double`` vector of one slot, as :class:`~armblocks.equations.Signature` lays it out.
+Each pointer is to the flat ``double`` vector of one slot, as :class:`~armblocks.equations.Signature` lays
+it out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from armblocks.compiler import elementary
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.opcodes import COMPARISONS, Opcode
 from armblocks.compiler.tape import Tape
@@ -112,6 +112,8 @@ class Registers:
 
 def emit_operations(body: Body, tape: Tape, load: LoadInput) -> Registers:
     """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read."""
+    from armblocks.compiler import elementary  # not needed where code comes from the disk cache
+
     registers = Registers(body, tape, load)
     partners = _sine_cosine_pairs(tape)
     for k, (opcode, operands) in enumerate(tape.operations):
@@ -197,4 +199,6 @@ def _emit_number(body: Body, opcode: Opcode, values: list[str]) -> str:
             chosen = body.select(body.compare("olt" if opcode is Opcode.MINIMUM else "ogt", a, b), a, b)
             return body.select(body.compare("uno", a, a), a, chosen)
         case _:
+            from armblocks.compiler import elementary
+
             return elementary.call(body, opcode, values)

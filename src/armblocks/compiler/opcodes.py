@@ -6,8 +6,8 @@ Every operation works on IEEE 754 doubles and rounds to nearest. Where the sourc
 * ``MINIMUM`` and ``MAXIMUM`` hand on a NaN of either operand (as ``numpy.minimum``; C's ``fmin`` and CasADi
   would drop it, and a limiter would hide the first bad signal). Of two equal operands the second is given.
 * ``SIGN`` is -1, 1, or the operand itself where that is a zero or a NaN.
-* A comparison is 1.0 or 0.0; with a NaN all are 0.0 but ``NE``. A condition holds when it is not equal to zero,
-  so a NaN holds.
+* A comparison is 1.0 or 0.0; with a NaN all are 0.0 but ``NE``. A condition holds when it is not equal to
+  zero, so a NaN holds.
 * ``SELECT c a b`` is ``a`` where ``c`` holds, else ``b``; the value not chosen has no influence, be it NaN.
 * ``MODULO`` is C's ``fmod`` (sign of the dividend, exact); ``REMAINDER`` is IEEE's (nearest quotient, ties to
   even, exact).

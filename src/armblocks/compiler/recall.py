@@ -16,9 +16,9 @@ from armblocks.errors import CompileError
 def recall(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
     """The kernel of the equations that ``key`` identifies.
 
-    ``key`` must say everything that the equations depend on (which ones, and all numbers traced into them); the
-    sources of this package are added to it. ``trace()`` is only called when the disk cache does not know the
-    key. Raises what ``trace`` and :func:`~armblocks.compiler.compile_function` raise.
+    ``key`` must say everything that the equations depend on (which ones, and all numbers traced into them);
+    the sources of this package are added to it. ``trace()`` is only called when the disk cache does not
+    know the key. Raises what ``trace`` and :func:`~armblocks.compiler.compile_function` raise.
     """
     name = cache.record_name(key)
     record = cache.load(name)

@@ -82,7 +82,7 @@ class TapeBuilder:
     def _simplify_add(self, a: int, b: int) -> int | None:
         for x, y in ((a, b), (b, a)):
             number = self._value(y)
-            if number == 0.0 and math.copysign(1.0, number) < 0.0:  # x + -0 is x; x + 0 is not when x is -0
+            if number is not None and _is_zero(number, -1.0):  # x + -0 is x; x + 0 is not when x is -0
                 return x
             if negated := self._is(y, Opcode.NEGATE):
                 return self.add(Opcode.SUBTRACT, x, negated[0])
@@ -100,7 +100,7 @@ class TapeBuilder:
 
     def _simplify_subtract(self, a: int, b: int) -> int | None:
         number = self._value(b)
-        if number == 0.0 and math.copysign(1.0, number) > 0.0:
+        if number is not None and _is_zero(number, 1.0):
             return a
         if negated := self._is(b, Opcode.NEGATE):
             return self.add(Opcode.ADD, a, negated[0])
@@ -218,6 +218,10 @@ def _reachable(nodes: Sequence[_Node | float | None], wanted: Sequence[int]) -> 
             for operand in node[1]:
                 used[operand] = 1
     return [handle for handle, node in enumerate(nodes) if used[handle] and node is not None]
+
+
+def _is_zero(number: float, sign: float) -> bool:
+    return number == 0.0 and math.copysign(1.0, number) == sign
 
 
 def _fold(opcode: Opcode, values: list[float]) -> float:

@@ -1,10 +1,10 @@
 """Elementary functions as IR, the same operations at every number of lanes.
 
 Each is written once over a :class:`~armblocks.compiler.ir_text.Body` with additions, multiplications, fused
-multiply-adds, divisions, square roots, comparisons and bit operations only, all of which IEEE 754 defines to the
-bit. So one lane, eight lanes and every processor give the same bits, and no C library is called. Errors stay
-below 2 units in the last place (mostly below 1) over the whole range; the tests measure them. Zeros keep their
-sign, infinities, NaN and subnormal numbers are served as C99 (Annex F) says.
+multiply-adds, divisions, square roots, comparisons and bit operations only, all of which IEEE 754 defines
+to the bit. So one lane, eight lanes and every processor give the same bits, and no C library is called.
+Errors stay below 2 units in the last place (mostly below 1) over the whole range; the tests measure them.
+Zeros keep their sign, infinities, NaN and subnormal numbers are served as C99 (Annex F) says.
 """
 
 from __future__ import annotations

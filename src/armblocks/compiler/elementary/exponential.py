@@ -1,8 +1,8 @@
 """Exponentials and hyperbolic functions.
 
-``x = k ln 2 + r`` with ``|r| <= ln(2)/2`` in two parts; ``exp r - 1`` comes as an unevaluated pair, so that what is
-small stays exact to its own last place; the power of two is applied in two halves, which meets overflow and
-subnormal results without a case of its own.
+``x = k ln 2 + r`` with ``|r| <= ln(2)/2`` in two parts; ``exp r - 1`` comes as an unevaluated pair, so that
+what is small stays exact to its own last place; the power of two is applied in two halves, which meets
+overflow and subnormal results without a case of its own.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ class _Power(NamedTuple):
 
     high: str
     low: str
-    count: str
-    """The power of two as a number."""
     scale: tuple[str, str]
 
 
@@ -127,7 +125,7 @@ def _reduce(body: Body, high: str, low: str) -> _Power:
     half = body.subtract(rounded_half, rounder)
     rounded_other = body.add(body.subtract(count, half), rounder)
     scale = (_power_of_two(body, rounded_half), _power_of_two(body, rounded_other))
-    return _Power(total, body.add(error, slope), count, scale)
+    return _Power(total, body.add(error, slope), scale)
 
 
 def _power_of_two(body: Body, rounded: str) -> str:

@@ -24,7 +24,7 @@ def arc_sine(body: Body, x: str) -> str:
 
 
 def arc_cosine(body: Body, x: str) -> str:
-    """``acos x``: ``pi/2 - asin x``, above one half ``2 asin sqrt((1 - x) / 2)``, below minus one half pi less that."""
+    """``acos x``: ``pi/2 - asin x``, and ``2 asin sqrt((1 - |x|) / 2)`` or pi less that at the ends."""
     _, small, s, curve = _arc_sine_parts(body, x)
     negative = body.compare("olt", x, body.number(0.0))
 
@@ -42,7 +42,7 @@ def arc_cosine(body: Body, x: str) -> str:
 
 
 def _arc_sine_parts(body: Body, x: str) -> tuple[str, str, str, str]:
-    """``|x|``, whether it is below one half, and s, c with ``asin = s + c`` of it or of sqrt((1 - |x|) / 2)."""
+    """``|x|``; whether it is below one half; s and c, ``asin = s + c`` of it or of sqrt((1 - |x|) / 2)."""
     magnitude = body.absolute(x)
     small = body.compare("ole", magnitude, body.number(0.5))
     outer = body.multiply(body.subtract(body.number(1.0), magnitude), body.number(0.5))

@@ -1,8 +1,8 @@
 """Logarithms and inverse hyperbolic functions, all from the logarithm of an unevaluated pair.
 
-``ln(2**k m) = k ln 2 + ln m`` with ``m`` between sqrt(1/2) and sqrt(2), and ``ln m = 2 atanh s``, ``s = (m - 1) / (m +
-1)``. Every leading term is carried with its rounding error, so that the result is right to about 2**-65 of itself,
-near 1 as well; the argument may itself be such a pair.
+``ln(2**k m) = k ln 2 + ln m`` with ``m`` between sqrt(1/2) and sqrt(2), and ``ln m = 2 atanh s``,
+``s = (m - 1) / (m + 1)``. Every leading term is carried with its rounding error, so that the result is right to
+about 2**-65 of itself, near 1 as well; the argument may itself be such a pair.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def logarithm_of_one_plus(body: Body, x: str) -> str:
 
 
 def inverse_hyperbolic_sine(body: Body, x: str) -> str:
-    """``asinh x = ln(|x| + sqrt(x x + 1))`` with the sign of x; ``ln |x| + ln 2`` where the square overflows."""
+    """``asinh x = ln(|x| + sqrt(x x + 1))`` with the sign of x; ``ln 2 |x|`` where squares overflow."""
     magnitude = body.absolute(x)
     square, square_rest = body.two_product(magnitude, magnitude)
     under, under_rest = body.two_sum(square, body.number(1.0))
@@ -89,7 +89,7 @@ def inverse_hyperbolic_tangent(body: Body, x: str) -> str:
 def logarithm_of_pair(
     body: Body, high: str, low: str | None, *, doubled: str | None = None
 ) -> tuple[str, str]:
-    """``ln(high + low)`` as an unevaluated pair, for a positive finite sum; of twice that where ``doubled`` holds.
+    """``ln(high + low)`` of a positive finite sum, as an unevaluated pair; of twice it where ``doubled`` holds.
 
     Without ``low`` the argument is ``high`` alone. A subnormal ``high`` must be alone.
     """

@@ -13,7 +13,7 @@ _LONG_DIVISION = "armblocks_long_division"
 
 
 def modulo(body: Body, x: str, y: str) -> str:
-    """C's ``fmod``: the remainder of truncated division, with the sign of ``x``. NaN for y = 0 or infinite x."""
+    """C's ``fmod``: the remainder of truncated division, sign of ``x``. NaN for y = 0 or infinite x."""
     return body.intrinsic("copysign", _modulo(body, body.absolute(x), body.absolute(y)), x)
 
 
@@ -88,7 +88,7 @@ turn:
   %less = sub i64 %left, %step
   br label %head
 done:
-  ; rest 2**(exponent of b), exact: first as a number of the smallest normal's scale, then twice half the power
+  ; rest 2**(exponent of b): in units of the smallest number, then times a power of two in two halves; exact
   %number = uitofp i64 %rest to double
   %units = add i64 {exponents[1]}, -1
   %half = lshr i64 %units, 1

@@ -1,9 +1,9 @@
 """Sine, cosine, tangent.
 
-The argument is brought to ``|r| <= pi/4`` by subtracting ``k pi/2`` in three parts with fused multiply-adds (Cody
-and Waite): the first difference is exact, and what the second rounds off is kept beside ``r``. That holds up to
-``|x| = 2**31``. Beyond, ``2/pi`` is multiplied bit by bit around the binary point (Payne and Hanek 1983), in one
-lane; a block of samples with such an angle is evaluated again with one lane.
+The argument is brought to ``|r| <= pi/4`` by subtracting ``k pi/2`` in three parts with fused multiply-adds
+(Cody and Waite): the first difference is exact, and what the second rounds off is kept beside ``r``. That
+holds up to ``|x| = 2**31``. Beyond, ``2/pi`` is multiplied bit by bit around the binary point (Payne and
+Hanek 1983), in one lane; a block of samples with such an angle is evaluated again with one lane.
 """
 
 from __future__ import annotations
@@ -137,9 +137,9 @@ def _signed(body: Body, value: str, sign: str) -> str:
 def _write_huge(module: Module) -> str:
     """Text of the reduction of ``|x| >= 2**31``, infinity and NaN included, for one lane.
 
-    With ``|x| = mantissa 2**exponent``, the bits of 2/pi that weigh 4 or more in the product change the quarter
-    by multiples of four, so that a window of 192 bits below them decides; the error is below 2**-137, and no
-    double is nearer to a multiple of pi/2 than 2**-61 of a quarter.
+    With ``|x| = mantissa 2**exponent``, the bits of 2/pi that weigh 4 or more in the product change the
+    quarter by multiples of four, so that a window of 192 bits below them decides; the error is below
+    2**-137, and no double is nearer to a multiple of pi/2 than 2**-61 of a quarter.
     """
     module.add(
         "armblocks_two_over_pi",

@@ -1,0 +1,3 @@
+"""The part of llvmlite that armblocks uses, typed."""
+
+__version__: str
