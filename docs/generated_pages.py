@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 import warnings
 from pathlib import Path
 
@@ -40,18 +41,29 @@ def blocks_page() -> str:
 def block_section(kind: type[Block]) -> list[str]:
     """Heading, docstring and parameter table of one block."""
     title = kind.type_name() if kind.title == kind.type_name() else f"{kind.type_name()} ({kind.title})"
-    lines = ["", f"### {title}", "", "```{eval-rst}", inspect.cleandoc(kind.__doc__ or ""), "```"]
+    lines = ["", f"### {title}", "", prose(inspect.cleandoc(kind.__doc__ or ""))]
     if kind.parameters():
         lines += ["", "| parameter | unit | default | tunable | meaning |", "|---|---|---|---|---|"]
         lines += [parameter_row(rule) for rule in kind.parameters()]
     return lines
 
 
+def prose(docstring: str) -> str:
+    """A docstring as Markdown: code stays code, and all else, formulas with stars included, is plain text."""
+    parts = re.split(r"(?::\w+:)?(`+)(.+?)\1", docstring)
+    text = [
+        re.sub(r"([*_\[\]|$<>#])", r"\\\1", plain) + (f"`{code}`" if code else "")
+        for plain, code in zip(parts[::3], [*parts[2::3], ""])
+    ]
+    return "".join(text)
+
+
 def parameter_row(rule: Parameter) -> str:
     """One row of a block's parameter table."""
     default = "" if rule.required else f"`{rule.default}`"
-    cells = (f"`{rule.name}`", rule.unit, default, "yes" if rule.tunable else "", rule.doc)
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    meaning = f"{rule.doc}: {rule.describe()}" if rule.choices else rule.doc
+    cells = (f"`{rule.name}`", rule.unit, default, "yes" if rule.tunable else "", prose(meaning))
+    return "| " + " | ".join(cells) + " |"
 
 
 def shipped_page() -> str:
@@ -68,12 +80,13 @@ def shipped_page() -> str:
         warnings.simplefilter("ignore", ab.errors.InertiaWarning)
         for name in ab.list_robots():
             robot = ab.load_robot(name).robot
-            about = "; ".join(text for text in (robot.manufacturer, robot.comment, robot.source) if text)
+            about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
             lines.append(f"| `{name}` | {robot.joint_letters} | {about} |")
-        lines += ["", "## Examples", "", "| name | blocks | what it is |", "|---|---|---|"]
+        lines += ["", "## Examples", "", "| name | stop time | blocks |", "|---|---|---|"]
         for name in ab.list_examples():
             diagram = ab.load_diagram(name)
-            lines.append(f"| `{name}` | {len(diagram.blocks)} | |")
+            kinds = sorted({block.type_name() for block in diagram.blocks.values()})
+            lines.append(f"| `{name}` | {diagram.settings.stop_time:g} s | {', '.join(kinds)} |")
     return "\n".join(lines) + "\n"
 
 
