@@ -117,7 +117,7 @@ class _View:
 
 @cache
 def _addresses() -> list[int] | None:
-    """What the table holds, in the order of the places; None where the binary interface is not as expected."""
+    """What the table holds, in the order of the places; None where an interface is not as expected."""
     if ctypes.sizeof(ctypes.c_void_p) != 8 or not _layout_is_known():
         return None
     try:

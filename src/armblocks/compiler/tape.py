@@ -43,9 +43,7 @@ class OperationCount:
 
     @property
     def flops(self) -> int:
-        """Multiplies and adds, a fused pair being two, plus divisions and square roots; functions not
-        counted.
-        """
+        """Multiplies, adds (a fused pair is two), divisions, square roots; functions are not counted."""
         plain = self.multiplies + self.adds + self.divisions + self.square_roots
         return plain + 2 * self.fused_multiply_adds
 

@@ -1,8 +1,8 @@
 """Logarithms and inverse hyperbolic functions, all from the logarithm of an unevaluated pair.
 
 ``ln(2**k m) = k ln 2 + ln m`` with ``m`` between sqrt(1/2) and sqrt(2), and ``ln m = 2 atanh s``,
-``s = (m - 1) / (m + 1)``. Every leading term is carried with its rounding error, so that the result is right to
-about 2**-65 of itself, near 1 as well; the argument may itself be such a pair.
+``s = (m - 1) / (m + 1)``. Every leading term is carried with its rounding error, so that the result is right
+to about 2**-65 of itself, near 1 as well; the argument may itself be such a pair.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def inverse_hyperbolic_tangent(body: Body, x: str) -> str:
 def logarithm_of_pair(
     body: Body, high: str, low: str | None, *, doubled: str | None = None
 ) -> tuple[str, str]:
-    """``ln(high + low)`` of a positive finite sum, as an unevaluated pair; of twice it where ``doubled`` holds.
+    """``ln(high + low)`` of a positive finite sum as a pair; of twice it where ``doubled`` holds.
 
     Without ``low`` the argument is ``high`` alone. A subnormal ``high`` must be alone.
     """

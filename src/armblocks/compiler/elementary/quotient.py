@@ -60,7 +60,7 @@ def _modulo(body: Body, a: str, b: str) -> str:
 
 
 def _write_long_division(module: Module) -> str:
-    """Text of ``a mod b`` for finite ``a >= b > 0``: the mantissas as integers, 11 bits of quotient a turn."""
+    """Text of ``a mod b`` for finite ``a >= b > 0``: integer mantissas, 11 bits of quotient a turn."""
     body = Body(module)
     mantissas: list[str] = []
     exponents: list[str] = []
@@ -88,7 +88,7 @@ turn:
   %less = sub i64 %left, %step
   br label %head
 done:
-  ; rest 2**(exponent of b): in units of the smallest number, then times a power of two in two halves; exact
+  ; rest 2**(exponent of b), exact: units of the smallest number, times a power of two in two halves
   %number = uitofp i64 %rest to double
   %units = add i64 {exponents[1]}, -1
   %half = lshr i64 %units, 1
