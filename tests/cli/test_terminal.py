@@ -1,5 +1,6 @@
 """How messages look: every part of an error, warnings once and on one line, narrow and wide."""
 
+import io
 import warnings
 
 import pytest
@@ -40,7 +41,7 @@ def test_lines_of_a_log_are_never_wrapped(capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.mark.parametrize("width", [40, 80, 160])
 def test_a_terminal_gets_no_line_wider_than_itself(width: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    console = Console(width=width, force_terminal=True, record=True, highlight=False, file=_Nowhere())
+    console = Console(width=width, force_terminal=True, record=True, highlight=False, file=io.StringIO())
     monkeypatch.setattr(terminal, "messages_console", lambda: console)
     terminal.show_error(UnknownNameError("block", "blok7", [f"block{number}" for number in range(50)]))
     lines = console.export_text().splitlines()
@@ -61,12 +62,3 @@ def test_other_warnings_stay_pythons_own() -> None:
         pytest.raises(UserWarning, match="somebody else's"),
     ):
         warnings.warn("somebody else's", UserWarning, stacklevel=1)
-
-
-class _Nowhere:
-    """A stream that forgets."""
-
-    def write(self, text: str) -> int:
-        return len(text)
-
-    def flush(self) -> None: ...

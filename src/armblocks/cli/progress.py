@@ -44,7 +44,8 @@ class RunProgress:
             self._bar.stop()
 
     def __call__(self, simulated: float, fraction: float, real_time_factor: float) -> None:
-        where = f"t = {simulated:.4g} s, {real_time_factor:.3g} x real time"
+        reached = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
+        where = f"t = {reached} s, {real_time_factor:,.0f} x real time"
         now = time.perf_counter()
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, total=1.0, completed=fraction, where=where)

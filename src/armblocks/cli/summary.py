@@ -27,11 +27,11 @@ BEYOND = "!"
 def print_run(result: SimulationResult, console: Console) -> None:
     """One line: what was simulated, how, and how fast."""
     run = result.run
-    end = f"{result.time[-1]:g} s" if result.time.size else "nothing"
+    end = f"{result.time[-1]:,.10g} s" if result.time.size else "nothing"
     how = "evaluated at" if run.solver == "none" else f"{run.solver}, {run.steps:,} steps, recorded at"
     text = Text.assemble(
         (f"{result.name}: ", STRONG),
-        f"{end} in {run.wall_time:.3g} s, {run.real_time_factor:.3g} x real time; ",
+        f"{end} in {run.wall_time:.3g} s, {factor_text(run.real_time_factor)} x real time; ",
         f"{how} {result.time.size:,} instants",
     )
     console.print(text)
@@ -41,18 +41,21 @@ def print_run(result: SimulationResult, console: Console) -> None:
         console.print(Text.assemble(("note: ", WARNING), run.message))
 
 
+def factor_text(factor: float) -> str:
+    """A real-time factor with three digits and no exponent."""
+    return f"{factor:,.0f}" if factor >= 100 else f"{factor:.3g}"
+
+
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:
     """The last value of everything that a Display block shows."""
-    shown = table(("display", "left"), ("at the end", "left"), ("", "left"))
+    shown = table(("display", "left"), ("signal", "left"), ("at the end", "left"), ("", "left"))
     for block, view in diagram.views():
         if view.kind is not ViewKind.VALUE or not result.time.size:
             continue
         labels = view.labels or ("",) * len(view.signals)
         for signal, label in zip(view.signals, labels):
-            path = f"{block}/{signal}"
-            value = np.asarray(result[path][-1])
-            name = label or (block if len(view.signals) == 1 else path)
-            shown.add_row(name, _value_text(value), result.units[result.resolve(path)])
+            path = result.resolve(f"{block}/{signal}")
+            shown.add_row(block, label or path, _value_text(np.asarray(result[path][-1])), result.units[path])
     if shown.row_count:
         console.print()
         console.print(shown)
