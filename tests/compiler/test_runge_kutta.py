@@ -13,11 +13,11 @@ from casadi import SX
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, hermite_dense
 from armblocks.compiler.from_casadi import tape_from
+from armblocks.compiler.integrator_workspace import Status
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.native import load_code
 from armblocks.compiler.native_integrator import NativeIntegrator
-from armblocks.compiler.runge_kutta import Status, _Loop
 from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
 
@@ -68,10 +68,8 @@ def test_inverse_root_is_right_to_the_last_place_over_all_magnitudes(k: int) -> 
     module = Module()
 
     def write() -> str:
-        loop = _Loop(module, PAIR, 1, "unused")
         w = Routine(module)
-        loop.w = w
-        w.do(f"ret double {loop.inverse_root('%a', k)}")
+        w.do(f"ret double {w.inverse_root('%a', k)}")
         return w.text("define double @root(double %a)")
 
     module.define("root", write)

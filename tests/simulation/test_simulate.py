@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -11,8 +13,9 @@ from scipy.special import ellipk
 from small_systems import oscillator, scalar, states_of, system, van_der_pol_pid
 
 from armblocks.compiler.system import CompiledSystem, compile_system
-from armblocks.equations import SimulationOptions, signature
-from armblocks.simulation import SimulationResult, simulate
+from armblocks.equations import SimulationOptions
+from armblocks.equations import signature as layout
+from armblocks.simulation import SimulationResult, find_tableau, simulate
 
 OSCILLATOR = compile_system(oscillator())
 VAN_DER_POL = compile_system(van_der_pol_pid())
@@ -24,7 +27,7 @@ def pendulum() -> CompiledSystem:
         system(
             "pendulum",
             states=states_of("pendulum/q", "pendulum/qd"),
-            signals=signature(
+            signals=layout(
                 ("pendulum/p", (2,), "m"), ("pendulum/v", (2,), "m/s"), ("pendulum/energy", (), "J")
             ),
             derivative=lambda t, x, p: ca.vertcat(x[1], -9.81 * ca.sin(x[0])),
@@ -110,11 +113,11 @@ def jumping() -> CompiledSystem:
         system(
             "jump",
             states=states_of("integrator/x"),
-            signals=signature(("step/y", ()), ("integrator/y", ())),
+            signals=layout(("step/y", ()), ("integrator/y", ())),
             derivative=lambda t, x, p: step(t, p),
             outputs=lambda t, x, p: ca.vertcat(step(t, p), x),
             initial=(0.0,),
-            parameters=signature(("step.time", ())),
+            parameters=layout(("step.time", ())),
             values=(0.35,),
             breakpoints=lambda p: [p[0]],
         )
@@ -135,7 +138,7 @@ def test_a_system_without_states_is_evaluated_directly() -> None:
     clock = compile_system(
         system(
             "clock",
-            signals=signature(("clock/y", (), "s"), ("pose/T", (2, 2))),
+            signals=layout(("clock/y", (), "s"), ("pose/T", (2, 2))),
             outputs=lambda t, x, p: ca.vertcat(t, ca.cos(t), -ca.sin(t), ca.sin(t), ca.cos(t)),
         )
     )
@@ -215,6 +218,24 @@ def test_ctrl_c_keeps_what_is_there_and_marks_it() -> None:
     whole = simulate(OSCILLATOR, SimulationOptions(stop_time=5.0, solver="rk4", step=1e-4, sample_time=0.5))
     kept = min(result.time.size, whole.time.size)
     assert result.states[:kept].tobytes() == whole.states[:kept].tobytes()
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="POSIX timers")
+def test_a_signal_from_outside_ends_a_long_native_run_soon() -> None:
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        OSCILLATOR.integrator(find_tableau("rk4"))
+        signal.setitimer(signal.ITIMER_REAL, 0.15)
+        options = SimulationOptions(stop_time=1e6, solver="rk4", step=1e-4, sample_time=1.0)  # minutes
+        result = simulate(OSCILLATOR, options)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, previous)
+    assert not result.run.complete
+    assert result.run.wall_time < 5.0  # a tenth of it on a free machine
 
 
 def test_runs_repeat_bit_for_bit() -> None:

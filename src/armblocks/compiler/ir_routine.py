@@ -38,6 +38,27 @@ class Routine(Body):
         """The larger one; ``b`` where either is NaN."""
         return self.select(self.compare("ogt", a, b), a, b)
 
+    def inverse_root(self, a: str, k: int) -> str:
+        """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, to the last place or so.
+
+        A first guess from the divided bits, its excess centred by 0.064, then twice ``y (1 - r)^(-1/k)`` with
+        ``r = 1 - a y^k`` (below 0.25, then 1e-3), as its Taylor polynomial of degree 4. All operations are
+        exactly rounded: no library's ``pow`` decides a step.
+        """
+        one = 1023 << 52
+        offset = one + one // k - int(0.064 * (1 << 52))
+        y = self.from_bits(self.word_op("sub", str(offset), self.word_op("udiv", self.bits(a), str(k))))
+        coefficients = [1.0]
+        for m in range(4):
+            coefficients.append(coefficients[-1] * (1 / k + m) / (m + 1))
+        for _ in range(2):
+            power = y
+            for _ in range(k - 1):
+                power = self.multiply(power, y)
+            r = self.subtract(self.number(1.0), self.multiply(a, power))
+            y = self.multiply(y, self.polynomial(r, coefficients))
+        return y
+
     # Memory.
 
     def variable(self, kind: str, initial: str) -> str:

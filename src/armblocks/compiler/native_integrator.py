@@ -10,10 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.integrator_workspace import (
+    Count,
+    Real,
+    Status,
+    slope_place,
+    state_place,
+    trial_place,
+    workspace_size,
+)
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
-from armblocks.compiler.runge_kutta import Count, Real, Status, emit_integrator, workspace_size
+from armblocks.compiler.runge_kutta import emit_integrator
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
@@ -117,7 +126,10 @@ class Integration:
     @property
     def state(self) -> Vector:
         """State there, ``(n,)``: a view."""
-        return self.reals[Real.END : Real.END + self.integrator.states]
+        return self._vector(state_place())
+
+    def _vector(self, place: int) -> Vector:
+        return self.reals[place : place + self.integrator.states]
 
     @property
     def last_step(self) -> float:
@@ -145,15 +157,13 @@ class Integration:
         return int(self.counts[Count.EVALUATIONS])
 
     def _stage_derivatives(self) -> Vector:
-        n, rows = self.integrator.states, self.integrator.tableau.rows
-        first = Real.END + 2 * n
-        return self.reals[first : first + rows * n].reshape(rows, n)
+        n = self.integrator.states
+        return self.reals[slope_place(n, 0) :].reshape(self.integrator.tableau.rows, n)
 
     def weighted_errors(self) -> Vector:
         """Error of every state in the step tried last, over what is allowed, ``(n,)`` (adaptive methods)."""
-        tableau, n = self.integrator.tableau, self.integrator.states
-        weights = np.array(tableau.error)
-        after = self.reals[Real.END + n : Real.END + 2 * n]
+        weights = np.array(self.integrator.tableau.error)
+        after = self._vector(trial_place(self.integrator.states))
         rtol, atol = self.reals[Real.RTOL], self.reals[Real.ATOL]
         error = self.last_step * (weights @ self._stage_derivatives()[: weights.size])
         return np.abs(error) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))
@@ -162,9 +172,10 @@ class Integration:
         """Time and state at which the derivative of the step tried last became NaN or infinite first."""
         tableau = self.integrator.tableau
         K, h, clamp = self._stage_derivatives(), self.last_step, self._kept[3][self.counts[Count.SEGMENT]]
-        rows = [*tableau.matrix, tableau.weights]
-        for stage, (row, node) in enumerate(zip(rows, [*tableau.nodes, 1.0])):
-            if not np.isfinite(K[stage]).all() or stage == tableau.stages:
-                state = self.state + h * (np.array(row) @ K[: len(row)]) if row else self.state.copy()
-                return min(self.time + node * h, float(clamp)), state
-        raise AssertionError("unreachable: the last row always returns")
+        bad = [stage for stage in range(tableau.stages) if not np.isfinite(K[stage]).all()]
+        stage = bad[0] if bad else tableau.stages
+        row = [*tableau.matrix, tableau.weights][stage]
+        state = self.state.copy()
+        for weight, slope in zip(row, K):
+            state += h * weight * slope
+        return min(self.time + [*tableau.nodes, 1.0][stage] * h, float(clamp)), state

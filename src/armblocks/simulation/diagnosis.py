@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.compiler.integrator_workspace import Status
 from armblocks.compiler.native_integrator import Integration
-from armblocks.compiler.runge_kutta import Status
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
@@ -22,11 +22,7 @@ MANY_STEPS = 20_000
 
 def element_name(layout: Signature, place: int) -> str:
     """The name of scalar ``place`` of a flat vector: ``arm/q[2]``."""
-    for slot in layout:
-        if place < slot.size:
-            return element_names(slot)[place]
-        place -= slot.size
-    raise IndexError(place)
+    return [name for slot in layout for name in element_names(slot)][place]
 
 
 def first_bad_signal(

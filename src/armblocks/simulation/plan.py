@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 
 DEFAULT_INSTANTS = 1000
 """Intervals that are recorded where nobody says a sample time: 10 s in steps of 10 ms."""
-MOST_INSTANTS = 20_000_000
+MOST_NUMBERS = 500_000_000
+"""Recorded doubles of one run, 4 GB: beyond it the computer would suffer before the run does."""
 SMALLEST_RTOL = 1e-13
 """Below it the rounding of doubles decides, not the method."""
 
@@ -50,7 +51,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
                 fix="choose a smaller step",
             )
     tableau, reason = _choose(system, options)
-    sample_time = _sample_time(options, stop, None if tableau is None or tableau.adaptive else step)
+    sample_time = _sample_time(system, options, stop, None if tableau is None or tableau.adaptive else step)
     rtol, atol = options.rtol, options.atol
     if not SMALLEST_RTOL <= rtol <= 1.0:
         raise InputError(
@@ -102,7 +103,9 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Butcher
     return named, f"asked for: {named.title}"
 
 
-def _sample_time(options: SimulationOptions, stop: float, fixed_step: float | None) -> float:
+def _sample_time(
+    system: CompiledSystem, options: SimulationOptions, stop: float, fixed_step: float | None
+) -> float:
     """As asked; else the fixed step or its multiple that gives at most 10 000 rows; else stop / 1000."""
     if options.sample_time is not None:
         sample_time = _number("sample_time", options.sample_time, "a time in s above 0", above=0.0)
@@ -110,10 +113,13 @@ def _sample_time(options: SimulationOptions, stop: float, fixed_step: float | No
         sample_time = fixed_step * max(1, math.ceil(stop / fixed_step / 10_000 * (1.0 - 1e-9)))
     else:
         sample_time = stop / DEFAULT_INSTANTS if stop > 0.0 else 1.0
-    if stop / sample_time > MOST_INSTANTS:
+    width = 1 + system.states.size + system.signals_layout.size
+    if stop / sample_time * width > MOST_NUMBERS:
         raise InputError(
-            f"a sample time of {sample_time:g} s over {stop:g} s records {stop / sample_time:.3g} instants",
-            allowed=f"at most {MOST_INSTANTS}",
+            f"a sample time of {sample_time:g} s over {stop:g} s records {stop / sample_time:.3g} instants of "
+            f"{width} numbers",
+            where=system.name,
+            allowed=f"at most {MOST_NUMBERS // width} instants, which take 4 GB",
             fix="choose a larger sample_time: it has no effect on the accuracy of the steps",
         )
     return sample_time

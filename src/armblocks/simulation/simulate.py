@@ -8,8 +8,8 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.compiler.integrator_workspace import Status
 from armblocks.compiler.native_integrator import Integration
-from armblocks.compiler.runge_kutta import Status
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError

@@ -1,0 +1,211 @@
+"""The arithmetic of one Runge-Kutta step as LLVM IR: stages, error norm, first step, values between steps.
+
+Everything is written for vectors of ``n`` states that lie in the workspace ``%reals``: the old state x, the
+new one y and the stage derivatives K. Nothing here decides; the loop around it is
+:mod:`armblocks.compiler.runge_kutta`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from armblocks.compiler.butcher_tableau import ButcherTableau, Row
+from armblocks.compiler.integrator_workspace import Real, slope_place, state_place, trial_place
+from armblocks.compiler.ir_routine import Routine
+from armblocks.compiler.ir_text import number_text
+
+
+class StepWriter:
+    """Appends the arithmetic of ``tableau``'s steps to a routine that has ``%reals`` and ``%p``.
+
+    ``derivative`` names a function ``void (ptr t, ptr x, ptr p, ptr xd)`` of the same module. ``clamp`` and
+    ``evaluations`` are variables: the latest time to evaluate it at, and how often it was called.
+    """
+
+    def __init__(
+        self,
+        routine: Routine,
+        tableau: ButcherTableau,
+        states: int,
+        derivative: str,
+        clamp: str,
+        evaluations: str,
+    ) -> None:
+        self.w = routine
+        self.tableau = tableau
+        self.n = states
+        self.x = state_place()
+        self.y = trial_place(states)
+        self._derivative = derivative
+        self._clamp = clamp
+        self._evaluations = evaluations
+        self._instant = routine.variable("double", number_text(0.0))
+        self._rtol = routine.get(routine.at("%reals", Real.RTOL))
+        self._atol = routine.get(routine.at("%reals", Real.ATOL))
+
+    # Vectors in the workspace.
+
+    def K(self, row: int) -> int:
+        """Place of row ``row`` of the stage derivatives."""
+        return slope_place(self.n, row)
+
+    def element(self, place: int, index: str) -> str:
+        """Address of element ``index`` of the vector at ``place``."""
+        return self.w.at("%reals", self.w.word_op("add", index, str(place)))
+
+    def read(self, place: int, index: str) -> str:
+        """Element ``index`` of the vector at ``place``."""
+        return self.w.get(self.element(place, index))
+
+    def copy(self, source: int, target: int) -> None:
+        """``target = source``."""
+        self.w.for_each(self.n, lambda i: self.w.put(self.read(source, i), self.element(target, i)))
+
+    def evaluate(self, time: str, state: int, row: int) -> None:
+        """``K[row] = f(min(time, clamp), state)``: before a breakpoint the old value of a jump holds."""
+        w = self.w
+        w.put(w.minimum(time, w.get(self._clamp)), self._instant)
+        x, xd = w.at("%reals", state), w.at("%reals", self.K(row))
+        w.do(f"call void @{self._derivative}(ptr {self._instant}, ptr {x}, ptr %p, ptr {xd})")
+        w.increase(self._evaluations)
+
+    def move(self, weights: Row, h: str) -> None:
+        """``y = x + h sum_j weights[j] K[j]``."""
+
+        def write(index: str) -> None:
+            moved = self.w.fma(h, self._combination(weights, index), self.read(self.x, index))
+            self.w.put(moved, self.element(self.y, index))
+
+        self.w.for_each(self.n, write)
+
+    def all_finite(self, *places: int) -> str:
+        """Whether every element of the vectors is finite: ``0 v`` is NaN for an infinity or a NaN."""
+
+        def term(index: str, total: str) -> str:
+            for place in places:
+                total = self.w.fma(self.read(place, index), number_text(0.0), total)
+            return total
+
+        return self.w.compare("oeq", self._total(term), number_text(0.0))
+
+    # The step.
+
+    def stages(self, time: str, h: str, new_time: str) -> None:
+        """All stages, the new state into y and the derivative there into row ``s`` of K."""
+        tableau = self.tableau
+        for stage in range(1, tableau.stages):
+            self.move(tableau.matrix[stage], h)
+            self.evaluate(self.w.fma(number_text(tableau.nodes[stage]), h, time), self.y, stage)
+        self.move(tableau.weights, h)
+        self.evaluate(new_time, self.y, tableau.stages)
+
+    def error_norm(self, h: str, error: Row) -> str:
+        """Weighted root-mean-square norm of the error estimate of the step to y."""
+        w, stretched = self.w, self.tableau.stretched_error
+
+        def weighted(weights: Row) -> Callable[[str], str]:
+            def element(index: str) -> str:
+                before, after = (w.absolute(self.read(place, index)) for place in (self.x, self.y))
+                return w.divide(self._combination(weights, index), self._scale(w.maximum(before, after)))
+
+            return element
+
+        if stretched is None:
+            return w.multiply(h, self._mean_square(weighted(error)))
+        e5, e3 = self._square(weighted(error)), self._square(weighted(stretched))
+        denominator = w.square_root(w.multiply(w.fma(number_text(0.01), e3, e5), number_text(float(self.n))))
+        norm = w.divide(w.multiply(h, e5), denominator)
+        nothing = w.compare("oeq", denominator, number_text(0.0))
+        return w.select(nothing, number_text(0.0), norm)
+
+    def first_step(self, time: str, interval: str, max_step: str) -> str:
+        """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it."""
+        w = self.w
+
+        def weighted(value: Callable[[str], str]) -> Callable[[str], str]:
+            return lambda i: w.divide(value(i), self._scale(w.absolute(self.read(self.x, i))))
+
+        d0 = self._mean_square(weighted(lambda i: self.read(self.x, i)))
+        d1 = self._mean_square(weighted(lambda i: self.read(self.K(0), i)))
+        tiny = number_text(1e-5)
+        small = w.either(w.compare("olt", d0, tiny), w.compare("olt", d1, tiny))
+        h0 = w.select(small, number_text(1e-6), w.divide(w.multiply(number_text(0.01), d0), d1))
+        h0 = w.minimum(h0, interval)
+        self.move((1.0,), h0)
+        self.evaluate(w.add(time, h0), self.y, 1)
+        change = weighted(lambda i: w.subtract(self.read(self.K(1), i), self.read(self.K(0), i)))
+        d2 = w.divide(self._mean_square(change), h0)
+        steepest = w.maximum(d2, d1)
+        # Kept inside the range of inverse_root; beyond it the other bounds decide anyway.
+        bounded = w.multiply(number_text(100.0), steepest)
+        bounded = w.maximum(w.minimum(bounded, number_text(1e300)), number_text(1e-300))
+        h1 = w.select(
+            w.compare("ole", steepest, number_text(1e-15)),
+            w.maximum(w.multiply(h0, number_text(1e-3)), number_text(1e-6)),
+            w.inverse_root(bounded, self.tableau.error_order + 1),
+        )
+        h = w.minimum(h1, w.multiply(number_text(100.0), h0))
+        return w.minimum(w.minimum(h, interval), max_step)
+
+    # Between steps.
+
+    def extra_stages(self, time: str, h: str) -> None:
+        """The stages that only the dense output needs; y keeps its value."""
+        tableau = self.tableau
+        for k, node in enumerate(tableau.extra_nodes):
+            self.move(tableau.extra_matrix[k], h)
+            self.evaluate(self.w.fma(number_text(node), h, time), self.y, tableau.stages + 1 + k)
+        # The extra stages went through y: give it the new state again, by the same operations.
+        self.move(tableau.weights, h)
+
+    def interpolate(self, instant: str, time: str, h: str, target: str) -> None:
+        """The state at ``instant``, between ``time`` and ``time + h``, to the address ``target``."""
+        w = self.w
+        theta = w.divide(w.subtract(instant, time), h)
+        weights = [
+            (row, w.multiply(w.polynomial(theta, powers), theta))
+            for row, powers in enumerate(self.tableau.dense)
+            if any(powers)
+        ]
+
+        def write(index: str) -> None:
+            total = number_text(0.0)
+            for row, weight in weights:
+                total = w.fma(weight, self.read(self.K(row), index), total)
+            w.put(w.fma(h, total, self.read(self.x, index)), w.at(target, index))
+
+        w.for_each(self.n, write)
+
+    # Sums.
+
+    def _scale(self, magnitude: str) -> str:
+        return self.w.fma(magnitude, self._rtol, self._atol)
+
+    def _combination(self, weights: Row, index: str) -> str:
+        """``sum_j weights[j] K[j][index]``, zeros left out."""
+        w = self.w
+        total: str | None = None
+        for row, weight in enumerate(weights):
+            if weight != 0.0:
+                factors = number_text(weight), self.read(self.K(row), index)
+                total = w.multiply(*factors) if total is None else w.fma(*factors, total)
+        return total or number_text(0.0)
+
+    def _total(self, term: Callable[[str, str], str]) -> str:
+        """``sum_i``: ``term(index, sum so far)`` gives the next sum."""
+        total = self.w.variable("double", number_text(0.0))
+        self.w.for_each(self.n, lambda index: self.w.put(term(index, self.w.get(total)), total))
+        return self.w.get(total)
+
+    def _square(self, element: Callable[[str], str]) -> str:
+        """``sum_i element(i)^2``."""
+
+        def term(index: str, total: str) -> str:
+            value = element(index)
+            return self.w.fma(value, value, total)
+
+        return self._total(term)
+
+    def _mean_square(self, element: Callable[[str], str]) -> str:
+        """``sqrt(sum_i element(i)^2 / n)``."""
+        return self.w.square_root(self.w.divide(self._square(element), number_text(float(self.n))))
