@@ -115,9 +115,9 @@ def _sample_time(
         sample_time = stop / DEFAULT_INSTANTS if stop > 0.0 else 1.0
     width = 1 + system.states.size + system.signals_layout.size
     if stop / sample_time * width > MOST_NUMBERS:
+        instants = f"{stop / sample_time:.3g} instants of {width} numbers"
         raise InputError(
-            f"a sample time of {sample_time:g} s over {stop:g} s records {stop / sample_time:.3g} instants of "
-            f"{width} numbers",
+            f"a sample time of {sample_time:g} s over {stop:g} s records {instants}",
             where=system.name,
             allowed=f"at most {MOST_NUMBERS // width} instants, which take 4 GB",
             fix="choose a larger sample_time: it has no effect on the accuracy of the steps",
