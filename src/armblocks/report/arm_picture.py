@@ -62,10 +62,11 @@ class Stage:
         floor = foot
         if low[2] < foot - 0.02 * reach(robot):
             floor = math.floor(float(low[2]) / (spacing / 2)) * (spacing / 2)
-        x0, y0 = (math.floor(float(v) / spacing) * spacing for v in low[:2])
-        x1, y1 = (math.ceil(float(v) / spacing) * spacing for v in high[:2])
-        rim = np.array([(x, y, floor) for x in (x0, x1) for y in (y0, y1)])
-        camera = Camera.framing(np.concatenate([points, rim]), width, height, margin=margin)
+        x0, y0 = ((math.floor(float(v) / spacing) - 8) * spacing for v in low[:2])
+        x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
+        under = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
+        # The corners of the floor below the arm may touch the edge, the arm may not.
+        camera = Camera.framing(np.concatenate([points, under]), width, height, margin=margin)
         return cls(
             bodies=bodies,
             pedestal=_pedestal(robot, foot, floor),
@@ -98,8 +99,8 @@ def moments_picture(
     gap = 12.0
     width = (FIGURE_WIDTH - gap * (columns - 1)) / columns
     width = math.floor(width)
-    height, caption = round(width * 0.86), 34.0
-    stage = Stage.framing(robot, poses[picked], path, width, height)
+    height, caption = round(width * 0.84), 34.0
+    stage = Stage.framing(robot, poses[picked], path, width, height, margin=16.0)
     ghost = stage.render(poses[picked[0]])
     rows = math.ceil(moments / columns)
     picture = Picture(
@@ -189,16 +190,33 @@ def _raster(stage: Stage, pose: _Array, body: Rendering, ghost: Rendering | None
 
 
 def _floor(stage: Stage) -> list[Polyline]:
-    """The floor grid, one line each spacing."""
+    """The floor grid, one line each spacing, out to the panel's edge."""
     spacing, x0, x1, y0, y1 = stage.grid
-    marks: list[Polyline] = []
     xs = [x0 + k * spacing for k in range(round((x1 - x0) / spacing) + 1)]
     ys = [y0 + k * spacing for k in range(round((y1 - y0) / spacing) + 1)]
     ends = [*(((x, y0), (x, y1)) for x in xs), *(((x0, y), (x1, y)) for y in ys)]
+    marks: list[Polyline] = []
     for a, b in ends:
         line = stage.camera.flat(np.array([(*a, stage.floor), (*b, stage.floor)]))
-        marks.append(Polyline(line, stroke=Tone.HAIRLINE, width=0.7, sharp=True))
+        shown = _clipped(line, stage.width, stage.height)
+        if shown is not None:
+            marks.append(Polyline(shown, stroke=Tone.HAIRLINE, width=0.7, sharp=True))
     return marks
+
+
+def _clipped(line: _Array, width: float, height: float) -> _Array | None:
+    """The part of a straight line (2, 2) inside the panel, None if there is none (Liang and Barsky 1984)."""
+    start, step = line[0], line[1] - line[0]
+    enter, leave = 0.0, 1.0
+    for axis, limit in ((0, width), (1, height)):
+        inset = 1.0
+        if step[axis] == 0:
+            if not inset <= start[axis] <= limit - inset:
+                return None
+            continue
+        t0, t1 = sorted(((inset - start[axis]) / step[axis], (limit - inset - start[axis]) / step[axis]))
+        enter, leave = max(enter, float(t0)), min(leave, float(t1))
+    return np.stack([start + enter * step, start + leave * step]) if enter < leave else None
 
 
 def _path_marks(stage: Stage, body: Rendering, path: _Array, now: int) -> list[Polyline | Disc]:

@@ -54,7 +54,9 @@ def time_chart(
 ) -> Picture:
     """Panels under one another over one time axis (s), each line named at its right end."""
     spans = [_value_range(panel) for panel in panels]
-    ticks = [nice_ticks(low, high, 4) for low, high in spans]
+    ticks = [
+        nice_ticks(low, high, 4, degrees=panel.unit == "deg") for panel, (low, high) in zip(panels, spans)
+    ]
     left = 14 + max(text_width(axis_number(v), SMALL_SIZE) for values in ticks for v in values)
     left = max(left, 48.0)
     right = FIGURE_WIDTH - _LABEL_ROOM

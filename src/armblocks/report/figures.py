@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from armblocks.report.numbers import axis_number, si_prefix
 from armblocks.report.path_chart import path_chart, side_by_side
 from armblocks.report.picture import Picture
 from armblocks.report.style import FIGURE_WIDTH
+from armblocks.report.svg import svg_marks
 from armblocks.simulation.result import SimulationResult
 
 _Array = NDArray[np.float64]
@@ -37,6 +39,11 @@ class Figure:
     picture: Picture
     narrow: bool = False
     """Stands beside others of its kind, not across the whole page."""
+
+    @cached_property
+    def svg_marks(self) -> str:
+        """The marks as SVG, the same for the file and for the page."""
+        return svg_marks(self.picture)
 
 
 def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
@@ -237,8 +244,8 @@ def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
         y,
         x_label=labels[0],
         y_label=labels[1],
-        width=FIGURE_WIDTH / 2 - 6,
-        height=390.0,
+        width=(FIGURE_WIDTH - 24) / 3,
+        height=330.0,
         equal=bool(x_unit) and x_unit == y_unit,
     )
     picture.title = f"XY graph {block}"

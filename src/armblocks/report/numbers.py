@@ -19,29 +19,33 @@ def nice_step(rough: float) -> float:
     return 10.0 * power
 
 
-def nice_ticks(low: float, high: float, count: int) -> list[float]:
-    """About ``count`` round values within ``low`` .. ``high``."""
+def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) -> list[float]:
+    """About ``count`` round values within ``low`` .. ``high``; wide angles in parts of a turn."""
     step = nice_step((high - low) / max(count, 1))
+    if degrees and high - low > 60:
+        step = next(
+            (s for s in (15.0, 30.0, 45.0, 90.0, 180.0, 360.0) if s * count >= (high - low) * 0.7), step
+        )
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     return [k * step + 0.0 for k in range(first, last + 1)]
 
 
-def axis_number(value: float) -> str:
-    """A tick label: up to six significant digits, no trailing zeros, thin groups for long numbers."""
+def axis_number(value: float, digits: int = 6) -> str:
+    """A tick label: up to ``digits`` significant digits, no trailing zeros, thin groups for long numbers."""
     if not math.isfinite(value):
         return "not a number" if math.isnan(value) else ("∞" if value > 0 else MINUS + "∞")
-    text = f"{value:.6g}"
+    text = f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
         return f"{mantissa}e{int(exponent)}".replace("-", MINUS)
     whole, _, fraction = text.partition(".")
-    digits = whole.lstrip("-")
-    if len(digits) > 4:
+    left = whole.lstrip("-")
+    if len(left) > 4:
         groups: list[str] = []
-        while digits:
-            groups.insert(0, digits[-3:])
-            digits = digits[:-3]
+        while left:
+            groups.insert(0, left[-3:])
+            left = left[:-3]
         whole = ("-" if value < 0 else "") + "\u202f".join(groups)
     return (whole + ("." + fraction if fraction else "")).replace("-", MINUS)
 
@@ -50,7 +54,7 @@ def table_number(value: float, digits: int = 4) -> str:
     """A number for a table: ``digits`` significant digits, trailing zeros kept off, zero as 0."""
     if value == 0 or not math.isfinite(value):
         return axis_number(value)
-    return axis_number(float(f"{value:.{digits}g}"))
+    return axis_number(value, digits)
 
 
 def si_prefix(largest: float) -> tuple[float, str]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from armblocks.diagram import Diagram, ViewKind
-from armblocks.report.analysis import LimitFinding, LimitKind, MotionSummary, people_unit
+from armblocks.report.analysis import MotionSummary
 from armblocks.report.figures import Figure
 from armblocks.report.motion import Motion
-from armblocks.report.numbers import MINUS, axis_number, si_prefix, table_number
+from armblocks.report.numbers import axis_number, si_prefix
 from armblocks.report.page_style import page_css
+from armblocks.report.page_tables import html_table, limits_table, loads_table, tool_table, value_cell
 from armblocks.report.picture import Picture
-from armblocks.report.style import trace_tone
 from armblocks.report.svg import escape, svg_inline
 from armblocks.robot import inertia_findings
 from armblocks.simulation.result import SimulationResult
@@ -146,7 +146,7 @@ def _notices(contents: ReportContents) -> str:
 def _figure(figure: Figure) -> str:
     kind = "narrow" if figure.narrow else "wide"
     return (
-        f'<figure class="{kind}">{svg_inline(figure.picture, "fig-" + figure.name)}'
+        f'<figure class="{kind}">{svg_inline(figure.picture, "fig-" + figure.name, marks=figure.svg_marks)}'
         f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
     )
 
@@ -161,135 +161,11 @@ def _motion(motion: Motion, summary: MotionSummary, figures: Sequence[Figure]) -
     return (
         "".join(_figure(figure) for figure in figures)
         + "<h3>Joints against their limits</h3>"
-        + _limits_table(summary)
-        + (("<h3>Loads</h3>" + _loads_table(motion, summary)) if motion.tau is not None else "")
+        + limits_table(summary)
+        + (("<h3>Loads</h3>" + loads_table(motion, summary)) if motion.tau is not None else "")
         + "<h3>Tool</h3>"
-        + _tool_table(summary)
+        + tool_table(summary)
     )
-
-
-def _limits_table(summary: MotionSummary) -> str:
-    broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
-    heads = [
-        ("Joint", ""), ("Range used", ""), ("Range allowed", ""), ("Margin", ""), ("Peak speed", ""),
-        ("at", "s"), ("Speed allowed", ""), ("Speed used", "%"), ("Peak acceleration", ""),
-    ]  # fmt: skip
-    same_unit = len({joint.unit for joint in summary.joints}) == 1
-    if same_unit and summary.joints:
-        unit = summary.joints[0].unit
-        position, speed = people_unit(LimitKind.POSITION, unit)[1], people_unit(LimitKind.SPEED, unit)[1]
-        units = ["", position, position, position, speed, "s", speed, "%", f"{speed}²"]
-        heads = [(title, unit) for (title, _), unit in zip(heads, units)]
-    rows: list[str] = []
-    for index, joint in enumerate(summary.joints):
-        factor, unit = people_unit(LimitKind.POSITION, joint.unit)
-        tail = "" if same_unit else f' <span class="unit">{unit}</span>'
-        allowed = "not limited"
-        if joint.position_limits is not None:
-            allowed = _span(joint.position_limits[0] * factor, joint.position_limits[1] * factor)
-        share = None if joint.speed_share is None else 100 * joint.speed_share
-        cells = [
-            _cell(_span(joint.position_min * factor, joint.position_max * factor) + tail),
-            _cell(allowed),
-            _judged(joint.position_margin, factor, broken.get((joint.name, LimitKind.POSITION))),
-            _judged(joint.speed_peak, factor, broken.get((joint.name, LimitKind.SPEED))),
-            _cell(table_number(joint.speed_peak_time, 3)),
-            _cell("not limited" if joint.speed_limit is None else table_number(joint.speed_limit * factor)),
-            _cell("" if share is None else table_number(share, 3)),
-            _cell(table_number(joint.acceleration_peak * factor)),
-        ]
-        rows.append(_row(joint.name, index, cells))
-    return _table("Positions and speeds of each joint over the run", heads, rows)
-
-
-def _loads_table(motion: Motion, summary: MotionSummary) -> str:
-    broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
-    torque = "N m" if set(motion.robot.joint_units) == {"rad"} else "N m or N"
-    heads = [
-        ("Joint", ""), ("Peak torque", torque), ("RMS torque", torque), ("Motor peak", "N m"),
-        ("Motor RMS", "N m"), ("Motor speed", "rev/min"), ("Peak power", "W"), ("Work done", "J"),
-        ("Work taken", "J"),
-    ]  # fmt: skip
-    rows = [
-        _row(
-            joint.name,
-            index,
-            [
-                _judged(joint.torque_peak, 1.0, broken.get((joint.name, LimitKind.TORQUE))),
-                _cell(_optional(joint.torque_rms)),
-                _cell(_optional(joint.motor_torque_peak)),
-                _cell(_optional(joint.motor_torque_rms)),
-                _cell(_optional(joint.motor_speed_peak, 30 / np.pi)),
-                _cell(_optional(joint.power_peak)),
-                _cell(_optional(joint.work_done)),
-                _cell(_optional(joint.work_taken)),
-            ],
-        )
-        for index, joint in enumerate(summary.joints)
-    ]
-    done = sum(joint.work_done or 0.0 for joint in summary.joints)
-    taken = sum(joint.work_taken or 0.0 for joint in summary.joints)
-    total = ["", "", "", "", "", _optional(summary.power_peak), table_number(done), table_number(taken)]
-    rows.append(f'<tr><th scope="row">All</th>{"".join(_cell(text) for text in total)}</tr>')
-    note = (
-        "Torques at the joint; the motor's are divided by the gear ratio, its speed multiplied by it. "
-        "Work done: what the drives put in; taken: what they brake."
-    )
-    return _table(note, heads, rows)
-
-
-def _tool_table(summary: MotionSummary) -> str:
-    heads = [("", ""), ("x", "m"), ("y", "m"), ("z", "m")]
-    rows = [
-        f'<tr><th scope="row">{word}</th>{"".join(_cell(_fixed(v)) for v in place)}</tr>'
-        for word, place in (("Start", summary.tool_start), ("End", summary.tool_end))
-    ]
-    return (
-        _table("Position of the tool in the world", heads, rows)
-        + f"<p>Path length {table_number(summary.tool_path_length, 5)} m, "
-        f"greatest speed {table_number(summary.tool_speed_peak)} m/s.</p>"
-    )
-
-
-def _fixed(value: float) -> str:
-    return f"{value:.6f}".replace("-", MINUS)
-
-
-def _table(caption: str, heads: Sequence[tuple[str, str]], rows: Sequence[str]) -> str:
-    head = "".join(
-        f'<th scope="col">{title}' + (f'<span class="unit">{unit}</span>' if unit else "") + "</th>"
-        for title, unit in heads
-    )
-    return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
-        f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>"
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
-    )
-
-
-def _row(name: str, index: int, cells: Sequence[str]) -> str:
-    key = f'<span class="key" style="background:var(--{trace_tone(index).value})"></span>'
-    return f'<tr><th scope="row">{key}{escape(name)}</th>{"".join(cells)}</tr>'
-
-
-def _cell(text: str) -> str:
-    return f"<td>{text}</td>"
-
-
-def _judged(value: float | None, factor: float, finding: LimitFinding | None) -> str:
-    text = _optional(value, factor)
-    if finding is None:
-        return _cell(text)
-    since = table_number(finding.first_time, 3)
-    return f'<td class="bad">{text}<small>over limit from {since} s</small></td>'
-
-
-def _optional(value: float | None, factor: float = 1.0) -> str:
-    return "" if value is None else table_number(value * factor)
-
-
-def _span(low: float, high: float) -> str:
-    return f"{table_number(low)} … {table_number(high)}"
 
 
 def _displays(contents: ReportContents) -> str:
@@ -302,7 +178,7 @@ def _displays(contents: ReportContents) -> str:
         for number, signal in enumerate(view.signals):
             path = result.resolve(f"{block}/{signal}")
             label = view.labels[number] if number < len(view.labels) else ""
-            value = _value(np.asarray(result[path][-1]))
+            value = value_cell(np.asarray(result[path][-1]))
             unit = f' <span class="unit">{escape(result.units[path])}</span>' if result.units[path] else ""
             rows.append(
                 f'<tr><th scope="row">{escape(block)}</th><td class="text">{escape(label or path)}</td>'
@@ -312,20 +188,10 @@ def _displays(contents: ReportContents) -> str:
         return ""
     end = axis_number(float(result.time[-1]))
     return (
-        _table(f"Values at t = {end} s", [("Display", ""), ("Signal", ""), ("Value", "")], rows)
+        html_table(f"Values at t = {end} s", [("Display", ""), ("Signal", ""), ("Value", "")], rows)
         .replace('<th scope="col">Signal', '<th scope="col" style="text-align:left">Signal')
         .replace('<th scope="col">Value', '<th scope="col" style="text-align:left">Value')
     )
-
-
-def _value(value: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
-    if value.ndim == 0:
-        return table_number(float(value), 9)
-    lines = value.reshape(-1, value.shape[-1]) if value.ndim > 1 else value[None]
-    body = "".join(
-        "<tr>" + "".join(_cell(table_number(float(v), 7)) for v in line) + "</tr>" for line in lines
-    )
-    return f'<table class="matrix" role="presentation">{body}</table>'
 
 
 def _diagram(contents: ReportContents) -> str:
@@ -357,10 +223,10 @@ def _run(contents: ReportContents) -> str:
     if result.parameters:
         values = [
             f'<tr><th scope="row"><code>{escape(name)}</code></th>'
-            f'<td class="text">{_value(np.asarray(value))}</td></tr>'
+            f'<td class="text">{value_cell(np.asarray(value))}</td></tr>'
             for name, value in sorted(result.parameters.items())
         ]
-        text += "<h3>Parameters of the run</h3>" + _table(
+        text += "<h3>Parameters of the run</h3>" + html_table(
             "As the run used them, SI units", [("Parameter", ""), ("Value", "")], values
         )
     listed = ", ".join(f"<code>{escape(name)}</code>" for name in contents.files)

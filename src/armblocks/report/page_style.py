@@ -42,7 +42,8 @@ section{background:var(--surface);border:1px solid var(--hairline);border-radius
 figure{margin:18px 0 0}
 figure svg{display:block;width:100%;height:auto}
 figcaption{color:var(--muted);font-size:.88rem;margin-top:6px}
-.pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:8px 28px}
+.pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,300px),1fr));gap:8px 24px}
+.pair figure{max-width:560px}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem;width:100%;margin:6px 0}
 caption{text-align:left;color:var(--muted);font-size:.88rem;padding-bottom:6px}

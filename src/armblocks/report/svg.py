@@ -27,6 +27,8 @@ from armblocks.report.picture import (
 from armblocks.report.png_file import png_bytes
 from armblocks.report.style import FONT_STACK, MONO_STACK, PALETTE, Theme, Tone
 
+_MANY = 24
+
 
 def escape(text: str) -> str:
     """Text for XML content and attributes: markup escaped, characters that XML forbids dropped."""
@@ -50,7 +52,12 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def svg_file(picture: Picture, *, theme: Theme | None = None) -> str:
+def svg_marks(picture: Picture) -> str:
+    """The marks alone: what :func:`svg_file` and :func:`svg_inline` wrap, for those who write both."""
+    return _marks(picture.marks)
+
+
+def svg_file(picture: Picture, *, theme: Theme | None = None, marks: str | None = None) -> str:
     """A complete SVG document. ``theme`` fixes light or dark; ``None`` follows the viewer's preference."""
     base = theme or "light"
     rules = _tone_rules(base)
@@ -61,14 +68,15 @@ def svg_file(picture: Picture, *, theme: Theme | None = None) -> str:
         '<?xml version="1.0" encoding="UTF-8"?>\n'
         + _open_tag(picture, identifier="p", sized=True)
         + f"<style>{rules}</style>{background}"
-        + _marks(picture.marks)
+        + (svg_marks(picture) if marks is None else marks)
         + "</svg>\n"
     )
 
 
-def svg_inline(picture: Picture, identifier: str) -> str:
+def svg_inline(picture: Picture, identifier: str, *, marks: str | None = None) -> str:
     """The SVG element for a page that has :func:`page_rules`; ``identifier`` is unique within the page."""
-    return _open_tag(picture, identifier=identifier, sized=False) + _marks(picture.marks) + "</svg>"
+    inside = svg_marks(picture) if marks is None else marks
+    return f"{_open_tag(picture, identifier=identifier, sized=False)}{inside}</svg>"
 
 
 def page_rules() -> str:
@@ -125,6 +133,10 @@ def _dash(dash: Sequence[float]) -> str:
 
 def _path_data(points: Points, closed: bool) -> str:
     array = np.asarray(points, dtype=np.float64)
+    if len(array) > _MANY and np.isfinite(array).all():
+        # One format call for the whole line: an order faster, and a tenth of a px is finer than any screen.
+        data = ("M%.1f %.1f" + "L%.1f %.1f" * (len(array) - 1)) % tuple(array.ravel().tolist())
+        return data.replace(".0", "") + ("Z" if closed else "")
     pieces: list[str] = []
     pen = "M"
     for x, y in array.tolist():

@@ -99,7 +99,7 @@ def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]
 
 def _encoded(figure: Figure, kind: str) -> bytes:
     if kind == "svg":
-        return svg_file(figure.picture).encode()
+        return svg_file(figure.picture, marks=figure.svg_marks).encode()
     from armblocks.report.png import picture_png
 
     return picture_png(figure.picture)

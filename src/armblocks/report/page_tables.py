@@ -1,0 +1,148 @@
+"""The tables of the report's page: joints against their limits, loads, tool, values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.report.analysis import LimitFinding, LimitKind, MotionSummary, people_unit
+from armblocks.report.motion import Motion
+from armblocks.report.numbers import MINUS, table_number
+from armblocks.report.style import trace_tone
+from armblocks.report.svg import escape
+
+
+def limits_table(summary: MotionSummary) -> str:
+    broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
+    heads = [
+        ("Joint", ""), ("Range used", ""), ("Range allowed", ""), ("Margin", ""), ("Peak speed", ""),
+        ("at", "s"), ("Speed allowed", ""), ("Speed used", "%"), ("Peak acceleration", ""),
+    ]  # fmt: skip
+    same_unit = len({joint.unit for joint in summary.joints}) == 1
+    if same_unit and summary.joints:
+        unit = summary.joints[0].unit
+        position, speed = people_unit(LimitKind.POSITION, unit)[1], people_unit(LimitKind.SPEED, unit)[1]
+        units = ["", position, position, position, speed, "s", speed, "%", f"{speed}²"]
+        heads = [(title, unit) for (title, _), unit in zip(heads, units)]
+    rows: list[str] = []
+    for index, joint in enumerate(summary.joints):
+        factor, unit = people_unit(LimitKind.POSITION, joint.unit)
+        tail = "" if same_unit else f' <span class="unit">{unit}</span>'
+        allowed = "not limited"
+        if joint.position_limits is not None:
+            allowed = _span(joint.position_limits[0] * factor, joint.position_limits[1] * factor)
+        share = None if joint.speed_share is None else 100 * joint.speed_share
+        cells = [
+            _cell(_span(joint.position_min * factor, joint.position_max * factor) + tail),
+            _cell(allowed),
+            _judged(joint.position_margin, factor, broken.get((joint.name, LimitKind.POSITION))),
+            _judged(joint.speed_peak, factor, broken.get((joint.name, LimitKind.SPEED))),
+            _cell(table_number(joint.speed_peak_time, 3)),
+            _cell("not limited" if joint.speed_limit is None else table_number(joint.speed_limit * factor)),
+            _cell("" if share is None else table_number(share, 3)),
+            _cell(table_number(joint.acceleration_peak * factor)),
+        ]
+        rows.append(_row(joint.name, index, cells))
+    return html_table("Positions and speeds of each joint over the run", heads, rows)
+
+
+def loads_table(motion: Motion, summary: MotionSummary) -> str:
+    broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
+    torque = "N m" if set(motion.robot.joint_units) == {"rad"} else "N m or N"
+    heads = [
+        ("Joint", ""), ("Peak torque", torque), ("RMS torque", torque), ("Motor peak", "N m"),
+        ("Motor RMS", "N m"), ("Motor speed", "rev/min"), ("Peak power", "W"), ("Work done", "J"),
+        ("Work taken", "J"),
+    ]  # fmt: skip
+    rows = [
+        _row(
+            joint.name,
+            index,
+            [
+                _judged(joint.torque_peak, 1.0, broken.get((joint.name, LimitKind.TORQUE))),
+                _cell(_optional(joint.torque_rms)),
+                _cell(_optional(joint.motor_torque_peak)),
+                _cell(_optional(joint.motor_torque_rms)),
+                _cell(_optional(joint.motor_speed_peak, 30 / np.pi)),
+                _cell(_optional(joint.power_peak)),
+                _cell(_optional(joint.work_done)),
+                _cell(_optional(joint.work_taken)),
+            ],
+        )
+        for index, joint in enumerate(summary.joints)
+    ]
+    done = sum(joint.work_done or 0.0 for joint in summary.joints)
+    taken = sum(joint.work_taken or 0.0 for joint in summary.joints)
+    total = ["", "", "", "", "", _optional(summary.power_peak), table_number(done), table_number(taken)]
+    rows.append(f'<tr><th scope="row">All</th>{"".join(_cell(text) for text in total)}</tr>')
+    note = (
+        "Torques at the joint; the motor's are divided by the gear ratio, its speed multiplied by it. "
+        "Work done: what the drives put in; taken: what they brake."
+    )
+    return html_table(note, heads, rows)
+
+
+def tool_table(summary: MotionSummary) -> str:
+    heads = [("", ""), ("x", "m"), ("y", "m"), ("z", "m")]
+    rows = [
+        f'<tr><th scope="row">{word}</th>{"".join(_cell(_fixed(v)) for v in place)}</tr>'
+        for word, place in (("Start", summary.tool_start), ("End", summary.tool_end))
+    ]
+    return (
+        html_table("Position of the tool in the world", heads, rows)
+        + f"<p>Path length {table_number(summary.tool_path_length, 5)} m, "
+        f"greatest speed {table_number(summary.tool_speed_peak)} m/s.</p>"
+    )
+
+
+def _fixed(value: float) -> str:
+    return f"{value:.6f}".replace("-", MINUS)
+
+
+def html_table(caption: str, heads: Sequence[tuple[str, str]], rows: Sequence[str]) -> str:
+    head = "".join(
+        f'<th scope="col">{title}' + (f'<span class="unit">{unit}</span>' if unit else "") + "</th>"
+        for title, unit in heads
+    )
+    return (
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
+        f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>"
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
+    )
+
+
+def _row(name: str, index: int, cells: Sequence[str]) -> str:
+    key = f'<span class="key" style="background:var(--{trace_tone(index).value})"></span>'
+    return f'<tr><th scope="row">{key}{escape(name)}</th>{"".join(cells)}</tr>'
+
+
+def _cell(text: str) -> str:
+    return f"<td>{text}</td>"
+
+
+def _judged(value: float | None, factor: float, finding: LimitFinding | None) -> str:
+    text = _optional(value, factor)
+    if finding is None:
+        return _cell(text)
+    since = table_number(finding.first_time, 3)
+    return f'<td class="bad">{text}<small>over limit from {since} s</small></td>'
+
+
+def _optional(value: float | None, factor: float = 1.0) -> str:
+    return "" if value is None else table_number(value * factor)
+
+
+def _span(low: float, high: float) -> str:
+    return f"{table_number(low)} … {table_number(high)}"
+
+
+def value_cell(value: NDArray[np.float64]) -> str:
+    if value.ndim == 0:
+        return table_number(float(value), 9)
+    lines = value.reshape(-1, value.shape[-1]) if value.ndim > 1 else value[None]
+    body = "".join(
+        "<tr>" + "".join(_cell(table_number(float(v), 7)) for v in line) + "</tr>" for line in lines
+    )
+    return f'<table class="matrix" role="presentation">{body}</table>'
