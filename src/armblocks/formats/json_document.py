@@ -203,7 +203,7 @@ def split_members(node: Node, known: Iterable[str]) -> tuple[dict[str, Node], di
     for key, member in list(members.items()):
         if key in names:
             continue
-        near = difflib.get_close_matches(key.casefold(), names, n=1, cutoff=0.8)
+        near = difflib.get_close_matches(key.casefold(), names, n=1, cutoff=0.7)
         if near and near[0] not in members:
             raise member.error(
                 f"the key '{_short(key)}' is not known here",

@@ -59,7 +59,8 @@ class Joint(ABC):
     def __post_init__(self) -> None:
         axis = vector3(self.axis, where="axis of a joint")
         length = math.hypot(*axis)
-        if length > 0 and length != 1 and math.isfinite(length):
+        # An axis that is normal up to rounding stays as it is: what a file gives back must be the same axis.
+        if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):
             axis = (axis[0] / length, axis[1] / length, axis[2] / length)
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "offset", float(self.offset))

@@ -1,0 +1,311 @@
+"""Robot files: reading gives back what was written, the schema agrees, and slips are refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from armblocks.errors import ArmblocksError, ArmblocksWarning, FormatError, InertiaWarning, UnknownNameError
+from armblocks.formats import load_robot, read_robot, robot_files, write_robot
+from armblocks.robot import (
+    DhConvention,
+    DhRow,
+    Fixed,
+    FrictionModel,
+    JointLimits,
+    Link,
+    Motor,
+    Prismatic,
+    Revolute,
+    Robot,
+    link_from_dh,
+)
+from armblocks.robot.shapes import Box, Cylinder, Housing, Material, Mesh, Sphere
+from armblocks.spatial import Transform, transl, trotx, troty, trotz
+
+SCHEMAS = Path(robot_files.__file__).parent / "schema"
+
+
+def validator(kind: str) -> jsonschema.Draft202012Validator:
+    schema = json.loads((SCHEMAS / f"{kind}.schema.json").read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+NUMBERS = st.floats(-1e3, 1e3)
+POSITIVE = st.floats(1e-6, 1e3)
+ANGLES = NUMBERS | st.integers(-360, 360).map(math.radians)
+VECTORS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
+POSES = st.builds(
+    lambda p, a, b, c: transl(*p) @ trotz(a) @ troty(b) @ trotx(c), VECTORS, ANGLES, ANGLES, ANGLES
+)
+LIMITS = st.builds(
+    JointLimits,
+    position=st.none() | st.tuples(ANGLES, ANGLES).map(lambda ends: (min(ends), max(ends))),
+    speed=st.none() | POSITIVE,
+    torque=st.none() | POSITIVE,
+)
+MOTORS = st.builds(
+    Motor,
+    inertia=st.floats(0, 1),
+    gear_ratio=NUMBERS.filter(bool),
+    viscous_friction=st.floats(0, 1),
+    coulomb_friction=st.tuples(st.floats(0, 1), st.floats(-1, 0)),
+)
+SHAPES = st.sampled_from(
+    [
+        Cylinder(radius=0.1, length=0.5, bevel=0.01, material=Material.JOINT),
+        Housing(start=(0.1, 0.2), end=(0.05, 0.05), length=0.4, roundness=0.3),
+        Box(size=(1, 2, 3)),
+        Sphere(radius=0.2, material=Material.FLANGE),
+        Mesh(vertices=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), faces=((0, 1, 2),)),
+    ]
+)
+BODY: dict[str, Any] = {
+    "mass": st.floats(0, 100),
+    "centre_of_mass": VECTORS,
+    "inertia": st.tuples(*[NUMBERS] * 6),
+    "motor": st.none() | MOTORS,
+    "geometry": st.none() | st.lists(SHAPES, max_size=2).map(tuple),
+}
+
+
+@st.composite
+def robots(draw: st.DrawFn) -> Robot:
+    """Trees of all joint types, with and without D-H rows."""
+    links: list[Link] = []
+    for i in range(draw(st.integers(1, 4))):
+        parent = draw(st.sampled_from([None, *(link.name for link in links)]))
+        body = {key: draw(strategy) for key, strategy in BODY.items()}
+        if draw(st.booleans()):
+            dh = DhRow(
+                alpha=draw(ANGLES),
+                a=draw(NUMBERS),
+                d=draw(NUMBERS),
+                theta=draw(ANGLES),
+                sigma=draw(st.integers(0, 1)),
+                offset=draw(ANGLES),
+                convention=draw(st.sampled_from(DhConvention)),
+            )
+            links.append(link_from_dh(f"l{i}", dh, parent=parent, limits=draw(LIMITS), **body))
+        else:
+            kind = draw(st.sampled_from([Revolute, Prismatic, Fixed]))
+            joint = kind(axis=draw(VECTORS.filter(any)), offset=draw(ANGLES), limits=draw(LIMITS))
+            body["inertia"] = link_from_dh("x", DhRow(), inertia=body["inertia"]).inertia
+            links.append(
+                Link(name=f"l{i}", parent=parent, joint=joint, before=draw(POSES), after=draw(POSES), **body)
+            )
+    return Robot(
+        name=draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=5)),
+        manufacturer=draw(st.sampled_from(["", "KUKA"])),
+        comment=draw(st.sampled_from(["", "čćž"])),
+        links=tuple(links),
+        base=draw(st.just(Transform()) | POSES),
+        tool=draw(st.just(Transform()) | POSES),
+        gravity=draw(VECTORS),
+        friction_model=draw(st.sampled_from(FrictionModel)),
+    )
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(robots())
+def test_reading_what_was_written_gives_the_robot_back(robot: Robot) -> None:
+    data = write_robot(robot)
+    again = read_robot(data, "robot.json")
+    assert again == robot
+    assert write_robot(again) == data
+    validator("robot").validate(json.loads(data))
+
+
+def test_angles_are_written_in_degrees_where_nothing_is_lost() -> None:
+    row = DhRow(alpha=math.pi / 2, offset=math.radians(-12.5), theta=0.1)
+    robot = Robot(name="r", links=(link_from_dh("a", row),))
+    dh = json.loads(write_robot(robot))["links"][0]["dh"]
+    assert (dh["alpha"], dh["offset"], dh["theta"]) == ("90 deg", "-12.5 deg", 0.1)
+
+
+def test_numbers_of_a_sliding_joint_are_metres() -> None:
+    slider = Prismatic(limits=JointLimits(position=(0.0, math.pi), speed=math.pi), offset=math.pi)
+    entry = json.loads(write_robot(Robot(name="r", links=(Link(name="a", joint=slider),))))["links"][0]
+    assert entry["limits"] == {"position": [0, math.pi], "speed": math.pi}
+    assert entry["joint"]["offset"] == math.pi
+
+
+ROBOT: dict[str, Any] = {
+    "format": 1,
+    "name": "r",
+    "links": [{"name": "a", "dh": {"convention": "standard", "a": 1}, "mass": 1}],
+}
+EXACT = object()
+
+
+def changed(*path: str | int, value: object = EXACT) -> bytes:
+    """The robot above with one value replaced, or removed."""
+    document = json.loads(json.dumps(ROBOT))
+    here = document
+    for step in path[:-1]:
+        here = here[step]
+    if value is EXACT:
+        del here[path[-1]]
+    else:
+        here[path[-1]] = value
+    return json.dumps(document, indent=1).encode()
+
+
+LINK = ("links", 0)
+REFUSED = [
+    (changed("format"), "the key 'format' is missing"),
+    (changed("format", value=2), r"the format version is 2. Allowed: 1. Fix: update armblocks"),
+    (changed("format", value=True), "the format version is True"),
+    (changed("name", value=3), "name: the value is the number 3"),
+    (changed("nmae", value="x"), "the key 'nmae' is not known here.*did you mean 'name'"),
+    (changed("links", value=[]), "robot 'r': it has no links"),
+    (changed("links", value=[ROBOT["links"][0]] * 2), "two links are named 'a'"),
+    (changed(*LINK, "parent", value="b"), "link 'a' hangs on 'b', which does not exist"),
+    (changed(*LINK, "mass", value=-1), "robot 'r', link 'a': the mass is -1 kg"),
+    (changed(*LINK, "mass", value="1,5"), "the value is the text '1,5'"),
+    (changed(*LINK, "mas", value=1), r"links\[0\].mas: the key 'mas' is not known here.*did you mean 'mass'"),
+    (changed(*LINK, "joint", value={"type": "revolute"}), "the link has both 'dh' and 'joint'"),
+    (changed(*LINK, "dh", value={}), "the key 'convention' is missing"),
+    (changed(*LINK, "dh", "convention", value="craig"), "'craig' is not known here"),
+    (changed(*LINK, "dh", "joint", value="ball"), "'ball' is not known here"),
+    (changed(*LINK, "dh", "alpha", value="90"), "'90' is not an angle"),
+    (changed(*LINK, "dh", "alpha", value="90 deg/s"), "'90 deg/s' is not an angle"),
+    (changed(*LINK, "dh", "alpha", value="\u0669 deg"), "is not an angle"),
+    (changed(*LINK, "dh", "alpha", value="9" * 400 + " deg"), "is not an angle"),
+    (changed(*LINK, "limits", value={"position": [1]}), "1 limits are given"),
+    (changed(*LINK, "limits", value={"position": [1, 0]}), "the position limits are reversed"),
+    (changed(*LINK, "limits", value={"speed": "3 deg"}), "'3 deg' is not an angle"),
+    (changed(*LINK, "centre_of_mass", value=[1, 2]), "2 numbers are given"),
+    (changed(*LINK, "inertia", value={"ixx": 1}), "the key 'ixx' is not known here"),
+    (changed(*LINK, "motor", value={"gear_ratio": 0}), "the gear ratio is 0"),
+    (changed(*LINK, "geometry", value=[{"shape": "cone"}]), "'cone' is not known here"),
+    (changed(*LINK, "geometry", value=[{"shape": "box"}]), "the key 'size' is missing"),
+    (changed(*LINK, "geometry", value=[{"shape": "box", "radius": 1}]), "the key 'radius' is not known here"),
+    (
+        changed(*LINK, "geometry", value=[{"shape": "sphere", "radius": 1, "pose": [[1, 0, 0, 0]]}]),
+        "1 rows are given",
+    ),
+    (
+        changed(*LINK, "geometry", value=[{"shape": "mesh", "vertices": [], "faces": [[0, 1, 0.5]]}]),
+        "a face does not name vertices",
+    ),
+    (changed("base", value={"rotation": [[1, 0, 0]]}), "1 rows are given"),
+    (changed("base", value={"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]]}), "should be a rotation is not"),
+    (changed("friction_model", value="none"), "'none' is not known here. Allowed: squared-gear"),
+    (changed("links", value=[{"name": "a", "joint": {"type": "ball"}}]), "'ball' is not known here"),
+    (
+        changed("links", value=[{"name": "a", "joint": {"type": "revolute", "axis": [0, 0, 0]}}]),
+        "axis is zero",
+    ),
+]
+
+
+@pytest.mark.parametrize(("data", "message"), REFUSED, ids=[str(i) for i in range(len(REFUSED))])
+def test_refusal_names_file_line_and_key(data: bytes, message: str) -> None:
+    with pytest.raises(FormatError, match=message) as caught:
+        read_robot(data, "arm.json")
+    assert caught.value.where.startswith("arm.json:")
+
+
+def test_schema_knows_what_a_schema_can_know() -> None:
+    """All but what compares one value with another, or needs more than a shape's kind."""
+    passed = [message for data, message in REFUSED if validator("robot").is_valid(json.loads(data))]
+    assert len(passed) <= 12, passed
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(st.data())
+def test_mutated_document_is_read_or_refused(data: st.DataObject) -> None:
+    document = json.loads(write_robot(load_robot("puma560")))
+    for _ in range(data.draw(st.integers(1, 3))):
+        here: Any = document
+        while True:
+            keys = list(here) if isinstance(here, dict) else list(range(len(here)))
+            if not keys:
+                break
+            key = data.draw(st.sampled_from(keys))
+            if isinstance(here[key], dict | list) and data.draw(st.booleans()):
+                here = here[key]
+                continue
+            here[key] = data.draw(
+                st.sampled_from([None, True, -1, 1e300, 0, "", "x", [], {}, [1, 2, 3], "5 deg"])
+            )
+            break
+    try:
+        read_robot(json.dumps(document).encode(), "fuzz.json")
+    except FormatError as error:
+        assert error.where.startswith("fuzz.json")
+    except ArmblocksWarning:
+        pass  # friction that drives
+    except ArmblocksError as error:
+        pytest.fail(f"not located: {error}")
+
+
+# -- names and paths ---------------------------------------------------------------------------------------
+
+
+def test_user_files_warn_of_impossible_inertias_and_shipped_robots_do_not(tmp_path: Path) -> None:
+    path = tmp_path / "mine.json"
+    robot = load_robot("puma560")
+    path.write_bytes(write_robot(robot))
+    with pytest.warns(InertiaWarning) as caught:
+        mine = load_robot(path)
+    assert "robot 'Puma 560', link 'link1': it has inertia but no mass" in str(caught[0].message)
+    assert len(caught) == 2
+    assert mine == robot
+    assert (mine.source, robot.source) == (str(path), "puma560")
+
+
+def test_friction_model_of_a_file_can_be_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "r.JSON"
+    path.write_bytes(write_robot(replace(load_robot("twolink"), friction_model=FrictionModel.RELEASE_6)))
+    assert load_robot(str(path)).friction_model is FrictionModel.RELEASE_6
+    assert (
+        load_robot(path, friction_model=FrictionModel.SIGNED_GEAR).friction_model is FrictionModel.SIGNED_GEAR
+    )
+
+
+def test_unknown_name_says_the_nearest() -> None:
+    with pytest.raises(
+        UnknownNameError, match=r"there is no shipped robot named 'puma56'.*did you mean 'puma560'"
+    ):
+        load_robot("puma56")
+    with pytest.raises(UnknownNameError, match="there is no robot named 'x'"):
+        load_robot("kr180", name="x")
+    assert load_robot("kr180", name="KR180") == load_robot("kr180")
+
+
+def test_missing_file_is_said() -> None:
+    with pytest.raises(FormatError, match=r"nowhere/arm\.json: there is no such file"):
+        load_robot("nowhere/arm.json")
+
+
+def test_folder_is_refused_with_the_file_that_may_be_meant(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"this is a folder.*Allowed: a robot file: \.json, \.m"):
+        load_robot(tmp_path)
+
+
+def test_unknown_suffix_is_refused() -> None:
+    with pytest.raises(FormatError, match=r"'\.urdf' is no suffix of a robot file.*MATLAB robot script"):
+        load_robot("arms/ur5.urdf")
+
+
+def test_oversized_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "big.m"
+    path.write_bytes(b" " * (2**20 + 1))
+    with pytest.raises(FormatError, match=r"the file is too large. Allowed: at most 1048576 bytes"):
+        load_robot(path)
+
+
+def test_incomplete_installation_is_said() -> None:
+    with pytest.raises(FormatError, match=r"the shipped songs are missing.*install armblocks again"):
+        robot_files.shipped_folder("songs")
