@@ -49,7 +49,8 @@ def test_an_unknown_solver_says_the_nearest(refused: Refused, write_diagram: Wri
 def test_a_stop_time_is_finite_and_not_negative(time: str, refused: Refused) -> None:
     text = refused("run", "kr180model", f"--stop-time={time}")
     assert "stop_time is" in text
-    assert "allowed" in text
+    assert "a finite time in s, 0 or more" in text
+    assert "give another stop_time" in text
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """Every error and warning that the package can show is read by some test.
 
 The check is static and approximate: for each construction of an armblocks error or warning it takes the
-literal words of the message and looks whether three words in a row of them stand in a file under ``tests``.
+literal words of the message (what, allowed, fix) and looks whether three words in a row of them stand in a
+file under ``tests``.
 """
 
 import ast
@@ -68,23 +69,28 @@ def messages() -> Iterator[tuple[str, list[str]]]:
                 if kind not in TREE and not is_warning:
                     continue
                 seen.add(id(node))
-                first = node.args[0]
-                if kind == "UnknownNameError" and isinstance(first, ast.Constant):
-                    pieces = [f"there is no {first.value} named"]
-                else:
-                    pieces = list(literal_pieces(first, names))
+                pieces = list(literal_pieces(node.args[0], names))
+                if kind == "UnknownNameError":
+                    pieces = [f"there is no {' '.join(pieces)} named"]
+                for keyword in node.keywords:
+                    if keyword.arg in ("allowed", "fix"):
+                        pieces += literal_pieces(keyword.value, names)
                 place = f"{path.relative_to(SOURCE).as_posix()}:{node.lineno}"
                 yield place, pieces
 
 
 def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:
-    """All runs of words by which a message can be known: three in a row, or a whole shorter piece."""
+    """All runs of words by which a message can be known: three in a row, or a whole shorter piece.
+
+    Pieces of one word count only where there is nothing longer.
+    """
     split = [words(piece) for piece in pieces]
-    longest = max((len(piece) for piece in split), default=0)
-    size = min(RUN_OF_WORDS, longest)
+    least = min(2, max((len(piece) for piece in split), default=0))
     for piece in split:
-        for start in range(len(piece) - size + 1):
-            yield tuple(piece[start : start + size])
+        size = min(RUN_OF_WORDS, len(piece))
+        if size >= max(least, 1):
+            for start in range(len(piece) - size + 1):
+                yield tuple(piece[start : start + size])
 
 
 @pytest.fixture(scope="module")
