@@ -55,7 +55,7 @@ class Stage:
         ]
         points = np.concatenate([*clouds, path])
         low, high = points.min(axis=0), points.max(axis=0)
-        spacing = nice_step(float((high - low)[:2].max()) / 8)
+        spacing = nice_step(float((high - low).max()) / 8)
         feet = [c for c, body in zip(clouds, bodies) if body.row == 0]
         foot = float(np.concatenate(feet)[:, 2].min()) if feet else float(low[2])
         # The arm stands on the floor; where it reaches below its own foot, it stands on a pedestal.
@@ -127,7 +127,7 @@ def moments_picture(
             Text(width - 2, height + 16, _position(path[k]), size=SMALL_SIZE, tone=Tone.MUTED, anchor="end"),
         )
         picture.place(panel, left, top)
-    note = f"Floor grid {axis_number(stage.grid[0])} m, floor at z = {axis_number(stage.floor)} m"
+    note = f"Floor grid {axis_number(stage.grid[0])} m, floor at z = {axis_number(stage.floor, 3)} m"
     if len(picked) > 1:
         note += "; pale: the pose at the start"
     picture.add(Text(2, picture.height - 6, note, size=SMALL_SIZE, tone=Tone.MUTED))

@@ -20,12 +20,13 @@ def nice_step(rough: float) -> float:
 
 
 def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) -> list[float]:
-    """About ``count`` round values within ``low`` .. ``high``; wide angles in parts of a turn."""
-    step = nice_step((high - low) / max(count, 1))
+    """Round values within ``low`` .. ``high``, about ``count`` steps; wide angles in parts of a turn."""
+    rough = (high - low) / max(count, 1)
+    below = nice_step(rough / 2.5)
+    steps = [nice_step(below * factor) for factor in (1.0, 1.5, 3.0, 6.0)]
     if degrees and high - low > 60:
-        step = next(
-            (s for s in (15.0, 30.0, 45.0, 90.0, 180.0, 360.0) if s * count >= (high - low) * 0.7), step
-        )
+        steps = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0, *(s for s in steps if s > 360)]
+    step = min(steps, key=lambda s: abs(math.log(s / rough)))
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     return [k * step + 0.0 for k in range(first, last + 1)]

@@ -187,11 +187,8 @@ def _displays(contents: ReportContents) -> str:
     if not rows:
         return ""
     end = axis_number(float(result.time[-1]))
-    return (
-        html_table(f"Values at t = {end} s", [("Display", ""), ("Signal", ""), ("Value", "")], rows)
-        .replace('<th scope="col">Signal', '<th scope="col" style="text-align:left">Signal')
-        .replace('<th scope="col">Value', '<th scope="col" style="text-align:left">Value')
-    )
+    heads = [("Display", ""), ("Signal", ""), ("Value", "")]
+    return html_table(f"Values at t = {end} s", heads, rows, words=True)
 
 
 def _diagram(contents: ReportContents) -> str:
@@ -227,7 +224,11 @@ def _run(contents: ReportContents) -> str:
             for name, value in sorted(result.parameters.items())
         ]
         text += "<h3>Parameters of the run</h3>" + html_table(
-            "As the run used them, SI units", [("Parameter", ""), ("Value", "")], values
+            "As the run used them, SI units", [("Parameter", ""), ("Value", "")], values, words=True
         )
-    listed = ", ".join(f"<code>{escape(name)}</code>" for name in contents.files)
+    figures = [name for name in contents.files if name.startswith("figures/")]
+    names = [name for name in contents.files if name not in figures]
+    listed = ", ".join(f"<code>{escape(name)}</code>" for name in names)
+    if figures:
+        listed += f", and {len(figures)} figures in <code>figures/</code>"
     return text + f'<h3>Files beside this page</h3><p class="files">{listed}</p>'

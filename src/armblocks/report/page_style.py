@@ -32,8 +32,8 @@ a{color:var(--accent)}
 nav ul{list-style:none;display:flex;flex-wrap:wrap;gap:2px 20px;padding:0;margin:14px 0 0}
 .facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:1px;margin:22px 0 0;
  padding:0;
- background:var(--hairline);border:1px solid var(--hairline);border-radius:8px;overflow:hidden}
-.facts div{background:var(--surface);padding:10px 14px}
+ background:var(--surface);border:1px solid var(--hairline);border-radius:8px;overflow:hidden}
+.facts div{padding:10px 14px;box-shadow:1px 1px 0 var(--hairline)}
 .facts dt{color:var(--muted);font-size:.82rem}
 .facts dd{margin:0;font-size:1.12rem;font-weight:600;font-variant-numeric:tabular-nums}
 .facts small,.unit{color:var(--muted);font-weight:400;font-size:.86em}
@@ -43,7 +43,7 @@ figure{margin:18px 0 0}
 figure svg{display:block;width:100%;height:auto}
 figcaption{color:var(--muted);font-size:.88rem;margin-top:6px}
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,300px),1fr));gap:8px 24px}
-.pair figure{max-width:560px}
+.pair figure{max-width:400px}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92rem;width:100%;margin:6px 0}
 caption{text-align:left;color:var(--muted);font-size:.88rem;padding-bottom:6px}
@@ -53,7 +53,7 @@ thead th{border-bottom-color:var(--hairline);font-weight:600;vertical-align:bott
 th:first-child,td:first-child{text-align:left;padding-left:0}
 tbody th{font-weight:600}
 th .unit{display:block}
-td.text{text-align:left}
+td.text,.said thead th{text-align:left}
 tr:last-child>*{border-bottom:0}
 .key{display:inline-block;width:18px;height:3px;border-radius:2px;margin-right:8px;vertical-align:middle}
 td.bad{color:var(--error);background:var(--error-wash);font-weight:600}
@@ -75,5 +75,5 @@ footer{color:var(--muted);font-size:.86rem;padding:4px 0 40px}
  main,header.top{max-width:none;padding:0}
  section{border:0;padding:0;margin:14pt 0}nav,.screen{display:none}figure,tr,.notes li{break-inside:avoid}
  h2,h3{break-after:avoid}.scroll{overflow:visible}table{font-size:8pt}th,td{padding:3px 5px}
- .pair{grid-template-columns:1fr 1fr}}
+ .pair{grid-template-columns:1fr 1fr 1fr}.scroll{break-inside:avoid}}
 """

@@ -101,14 +101,18 @@ def _fixed(value: float) -> str:
     return f"{value:.6f}".replace("-", MINUS)
 
 
-def html_table(caption: str, heads: Sequence[tuple[str, str]], rows: Sequence[str]) -> str:
+def html_table(
+    caption: str, heads: Sequence[tuple[str, str]], rows: Sequence[str], *, words: bool = False
+) -> str:
+    """A table with a caption and headed columns (title, unit); ``words``: columns of text, not of numbers."""
+    kind = ' class="said"' if words else ""
     head = "".join(
         f'<th scope="col">{title}' + (f'<span class="unit">{unit}</span>' if unit else "") + "</th>"
         for title, unit in heads
     )
     return (
         f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">'
-        f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>"
+        f"<table{kind}><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>"
         f"<tbody>{''.join(rows)}</tbody></table></div>"
     )
 

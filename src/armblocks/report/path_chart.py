@@ -117,11 +117,21 @@ def _path_with_direction(points: _Array, tone: Tone) -> list[Mark]:
 
 
 def _beside(points: _Array, x: float, y: float, word: str) -> Text:
-    """The word next to a point, on the side where the line is not."""
-    near = points[np.hypot(points[:, 0] - x, points[:, 1] - y) < 40]
-    middle = near.mean(axis=0) if len(near) else np.array([x, y])
-    above = middle[1] >= y
+    """The word next to a point, on the side where it keeps farthest from the line."""
     width = text_width(word, SMALL_SIZE)
-    low, high = float(np.nanmin(points[:, 0])), float(np.nanmax(points[:, 0]))
-    left = min(max(x - width / 2, low - 8), max(high + 8 - width, low - 8))
-    return Text(left, y - 9 if above else y + 17, word, SMALL_SIZE, Tone.MUTED)
+    places = (
+        (x - width / 2, y - 10),
+        (x - width / 2, y + 18),
+        (x + 9, y + 4),
+        (x - 9 - width, y + 4),
+    )
+
+    def clearance(place: tuple[float, float]) -> float:
+        left, base = place
+        dx = np.maximum(np.maximum(left - points[:, 0], points[:, 0] - left - width), 0.0)
+        dy = np.maximum(np.maximum(base - SMALL_SIZE - points[:, 1], points[:, 1] - base), 0.0)
+        return float(np.nanmin(np.hypot(dx, dy)))
+
+    # Ahead of the others stands above; a clearance beyond a few px makes no difference.
+    left, base = max(places, key=lambda place: min(clearance(place), 7.0))
+    return Text(left, base, word, SMALL_SIZE, Tone.MUTED)

@@ -120,6 +120,22 @@ class _Plan:
             radius[link.name] = first * max(_TAPER**joints_before, _SMALLEST)
         return cls(radius, children, {link.name: link for link in robot.links}, size)
 
+    def stands_up(self, link: Link) -> bool:
+        """Whether the link is a column on the base: a vertical joint whose body first runs well upwards."""
+        upright = link.before.R @ np.array(link.joint.axis)
+        if link.parent is not None or not link.joint.turn or upright[2] < 0.99:
+            return False
+        T = link.after.inverse().matrix
+        axis = T[:3, :3] @ np.array(link.joint.axis)
+        ends = [
+            (np.array(c.before.translation), c.before.R @ np.array(c.joint.axis))
+            for c in self.children.get(link.name, [])
+        ] or [(np.zeros(3), np.array([0.0, 0.0, 1.0]))]
+        rises = [
+            float((_body_path(T[:3, 3], axis, end, end_axis)[1] - T[:3, 3]) @ axis) for end, end_axis in ends
+        ]
+        return min(rises) > 1.8 * self.radius[link.name]
+
     def shares_centre(self, link: Link) -> bool:
         """Whether the link's joint turns about another axis through the centre of its carrier's joint."""
         parent = self.links.get(link.parent) if link.parent is not None else None
@@ -168,7 +184,10 @@ def _link_shapes(robot: Robot, link: Link, plan: _Plan) -> list[Shape]:
     start, axis = T[:3, 3], T[:3, :3] @ np.array(link.joint.axis)
     r = plan.radius[link.name]
     shapes: list[Shape] = []
-    if link.joint.turn:
+    if plan.stands_up(link):
+        # The column rises from the base plate: the drum is a ring in it, clear of the floor.
+        shapes += _drum(start + 1.35 * r * axis, axis, r, length=1.5 * r)
+    elif link.joint.turn:
         # Where two joints share their centre (shoulder, wrist) the inner drum pierces the outer collar.
         inside = plan.shares_centre(link)
         shapes += _drum(start, axis, r, length=2.15 * plan.radius[link.parent or ""] if inside else 2.0 * r)
@@ -287,25 +306,25 @@ def _base_shapes(robot: Robot, plan: _Plan) -> list[Shape]:
         if np.linalg.norm(foot) > r:
             shapes += _casting(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.1 * r, foot, axis, r)
         upright = np.array([0.0, 0.0, 1.0])
-        shapes.append(
+        # A column stands on the base frame; a joint in the frame itself needs its foot below.
+        bottom = 0.0 if plan.stands_up(link) else -1.16 * r
+        shapes += [
             Housing(
                 start=(1.45 * r, 1.45 * r),
                 end=(1.12 * r, 1.12 * r),
                 length=0.75 * r,
                 roundness=1.0,
                 material=Material.BASE,
-                pose=_aligned(-1.0 * r * upright, upright),
-            )
-        )
-        shapes.append(
+                pose=_aligned((bottom + 0.16 * r) * upright, upright),
+            ),
             Cylinder(
                 radius=1.6 * r,
                 length=0.16 * r,
                 bevel=0.04 * r,
                 material=Material.BASE,
-                pose=_aligned(-1.08 * r * upright, upright),
-            )
-        )
+                pose=_aligned((bottom + 0.08 * r) * upright, upright),
+            ),
+        ]
     return shapes
 
 
