@@ -220,10 +220,10 @@ def test_without_debugging_a_process_shows_no_traceback(
 
 @pytest.mark.skipif(os.name == "nt", reason="a signal cannot be sent to a child alone on Windows")
 def test_ctrl_c_keeps_what_was_computed_and_says_so(write_diagram: Write, tmp_path: Path) -> None:
-    # An oscillator for ten million steps: longer than the test waits.
+    # An oscillator for 10^11 steps: longer than any machine takes to get the signal.
     blocks = {"v": ("Integrator", {}), "x": ("Integrator", {"initial": 1.0}), "k": ("Gain", {"gain": -1.0})}
     path = write_diagram(
-        blocks, "k/y -> v/u", "v/y -> x/u", "x/y -> k/u", stop_time=1e6, step=1e-2, sample_time=100.0
+        blocks, "k/y -> v/u", "v/y -> x/u", "x/y -> k/u", stop_time=1e9, step=1e-2, sample_time=1e5
     )
     process = subprocess.Popen(
         [sys.executable, "-m", "armblocks", "run", path, "--solver", "rk4", "--out", "kept", "--no-figures"],
@@ -233,7 +233,12 @@ def test_ctrl_c_keeps_what_was_computed_and_says_so(write_diagram: Write, tmp_pa
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(2.5)
+    deadline = time.monotonic() + 60.0
+    while not (tmp_path / "kept").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(
+        2.0
+    )  # the folder is made before the run: let the equations be compiled and the first steps be taken
     process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
