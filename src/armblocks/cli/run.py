@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -11,7 +12,7 @@ import typer
 from armblocks.cli.assignments import parse_assignments
 from armblocks.cli.progress import RunProgress
 from armblocks.cli.terminal import messages_console, results_console
-from armblocks.errors import ArmblocksError, FormatError, SimulationError
+from armblocks.errors import ArmblocksError, FormatError, LimitWarning, SimulationError
 
 
 class DataFormat(StrEnum):
@@ -73,13 +74,16 @@ def run(
             if not isinstance(error.partial, ab.SimulationResult):
                 raise
             failure, result = error, error.partial
-    files = ab.write_report(
-        folder,
-        diagram,
-        result,
-        formats=("svg", "png") if figures else (),
-        data=("csv", "parquet", *(extra.value for extra in formats or [])),
-    )
+    with warnings.catch_warnings():
+        # The summary below says every limit that is broken; once is enough.
+        warnings.simplefilter("ignore", LimitWarning)
+        files = ab.write_report(
+            folder,
+            diagram,
+            result,
+            formats=("svg", "png") if figures else (),
+            data=("csv", "parquet", *(extra.value for extra in formats or [])),
+        )
     console = results_console()
     print_run(result, console)
     print_displays(diagram, result, console)
