@@ -170,12 +170,12 @@ def _print_frames(robot: Robot, console: Console) -> None:
     gravity = " ".join(f"{_number(part)}" for part in robot.gravity)
     console.print(f"grav = {gravity} m/s², acceleration of a falling body (toolbox: opposite sign)")
     for name, pose in (("base", robot.base), ("tool", robot.tool)):
-        console.print(f"{name} = {_pose_text(pose)}")
+        console.print(f"{name} ={_pose_text(pose)}")
 
 
 def _pose_text(pose: Transform) -> str:
     if pose.is_identity:
-        return "identity"
+        return " identity"
     matrix = pose.matrix
     return "\n" + "\n".join("  " + "".join(f"{_number(entry):>12}" for entry in row) for row in matrix)
 
