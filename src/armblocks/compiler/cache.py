@@ -11,7 +11,6 @@ The folder is ``$ARMBLOCKS_CACHE_DIR`` (empty: no cache), else the system's plac
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import os
 import sys
 import threading
@@ -54,12 +53,13 @@ def record_name(key: str) -> str:
 
 
 def _digest(parts: Sequence[str]) -> str:
-    whole = hashlib.sha256()
-    for part in parts:
-        data = part.encode()
-        whole.update(len(data).to_bytes(8, "little"))
-        whole.update(data)
-    return whole.hexdigest()
+    return _sha256(b"".join(len(data).to_bytes(8, "little") + data for data in map(str.encode, parts))).hex()
+
+
+def _sha256(data: bytes) -> bytes:
+    import hashlib  # loads OpenSSL, which is slow; importing armblocks does without
+
+    return hashlib.sha256(data).digest()
 
 
 @cache
@@ -81,7 +81,7 @@ def _fingerprint(root: Path) -> str:
         for entry in _python_files(root):
             status = entry.stat()
             found.append(f"{entry.path} {status.st_size} {status.st_mtime_ns}")
-    return hashlib.sha256("\n".join(sorted(found)).encode()).hexdigest()
+    return _sha256("\n".join(sorted(found)).encode()).hex()
 
 
 def _python_files(root: Path | str) -> Iterator[os.DirEntry[str]]:
@@ -105,7 +105,7 @@ def load(name: str) -> bytes | None:
         return None
     start = len(_MAGIC) + 32
     content = data[start:]
-    if not data.startswith(_MAGIC) or data[len(_MAGIC) : start] != hashlib.sha256(content).digest():
+    if not data.startswith(_MAGIC) or data[len(_MAGIC) : start] != _sha256(content):
         return None
     with contextlib.suppress(OSError):  # what is in use is pruned last
         if time.time() - path.stat().st_mtime > _DAY:
@@ -125,7 +125,7 @@ def store(name: str, content: bytes) -> None:
         temporary = path.with_name(f"{name[:16]}-{writer}.tmp")
         try:
             with temporary.open("xb") as file:
-                file.write(_MAGIC + hashlib.sha256(content).digest() + content)
+                file.write(_MAGIC + _sha256(content) + content)
             temporary.replace(path)
         except OSError:
             temporary.unlink(missing_ok=True)

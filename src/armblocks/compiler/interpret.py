@@ -109,7 +109,7 @@ def _exact_multiply_add(a: float, b: float, c: float) -> float:
         rounded = float(exact)
     except OverflowError:
         rounded = math.inf
-    return math.copysign(rounded, exact)
+    return math.copysign(rounded, 1 if exact > 0 else -1)
 
 
 def _select(condition: Values, yes: Values, no: Values) -> Values:

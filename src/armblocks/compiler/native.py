@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
+import sys
 import threading
 from collections.abc import Callable, Sequence
+from functools import cache as once
 from typing import TYPE_CHECKING
 
 from armblocks.compiler import cache
@@ -24,9 +28,8 @@ class NativeCode:
     def address(self, symbol: str) -> int:
         """Address of an external function or variable. Raises ``KeyError`` where there is none."""
         with _LOCK:
-            address = self._engine.get_function_address(symbol) or self._engine.get_global_value_address(
-                symbol
-            )
+            engine = self._engine
+            address = engine.get_function_address(symbol) or engine.get_global_value_address(symbol)
         if not address:
             raise KeyError(symbol)
         return address
@@ -62,6 +65,7 @@ def compile_object(text: str, target: Target, *, jit: bool = True) -> bytes:
         module.data_layout = str(machine.target_data)
         module.verify()
         tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+        # The code is written over lanes already; these would only take time.
         tuning.slp_vectorization = False
         tuning.loop_vectorization = False
         tuning.loop_unrolling = False
@@ -74,7 +78,31 @@ def _link(code: bytes, target: Target) -> NativeCode:
     from llvmlite import binding as llvm
 
     with _LOCK:
+        _provide_runtime()
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target.machine())
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
     return NativeCode(engine)
+
+
+@once
+def _provide_runtime() -> None:
+    """Name the few C functions that LLVM may call where it does not find them by itself.
+
+    Processors without fused multiply-add or rounding instructions (x86-64 before 2013) need ``fma`` and
+    ``floor``, both exact in any C library; Windows checks large stack frames.
+    """
+    from llvmlite import binding as llvm
+
+    libraries: tuple[str | None, ...]
+    names: tuple[str, ...]
+    if sys.platform == "win32":
+        libraries, names = ("ucrtbase", "vcruntime140", "ntdll"), ("__chkstk",)
+    else:
+        libraries, names = (None,), ()  # what the process has loaded holds the C library
+    for name in ("fma", "floor", "ceil", "memcpy", "memmove", "memset", *names):
+        for library in libraries if llvm.address_of_symbol(name) is None else ():
+            with contextlib.suppress(OSError, AttributeError):
+                function = getattr(ctypes.CDLL(library), name)
+                llvm.add_symbol(name, ctypes.cast(function, ctypes.c_void_p).value or 0)
+                break

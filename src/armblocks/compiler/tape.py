@@ -7,7 +7,6 @@ register ``size of inputs + count of constants + k``.
 
 from __future__ import annotations
 
-import hashlib
 import struct
 from dataclasses import dataclass
 from functools import cached_property
@@ -108,6 +107,8 @@ class Tape:
     @cached_property
     def digest(self) -> str:
         """SHA-256 of the program, hexadecimal: the same on every machine."""
+        import hashlib  # loads OpenSSL, which is slow; importing armblocks does without
+
         return hashlib.sha256(self.to_bytes()).hexdigest()
 
     @cached_property

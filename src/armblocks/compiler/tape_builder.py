@@ -90,13 +90,13 @@ class TapeBuilder:
         return self._merge_branches(b, a) if merged is None else merged
 
     def _merge_branches(self, a: int, b: int) -> int | None:
-        """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0)."""
-        yes, no = self._is(a, Opcode.SELECT), self._is(b, Opcode.SELECT)
-        if yes is None or no is None or self._value(yes[2]) != 0.0 or self._value(no[2]) != 0.0:
+        """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0); the second stands here as (c ? 0 : no)."""
+        first, second = self._is(a, Opcode.SELECT), self._is(b, Opcode.SELECT)
+        if first is None or second is None or first[0] != second[0]:
             return None
-        if self._is(no[0], Opcode.NOT) == (yes[0],):
-            return self.add(Opcode.SELECT, yes[0], yes[1], no[1])
-        return None
+        if self._value(first[2]) != 0.0 or self._value(second[1]) != 0.0:
+            return None
+        return self.add(Opcode.SELECT, first[0], first[1], second[2])
 
     def _simplify_subtract(self, a: int, b: int) -> int | None:
         number = self._value(b)

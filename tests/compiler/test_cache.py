@@ -1,0 +1,247 @@
+"""The disk cache: whole files or none, whoever writes; damage and refusals only cost time."""
+
+import multiprocessing
+import os
+import time
+from pathlib import Path
+
+import casadi
+import numpy as np
+import pytest
+from small_functions import traced
+
+from armblocks.compiler import Kernel, cache, compile_function, recall
+from armblocks.compiler.tape import Tape
+from armblocks.equations import TracedFunction
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def function() -> TracedFunction:
+    return traced(lambda a: casadi.sin(a) * casadi.exp(a), 3, name="cached")
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted(folder.glob("??/*"))
+
+
+A = np.array([0.5, 1.0, -2.0])
+EXPECTED = np.sin(A) * np.exp(A)
+
+
+def counting(calls: list[str]) -> TracedFunction:
+    calls.append("traced")
+    return function()
+
+
+def test_the_second_time_nothing_is_traced(folder: Path) -> None:
+    calls: list[str] = []
+    for _ in range(3):
+        kernel = recall("my key", lambda: counting(calls))
+        np.testing.assert_allclose(kernel(A), EXPECTED, rtol=1e-15)
+        np.testing.assert_allclose(kernel(np.tile(A, (9, 1)))[8], EXPECTED, rtol=1e-15)
+        assert kernel.inputs == function().inputs
+        assert kernel.outputs == function().outputs
+        assert kernel.count.function_calls == 6
+        assert kernel.name == "cached"
+    assert calls == ["traced"]
+    assert len(files(folder)) == 4  # record, tape, single, batch
+    recall("another key", lambda: counting(calls))
+    assert calls == ["traced", "traced"]
+
+
+def test_code_from_disk_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = compile_function(function())(A)
+
+    def refuse(*_: object) -> bytes:
+        raise AssertionError("compiled again")
+
+    monkeypatch.setattr("armblocks.compiler.native.compile_object", refuse)
+    assert np.array_equal(compile_function(function())(A), first)
+    with pytest.raises(AssertionError, match="compiled again"):
+        compile_function(traced(lambda a: a * 3, 3))(A)
+
+
+def flip(data: bytes) -> bytes:
+    return data[:-20] + bytes([data[-20] ^ 1]) + data[-19:]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: b"",
+        lambda data: data[:30],
+        lambda data: data[:-1],
+        flip,
+        lambda data: data + b"x",
+        os.urandom,
+    ],
+    ids=["empty", "head only", "cut short", "one bit", "longer", "other content"],
+)
+def test_damaged_files_are_made_anew(folder: Path, damage: object) -> None:
+    calls: list[str] = []
+    before = recall("key", lambda: counting(calls))(A)
+    whole = {path: path.read_bytes() for path in files(folder)}
+    for path, data in whole.items():
+        path.write_bytes(damage(len(data) if damage is os.urandom else data))  # type: ignore[operator]
+    assert np.array_equal(recall("key", lambda: counting(calls))(A), before)
+    assert calls == ["traced", "traced"]
+    assert {path: path.read_bytes() for path in files(folder)} == whole
+
+
+def test_a_missing_tape_is_traced_again_when_it_is_needed(folder: Path) -> None:
+    calls: list[str] = []
+    recall("key", lambda: counting(calls))(A)
+    for path in files(folder):
+        content = cache.load(path.stem)
+        assert content is not None
+        if content.startswith(b"armblocks tape"):
+            path.unlink()
+    kernel = recall("key", lambda: counting(calls))
+    kernel(A)
+    assert calls == ["traced"]
+    assert isinstance(kernel.tape, Tape)
+    assert calls == ["traced", "traced"]
+
+
+def test_a_tape_or_record_of_another_make_is_made_anew(folder: Path) -> None:
+    calls: list[str] = []
+    kernel = recall("key", lambda: counting(calls))
+    kernel(A)
+    for path in files(folder):
+        content = cache.load(path.stem) or b""
+        if content.startswith(b"{"):
+            cache.store(path.stem, b'{"name": 3}')
+        elif content.startswith(b"armblocks tape"):
+            cache.store(path.stem, b"old tape")
+    again = recall("key", lambda: counting(calls))
+    assert again.tape == kernel.tape
+    assert calls == ["traced", "traced"]
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", str(blocked / "cache"))
+    np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
+    assert blocked.read_text() == "not a folder"
+
+
+def test_a_full_disk_leaves_no_remains(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Path, target: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
+    assert files(folder) == []
+
+
+def test_an_empty_name_switches_the_cache_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
+    assert cache.folder() is None
+    np.testing.assert_allclose(recall("key", function)(A), EXPECTED, rtol=1e-15)
+    cache.store("0" * 64, b"nothing")
+    assert cache.load("0" * 64) is None
+
+
+@pytest.mark.parametrize(
+    ("platform", "variable", "expected"),
+    [
+        ("linux", "XDG_CACHE_HOME", "base/armblocks"),
+        ("linux", None, "home/.cache/armblocks"),
+        ("darwin", None, "home/Library/Caches/armblocks"),
+        ("win32", "LOCALAPPDATA", "base/armblocks/Cache"),
+        ("win32", None, "home/AppData/Local/armblocks/Cache"),
+    ],
+)
+def test_each_system_has_its_place(
+    monkeypatch: pytest.MonkeyPatch, platform: str, variable: str | None, expected: str
+) -> None:
+    for name in ("ARMBLOCKS_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    if variable:
+        monkeypatch.setenv(variable, "base")
+    monkeypatch.setattr(Path, "home", lambda: Path("home"))
+    monkeypatch.setattr(cache.sys, "platform", platform)
+    assert cache.folder() == Path(expected)
+
+
+def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    def homeless() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("ARMBLOCKS_CACHE_DIR", raising=False)
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(cache.sys, "platform", "linux")
+    monkeypatch.setattr(Path, "home", homeless)
+    assert cache.folder() is None
+
+
+def test_what_was_used_least_recently_is_pruned_first(folder: Path) -> None:
+    names = [f"{k:064x}" for k in range(10)]
+    for age, name in enumerate(reversed(names)):
+        cache.store(name, bytes(1000))
+        path = next(folder.glob(f"??/{name}.bin"))
+        moment = time.time() - 3600 * age
+        os.utime(path, (moment, moment))
+    old = folder / "00" / "killed-writer.tmp"
+    old.write_bytes(b"x")
+    os.utime(old, (1, 1))
+    cache.prune(folder, limit=100_000)
+    assert len(files(folder)) == 10
+    cache.prune(folder, limit=6000)
+    kept = {path.stem for path in files(folder)}
+    assert kept == set(names[-4:])  # four of 1050 bytes fit into three quarters of 6000
+
+
+def test_use_keeps_a_file_young(folder: Path) -> None:
+    cache.store("ab" * 32, b"content")
+    path = next(folder.glob("??/*"))
+    os.utime(path, (1000, 1000))
+    assert cache.load("ab" * 32) == b"content"
+    assert time.time() - path.stat().st_mtime < 60
+
+
+def test_edited_sources_change_every_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    record, code = cache.record_name("key"), cache.object_name(("a", "b"))
+    assert code != cache.object_name(("ab", ""))
+    monkeypatch.setattr(cache, "package_fingerprint", lambda: "edited")
+    monkeypatch.setattr(cache, "compiler_fingerprint", lambda: "edited")
+    assert cache.record_name("key") != record
+    assert cache.object_name(("a", "b")) != code
+
+
+def test_the_fingerprint_sees_edits(tmp_path: Path) -> None:
+    source = tmp_path / "sub" / "module.py"
+    source.parent.mkdir()
+    source.write_text("a = 1")
+    before = cache._fingerprint(tmp_path)
+    assert cache._fingerprint(tmp_path) == before
+    (tmp_path / "notes.txt").write_text("no source")
+    assert cache._fingerprint(tmp_path) == before
+    source.write_text("a = 12")
+    assert cache._fingerprint(tmp_path) != before
+
+
+def _work(folder: str, results: "multiprocessing.Queue[list[float]]") -> None:
+    os.environ["ARMBLOCKS_CACHE_DIR"] = folder
+    kernel: Kernel = recall("shared key", function)
+    results.put(kernel(A).tolist())
+
+
+def test_processes_that_write_at_once_do_not_meet_half_files(folder: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    results: multiprocessing.Queue[list[float]] = context.Queue()
+    workers = [context.Process(target=_work, args=(str(folder), results)) for _ in range(3)]
+    for worker in workers:
+        worker.start()
+    found = [results.get(timeout=60) for _ in workers]
+    for worker in workers:
+        worker.join()
+    assert found[0] == found[1] == found[2]
+    assert [path for path in files(folder) if path.suffix == ".tmp"] == []
+    assert all(cache.load(path.stem) is not None for path in files(folder))

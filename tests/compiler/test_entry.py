@@ -1,0 +1,258 @@
+"""The builtin for single calls: the kernel's own answers and refusals, and no reference lost or kept."""
+
+import gc
+import sys
+import weakref
+from types import BuiltinFunctionType
+
+import casadi
+import numpy as np
+import pytest
+from casadi import SX
+from small_functions import mixed, same_bits, traced
+
+from armblocks.compiler import Kernel, compile_function, entry
+from armblocks.equations import TracedFunction, signature
+from armblocks.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def kernel() -> Kernel:
+    return compile_function(mixed())
+
+
+@pytest.fixture(scope="module")
+def several() -> Kernel:
+    inputs = signature(("t", ()), ("A", (2, 2)))
+    outputs = signature(("B", (2, 2)), ("s", ()))
+    return compile_function(
+        TracedFunction.trace("several", inputs, outputs, lambda t, A: [A * t, casadi.trace(A) + t])
+    )
+
+
+def arguments(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=3), rng.normal(size=3)
+
+
+def test_it_is_a_builtin_that_explains_itself(kernel: Kernel) -> None:
+    assert isinstance(kernel.entry, BuiltinFunctionType)
+    assert kernel.entry.__name__ == "mixed"
+    assert kernel.entry.__text_signature__ == "(a, b, /, *, out=None, threads=1)"
+    assert kernel.entry.__doc__ == "a (3,), b (3,) -> y (11,); or N samples of each."
+
+
+def test_it_gives_the_kernels_bits(kernel: Kernel) -> None:
+    for seed in range(30):
+        a, b = arguments(seed)
+        assert same_bits(kernel.entry(a, b), kernel(a, b))
+    huge = np.array([1e200, -3e9, 2e19]), np.array([1e300, np.nan, np.inf])
+    assert same_bits(kernel.entry(*huge), kernel(*huge))
+
+
+class Subclass(np.ndarray):
+    """An array of another class."""
+
+
+def odd_arguments() -> dict[str, object]:
+    a = arguments(1)[0]
+    raw = np.zeros(25, dtype=np.uint8)[1:].view(np.float64)
+    raw[:] = a
+    read_only = a.copy()
+    read_only.flags.writeable = False
+    return {
+        "list": a.tolist(),
+        "tuple": tuple(a),
+        "strided": np.repeat(a, 2)[::2],
+        "reversed": a[::-1],
+        "single precision": a.astype(np.float32),
+        "integers": np.array([1, 2, 3]),
+        "big-endian": a.astype(">f8"),
+        "subclass": a.view(Subclass),
+        "read-only": read_only,
+        "unaligned": raw,
+        "batch": np.tile(a, (5, 1)),
+        "own dtype object": a.astype(np.dtype("f8", metadata={"unit": "rad"})),
+        "memoryview": memoryview(a),
+    }
+
+
+@pytest.mark.parametrize("kind", odd_arguments())
+def test_whatever_the_kernel_takes_the_builtin_takes(kernel: Kernel, kind: str) -> None:
+    value = odd_arguments()[kind]
+    b = arguments(1)[1]
+    assert same_bits(np.asarray(kernel.entry(value, b)), np.asarray(kernel(value, b)))
+    assert type(kernel.entry(value, b)) is np.ndarray
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.zeros(2),
+        np.zeros(4),
+        np.zeros((1, 4)),
+        np.zeros((3, 1, 3)),
+        np.zeros(0),
+        np.float64(3.0),
+        3.0,
+        None,
+        "abc",
+        np.zeros(3, complex),
+        np.zeros(3, object),
+        np.zeros(3, bool),
+        [[1.0], [1.0, 2.0]],
+        object(),
+        {},
+    ],
+    ids=repr,
+)
+def test_whatever_the_kernel_refuses_the_builtin_refuses(kernel: Kernel, value: object) -> None:
+    b = arguments(1)[1]
+    with pytest.raises(InputError) as expected:
+        kernel(value, b)
+    with pytest.raises(InputError) as found:
+        kernel.entry(value, b)
+    assert str(found.value) == str(expected.value)
+
+
+def test_counts_and_keywords_reach_the_kernel(kernel: Kernel) -> None:
+    a, b = arguments(3)
+    for wrong in ((), (a,), (a, b, a)):
+        with pytest.raises(InputError, match="arguments were given"):
+            kernel.entry(*wrong)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'speed'"):
+        kernel.entry(a, b, speed=3)
+    out = np.empty(11)
+    assert kernel.entry(a, b, out=out) is out
+    assert same_bits(out, kernel(a, b))
+    assert same_bits(kernel.entry(np.tile(a, (9, 1)), b, threads=2)[8], out)
+
+
+def test_scalars_come_and_go_as_numbers(several: Kernel) -> None:
+    A = np.arange(4.0).reshape(2, 2)
+    for t in (2.0, np.float64(2.0), np.float32(2.0), 2, np.int64(2), np.array(2.0)):
+        B, s = several.entry(t, A)
+        assert np.array_equal(B, A * 2)
+        assert type(s) is np.float64
+        assert s == 5.0
+    single = compile_function(
+        TracedFunction.trace("one", signature(("t", ())), signature(("s", ())), lambda t: t * t)
+    )
+    assert type(single.entry(3.0)) is type(single(3.0)) is np.float64
+    assert single.entry(3.0) == 9.0
+
+
+def test_results_are_new_arrays(kernel: Kernel) -> None:
+    a, b = arguments(4)
+    first = kernel.entry(a, b)
+    kept = first.copy()
+    second = kernel.entry(b, a)
+    assert first.base is None
+    assert first.flags.owndata
+    assert first.flags.c_contiguous
+    assert first.flags.writeable
+    assert not np.shares_memory(first, second)
+    assert np.array_equal(first, kept)
+
+
+def test_no_reference_is_lost_or_kept(kernel: Kernel, several: Kernel) -> None:
+    a, b = arguments(5)
+    A = np.eye(2)
+    watched = (a, b, A, np.dtype(np.float64), np.ndarray, np.float64, kernel, kernel.entry, several.entry)
+
+    def exercise() -> None:
+        for _ in range(500):
+            kernel.entry(a, b)
+            several.entry(1.5, A)
+            for wrong in ((a,), (a, A), (a, None)):
+                with pytest.raises(InputError):
+                    kernel.entry(*wrong)
+
+    exercise()
+    gc.collect()
+    before = [sys.getrefcount(thing) for thing in watched]
+    blocks = sys.getallocatedblocks()
+    exercise()
+    gc.collect()
+    after = [sys.getrefcount(thing) for thing in watched]
+    assert [abs(x - y) < 20 for x, y in zip(before, after)] == [True] * len(watched)
+    assert abs(sys.getallocatedblocks() - blocks) < 400  # 500 turns would show ten times that
+
+
+def test_the_builtin_keeps_its_code_alive_and_lets_it_go() -> None:
+    kernel = compile_function(traced(lambda a: 3 * a, 2, name="triple"))
+    builtin = kernel.entry
+    watch = weakref.ref(kernel)
+    del kernel
+    gc.collect()
+    assert np.array_equal(builtin(np.array([1.0, 2.0])), [3.0, 6.0])
+    assert np.array_equal(builtin([1.0, 2.0]), [3.0, 6.0])
+    del builtin
+    gc.collect()
+    assert watch() is None
+
+
+def test_another_fallback_gets_what_the_fast_path_does_not_serve(kernel: Kernel) -> None:
+    seen: list[tuple[object, ...]] = []
+
+    def fallback(*arguments: object, **options: object) -> str:
+        seen.append((arguments, options))
+        return "fallback"
+
+    builtin = kernel.entry_before(fallback)
+    a, b = arguments(6)
+    assert same_bits(builtin(a, b), kernel(a, b))
+    assert builtin(a, b, payload=3) == "fallback"
+    assert builtin([1], b) == "fallback"
+    assert seen == [((a, b), {"payload": 3}), (([1], b), {})]
+
+
+def test_errors_of_the_fallback_pass_through(kernel: Kernel) -> None:
+    def fallback(*arguments: object) -> None:
+        raise ZeroDivisionError("from the fallback")
+
+    with pytest.raises(ZeroDivisionError, match="from the fallback"):
+        kernel.entry_before(fallback)(1)
+
+
+def test_an_unknown_binary_interface_is_left_alone(kernel: Kernel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(entry, "_addresses", lambda: None)
+    called = kernel.entry_before(kernel)
+    assert called is kernel
+    a, b = arguments(7)
+    assert same_bits(called(a, b), kernel.entry(a, b))
+
+
+def test_offsets_are_compared_with_a_real_array(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry._addresses.cache_clear()
+    try:
+        monkeypatch.setattr(entry, "ARRAY_DATA", 24)
+        assert entry._addresses() is None
+    finally:
+        entry._addresses.cache_clear()
+
+
+def test_random_mixtures_of_arguments(kernel: Kernel) -> None:
+    rng = np.random.default_rng(8)
+    pool = [*odd_arguments().values(), np.zeros(2), None, "x", 1.0, *arguments(9)]
+    for _ in range(300):
+        chosen = [pool[k] for k in rng.integers(len(pool), size=rng.integers(0, 4))]
+        try:
+            expected = kernel(*chosen)
+        except InputError as error:
+            with pytest.raises(InputError) as found:
+                kernel.entry(*chosen)
+            assert str(found.value) == str(error)
+        else:
+            assert same_bits(np.asarray(kernel.entry(*chosen)), np.asarray(expected))
+
+
+def test_matrices_in_column_order_are_read_as_what_they_are() -> None:
+    kernel = compile_function(
+        TracedFunction.trace(
+            "transpose", signature(("A", (2, 3))), signature(("B", (3, 2))), lambda A: SX(A.T)
+        )
+    )
+    A = np.arange(6.0).reshape(2, 3)
+    for value in (A, np.asfortranarray(A)):
+        assert np.array_equal(kernel.entry(value), A.T)

@@ -1,0 +1,131 @@
+"""Every operation that CasADi's scalar graphs can hold arrives on the tape with its meaning."""
+
+from collections.abc import Callable
+
+import casadi
+import numpy as np
+import pytest
+from casadi import SX
+from small_functions import mixed, traced
+
+from armblocks.compiler import compile_function
+from armblocks.compiler.from_casadi import tape_from
+from armblocks.compiler.interpret import interpret
+from armblocks.errors import CompileError
+
+UNARY: dict[str, Callable[[SX], SX]] = {
+    name: getattr(casadi, name)
+    for name in [
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "asinh",
+        "acosh",
+        "atanh",
+        "exp",
+        "log",
+        "log10",
+        "sqrt",
+        "fabs",
+        "sign",
+        "floor",
+        "ceil",
+        "erf",
+        "expm1",
+        "log1p",
+        "logic_not",
+    ]
+} | {
+    "negative": lambda x: -x,
+    "square": lambda x: x**2,
+    "cube": lambda x: x**3,
+    "twice": lambda x: 2 * x,
+    "inverse": lambda x: 1 / x,
+    "constant power": lambda x: x**2.5,
+    "power of two": lambda x: 2**x,
+}
+BINARY: dict[str, Callable[[SX, SX], SX]] = {
+    name: getattr(casadi, name)
+    for name in ["atan2", "fmin", "fmax", "fmod", "remainder", "copysign", "hypot", "logic_and", "logic_or"]
+} | {
+    "add": lambda x, y: x + y,
+    "subtract": lambda x, y: x - y,
+    "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y,
+    "power": lambda x, y: x**y,
+    "less": lambda x, y: x < y,
+    "less or equal": lambda x, y: x <= y,
+    "equal": lambda x, y: casadi.eq(x, y),
+    "not equal": lambda x, y: casadi.ne(x, y),
+    "choice": lambda x, y: casadi.if_else(x < y, 3 * x, y),
+    "half choice": lambda x, y: casadi.if_else(x < y, x, 0),
+}
+VALUES = np.array(
+    [0.0, -0.0, 0.3, -0.3, 0.9999, 1.0, -1.0, 1.7, -2.5, 3.0, 40.0, -1e5, 1e-9, np.inf, -np.inf]
+)
+
+
+@pytest.mark.parametrize("name", UNARY)
+def test_unary_operations_mean_what_casadi_means(name: str) -> None:
+    function = traced(UNARY[name], 1)
+    kernel = compile_function(function)
+    for value in (*VALUES, np.nan):
+        expected = function([value])[0]
+        # CasADi calls the C library; ours may differ by its error and our own.
+        np.testing.assert_allclose(kernel([value]), expected, rtol=1e-15, err_msg=str(value))
+        np.testing.assert_allclose(interpret(kernel.tape, [[value]])[0], expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("name", BINARY)
+def test_binary_operations_mean_what_casadi_means(name: str) -> None:
+    function = traced(BINARY[name], 1, 1)
+    kernel = compile_function(function)
+    for x in VALUES:
+        for y in VALUES:
+            expected = function([x], [y])[0]
+            np.testing.assert_allclose(kernel([x], [y]), expected, rtol=1e-15, err_msg=f"{x} {y}")
+            np.testing.assert_allclose(interpret(kernel.tape, [[x], [y]])[0], expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "name", ["fmin", "fmax", "add", "divide", "fmod", "remainder", "atan2", "hypot", "power"]
+)
+def test_nan_is_handed_on(name: str) -> None:
+    """CasADi's fmin and fmax drop a NaN; a limiter would then hide the first bad signal."""
+    kernel = compile_function(traced(BINARY[name], 1, 1))
+    for x, y in ((np.nan, 2.0), (2.0, np.nan), (np.nan, np.nan)):
+        assert np.isnan(kernel([x], [y])[0])
+        assert np.isnan(kernel([[x]] * 9, [[y]] * 9)).all()
+
+
+def test_the_branch_not_taken_has_no_influence() -> None:
+    kernel = compile_function(traced(lambda x, y: casadi.if_else(x > 0, y, casadi.log(x)), 1, 1))
+    assert kernel([1.0], [5.0])[0] == 5.0
+    assert kernel([2.0], [-np.inf])[0] == -np.inf
+    guarded = compile_function(traced(lambda x: casadi.if_else(x > 0, casadi.sqrt(x), 0), 1))
+    assert guarded([-1.0])[0] == 0.0
+
+
+def test_sparse_results_are_filled_with_zeros() -> None:
+    function = traced(lambda x: casadi.sparsify(casadi.vertcat(x, 0, 2 * x)), 1)
+    np.testing.assert_array_equal(compile_function(function)([3.0]), [3.0, 0.0, 6.0])
+
+
+def test_a_whole_function_agrees_with_casadi() -> None:
+    function = mixed()
+    tape = tape_from(function)
+    samples = np.random.default_rng(5).normal(size=(50, 2, 3))
+    for a, b in samples:
+        np.testing.assert_allclose(interpret(tape, [a, b])[0], function(a, b)[0], rtol=1e-13, atol=1e-15)
+
+
+def test_an_unknown_operation_is_named() -> None:
+    function = traced(lambda x: casadi.erfinv(x), 1, name="probit")
+    with pytest.raises(CompileError, match=r"probit: the equations use the operation OP_ERFINV"):
+        compile_function(function)

@@ -1,0 +1,109 @@
+"""Other processors: code assembles for them, and gives the same bits where it can be run here."""
+
+import ctypes
+import platform
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from llvmlite import binding as llvm
+from small_functions import mixed, same_bits
+
+from armblocks.compiler import compile_function
+from armblocks.compiler.batch import emit_batch
+from armblocks.compiler.entry_ir import emit_entry
+from armblocks.compiler.from_casadi import tape_from
+from armblocks.compiler.ir_text import Module
+from armblocks.compiler.layout import BatchLayout, Layout
+from armblocks.compiler.llvm_ir import emit_function
+from armblocks.compiler.native import NativeCode, _link, compile_object, load_code
+from armblocks.compiler.target import Target, host_target, vector_lanes
+
+LAYOUT = BatchLayout(inputs=(Layout.ROWS, Layout.ROWS), outputs=(Layout.ROWS,))
+
+
+def module(lanes: int) -> str:
+    function = mixed()
+    tape = tape_from(function)
+    made = Module()
+    emit_batch(made, tape, LAYOUT, lanes, "batch")
+    emit_function(made, tape, "evaluate", linkage="")
+    emit_entry(made, function.inputs, function.outputs, "evaluate")
+    return made.text
+
+
+@pytest.mark.parametrize(
+    ("triple", "cpu", "lanes"),
+    [
+        ("x86_64-unknown-linux-gnu", "x86-64", 2),
+        ("x86_64-unknown-linux-gnu", "skylake-avx512", 8),
+        ("x86_64-pc-windows-msvc", "x86-64-v3", 4),
+        ("x86_64-apple-darwin", "haswell", 4),
+        ("aarch64-unknown-linux-gnu", "generic", 2),
+        ("arm64-apple-darwin", "apple-m1", 2),
+        ("aarch64-pc-windows-msvc", "generic", 2),
+    ],
+)
+def test_code_assembles_for_other_systems(triple: str, cpu: str, lanes: int) -> None:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = replace(host_target(), triple=triple, cpu=cpu, features="", lanes=lanes)
+    assert len(compile_object(module(lanes), target)) > 1000
+
+
+@pytest.mark.parametrize(("cpu", "lanes"), [("x86-64", 1), ("x86-64", 2), ("haswell", 4)])
+@pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="runs x86-64 code")
+def test_older_processors_give_the_same_bits(cpu: str, lanes: int) -> None:
+    """Without fused multiply-add in hardware the C library's exact one is called."""
+    if cpu == "haswell" and not llvm.get_host_cpu_features().get("avx2"):
+        pytest.skip("this processor has no AVX2")
+    target = replace(host_target(), cpu=cpu, features="", lanes=lanes)
+    code = _link(compile_object(module(lanes), target), target)
+    function = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 3)(code.address("batch"))
+    rng = np.random.default_rng(4)
+    a, b = rng.normal(size=(101, 3)), rng.normal(size=(101, 3))
+    a[7, 0], b[9, 2] = 1e200, 1e12
+    out = np.empty((101, 11))
+    function(0, 101, 101, a.ctypes.data, b.ctypes.data, out.ctypes.data)
+    assert same_bits(out, compile_function(mixed())(a, b))
+
+
+@pytest.mark.parametrize(
+    ("triple", "features", "lanes"),
+    [
+        ("x86_64-unknown-linux-gnu", {"avx512f": True, "avx2": True, "fma": True}, 8),
+        ("x86_64-pc-windows-msvc", {"avx512f": False, "avx2": True, "fma": True}, 4),
+        ("x86_64-unknown-linux-gnu", {"avx2": True}, 2),
+        ("x86_64-unknown-linux-gnu", {}, 2),
+        ("arm64-apple-darwin", {"neon": True}, 2),
+    ],
+)
+def test_lanes_follow_the_vector_registers(triple: str, features: dict[str, bool], lanes: int) -> None:
+    assert vector_lanes(triple, features) == lanes
+
+
+def test_the_host_is_known_once() -> None:
+    target = host_target()
+    assert isinstance(target, Target)
+    assert target is host_target()
+    assert target.cpu in target.key
+    assert "llvmlite" in target.key
+    assert replace(target, lanes=1).key != target.key
+
+
+def test_an_unknown_symbol_has_no_address() -> None:
+    code = load_code(("symbols",), lambda: "define double @known() { ret double 1.0 }")
+    assert isinstance(code, NativeCode)
+    assert code.address("known") > 0
+    with pytest.raises(KeyError, match="unknown"):
+        code.address("unknown")
+
+
+def test_no_c_library_is_called_where_the_processor_has_fused_multiply_add() -> None:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    names = (b"sin", b"cos", b"tan", b"atan2", b"exp", b"fmod", b"pow", b"log", b"fma", b"floor")
+    for triple, cpu in (("x86_64-unknown-linux-gnu", "haswell"), ("aarch64-unknown-linux-gnu", "generic")):
+        target = replace(host_target(), triple=triple, cpu=cpu, features="", lanes=2)
+        code = compile_object(module(2), target)
+        assert not [name for name in names if b"\0" + name + b"\0" in code]
