@@ -90,7 +90,7 @@ class TapeBuilder:
         return self._merge_branches(b, a) if merged is None else merged
 
     def _merge_branches(self, a: int, b: int) -> int | None:
-        """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0); the second stands here as (c ? 0 : no)."""
+        """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0), here (c ? yes : 0) + (c ? 0 : no)."""
         first, second = self._is(a, Opcode.SELECT), self._is(b, Opcode.SELECT)
         if first is None or second is None or first[0] != second[0]:
             return None
