@@ -5,41 +5,75 @@
 >>> result = ab.simulate("kr180model")
 """
 
-from armblocks import blocks, errors
-from armblocks.diagram import Diagram, DiagramBuilder
-from armblocks.equations import SimulationOptions
-from armblocks.face import (
-    Arm,
-    CompiledDiagram,
-    JointTrajectory,
-    Payload,
-    compile_diagram,
-    jtraj,
-    list_blocks,
-    list_examples,
-    list_robots,
-    load_diagram,
-    load_robot,
-    save_diagram,
-    save_robot,
-    simulate,
-    write_report,
-)
-from armblocks.robot import (
-    DhRow,
-    Fixed,
-    FrictionModel,
-    JointLimits,
-    Link,
-    Motor,
-    Prismatic,
-    Revolute,
-    Robot,
-    modified_dh,
-    standard_dh,
-)
-from armblocks.simulation import SimulationResult
-from armblocks.spatial import Transform
+from typing import TYPE_CHECKING
+
+from armblocks.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from armblocks import blocks, errors
+    from armblocks.diagram import Diagram, DiagramBuilder
+    from armblocks.equations import SimulationOptions
+    from armblocks.face.arm import Arm
+    from armblocks.face.diagrams import list_blocks, list_examples, load_diagram, save_diagram
+    from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
+    from armblocks.face.payload import Payload
+    from armblocks.face.reporting import write_report
+    from armblocks.face.robots import list_robots, load_robot, save_robot
+    from armblocks.face.trajectory import JointTrajectory, jtraj
+    from armblocks.robot import (
+        DhRow,
+        Fixed,
+        FrictionModel,
+        JointLimits,
+        Link,
+        Motor,
+        Prismatic,
+        Revolute,
+        Robot,
+        modified_dh,
+        standard_dh,
+    )
+    from armblocks.simulation import SimulationResult
+    from armblocks.spatial import Transform
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "Arm": "armblocks.face.arm",
+            "CompiledDiagram": "armblocks.face.model",
+            "DhRow": "armblocks.robot",
+            "Diagram": "armblocks.diagram",
+            "DiagramBuilder": "armblocks.diagram",
+            "Fixed": "armblocks.robot",
+            "FrictionModel": "armblocks.robot",
+            "JointLimits": "armblocks.robot",
+            "JointTrajectory": "armblocks.face.trajectory",
+            "Link": "armblocks.robot",
+            "Motor": "armblocks.robot",
+            "Payload": "armblocks.face.payload",
+            "Prismatic": "armblocks.robot",
+            "Revolute": "armblocks.robot",
+            "Robot": "armblocks.robot",
+            "SimulationOptions": "armblocks.equations",
+            "SimulationResult": "armblocks.simulation",
+            "Transform": "armblocks.spatial",
+            "blocks": "armblocks.blocks",
+            "compile_diagram": "armblocks.face.model",
+            "errors": "armblocks.errors",
+            "jtraj": "armblocks.face.trajectory",
+            "list_blocks": "armblocks.face.diagrams",
+            "list_examples": "armblocks.face.diagrams",
+            "list_robots": "armblocks.face.robots",
+            "load_diagram": "armblocks.face.diagrams",
+            "load_robot": "armblocks.face.robots",
+            "modified_dh": "armblocks.robot",
+            "save_diagram": "armblocks.face.diagrams",
+            "save_robot": "armblocks.face.robots",
+            "simulate": "armblocks.face.model",
+            "standard_dh": "armblocks.robot",
+            "write_report": "armblocks.face.reporting",
+        },
+    )
 
 __all__ = [
     "Arm",
@@ -76,3 +110,7 @@ __all__ = [
     "standard_dh",
     "write_report",
 ]
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler import Kernel, OperationCount, recall
-from armblocks.dynamics import TRACES
+from armblocks.equations import TracedFunction
 from armblocks.errors import UnknownNameError
 from armblocks.face.payload import Payload
 from armblocks.face.robot_html import robot_html
@@ -176,8 +177,8 @@ class Arm:
     # ---- how it was made ---------------------------------------------------------------------------------
     def operation_count(self, method: str) -> OperationCount:
         """Multiplies, adds and other operations in one evaluation of a method, such as ``"rne"``."""
-        if method not in TRACES:
-            raise UnknownNameError("compiled method", method, TRACES, where=self.name)
+        if method not in _traces():
+            raise UnknownNameError("compiled method", method, _traces(), where=self.name)
         return self._kernel(method).count
 
     @cached_property
@@ -187,7 +188,7 @@ class Arm:
         return hashlib.sha256(repr(replace(self.robot, links=links, source="")).encode()).hexdigest()
 
     def _kernel(self, method: str) -> Kernel:
-        return recall(f"robot/{method}/{self._description_key}", lambda: TRACES[method](self.robot))
+        return recall(f"robot/{method}/{self._description_key}", lambda: _traces()[method](self.robot))
 
     def _loadable(self, method: str) -> OfMotion:
         """The plain kernel, and the one with wrench and payload as soon as a call names either."""
@@ -224,3 +225,10 @@ class Arm:
         from armblocks.report import arm_picture_svg
 
         return robot_html(self.robot, arm_picture_svg(self.robot, [0.0] * self.n))
+
+
+def _traces() -> Mapping[str, Callable[[Robot], TracedFunction]]:
+    """All traced quantities; imported late, because a warm cache needs no tracing."""
+    from armblocks.dynamics import TRACES
+
+    return TRACES

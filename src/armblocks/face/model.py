@@ -16,7 +16,7 @@ from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import UnknownNameError
-from armblocks.face.loading import load_diagram
+from armblocks.face.diagrams import load_diagram
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
 from armblocks.simulation.simulate import Progress

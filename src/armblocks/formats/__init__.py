@@ -1,12 +1,38 @@
 """Files and descriptions: robots and diagrams, read and written. Nothing in a file is ever executed."""
 
-from armblocks.formats.diagram_files import list_examples, load_diagram, read_diagram, write_diagram
-from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
-from armblocks.formats.matlab_script import Script, read_script
-from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot
-from armblocks.formats.robot_format import RobotFormat
-from armblocks.formats.robot_json import read_robot, write_robot
-from armblocks.formats.robot_references import ResolveRobot
+from typing import TYPE_CHECKING
+
+from armblocks.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from armblocks.formats.diagram_files import list_examples, load_diagram, read_diagram, write_diagram
+    from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
+    from armblocks.formats.matlab_script import Script, read_script
+    from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot
+    from armblocks.formats.robot_format import RobotFormat
+    from armblocks.formats.robot_json import read_robot, write_robot
+    from armblocks.formats.robot_references import ResolveRobot
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "ROBOT_FORMATS": "armblocks.formats.robot_files",
+            "ResolveRobot": "armblocks.formats.robot_references",
+            "RobotFormat": "armblocks.formats.robot_format",
+            "Script": "armblocks.formats.matlab_script",
+            "diagram_from_bytes": "armblocks.formats.diagram_json",
+            "diagram_to_bytes": "armblocks.formats.diagram_json",
+            "list_examples": "armblocks.formats.diagram_files",
+            "list_robots": "armblocks.formats.robot_files",
+            "load_diagram": "armblocks.formats.diagram_files",
+            "load_robot": "armblocks.formats.robot_files",
+            "read_diagram": "armblocks.formats.diagram_files",
+            "read_robot": "armblocks.formats.robot_json",
+            "read_script": "armblocks.formats.matlab_script",
+            "write_diagram": "armblocks.formats.diagram_files",
+            "write_robot": "armblocks.formats.robot_json",
+        },
+    )
 
 __all__ = [
     "ROBOT_FORMATS",

@@ -1,4 +1,4 @@
-"""Robots and diagrams by name or path, and what is there to choose from."""
+"""Robots by name or path."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from os import PathLike
 from pathlib import Path
 
 from armblocks import formats
-from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram
 from armblocks.face.arm import Arm
 from armblocks.files import write_atomically
 from armblocks.robot import FrictionModel, Robot
@@ -36,26 +34,6 @@ def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
     return target
 
 
-def load_diagram(name_or_path: str | PathLike[str]) -> Diagram:
-    """A shipped example by name (``"kr180model"``), or a diagram from a ``.json`` file."""
-    return formats.load_diagram(name_or_path, BLOCKS)
-
-
-def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
-    """Write a diagram as canonical JSON, all or nothing; returns the path."""
-    return formats.write_diagram(path, diagram)
-
-
 def list_robots() -> tuple[str, ...]:
     """Names of the shipped robots."""
     return formats.list_robots()
-
-
-def list_examples() -> tuple[str, ...]:
-    """Names of the shipped diagrams."""
-    return formats.list_examples()
-
-
-def list_blocks() -> tuple[str, ...]:
-    """Type names of all blocks."""
-    return tuple(BLOCKS)

@@ -1,0 +1,40 @@
+"""Packages that export lazily say the same thing to the interpreter and to type checkers."""
+
+import ast
+import importlib
+from pathlib import Path
+
+import pytest
+
+PACKAGES = ("armblocks", "armblocks.formats")
+
+
+def homes_for_type_checkers(package: str) -> dict[str, str]:
+    """Name and module of every import under ``if TYPE_CHECKING``."""
+    tree = ast.parse(Path(importlib.import_module(package).__file__ or "").read_text())
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
+    return {
+        alias.name: f"{node.module}.{alias.name}" if node.module == package else node.module or ""
+        for node in imports
+        for alias in node.names
+    }
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_name_is_found_where_type_checkers_look(package: str) -> None:
+    module = importlib.import_module(package)
+    homes = homes_for_type_checkers(package)
+    assert sorted(homes) == sorted(module.__all__)
+    for name, home in homes.items():
+        found = getattr(module, name)
+        if home == f"{package}.{name}":
+            assert found is importlib.import_module(home)
+        else:
+            assert found is getattr(importlib.import_module(home), name)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_an_unknown_name_is_an_attribute_error(package: str) -> None:
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'fkin'"):
+        importlib.import_module(package).fkin  # noqa: B018 - the access is the test
