@@ -43,6 +43,7 @@ from armblocks.formats import (
     write_diagram,
     write_robot,
 )
+from armblocks.formats.robot_files import shipped_folder
 from armblocks.robot import FrictionModel, Robot
 
 SCHEMAS = Path(formats.__file__).parent / "schema"
@@ -134,7 +135,7 @@ def test_shipped_examples_are_canonical_and_follow_the_schema(
     name: str, schema: jsonschema.Draft202012Validator, tmp_path: Path
 ) -> None:
     diagram = load_diagram(name, BLOCKS)
-    path = formats.robot_files.shipped_folder("examples") / f"{name}.json"
+    path = shipped_folder("examples") / f"{name}.json"
     copy = write_diagram(tmp_path / "copy.json", diagram)
     assert copy.read_bytes() == path.read_bytes()
     assert read_diagram(copy, BLOCKS) == diagram

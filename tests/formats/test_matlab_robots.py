@@ -184,6 +184,16 @@ def test_values_are_copied_in_release_8() -> None:
     assert script.robots["s"].name == "other"
 
 
+def test_constructors_copy_in_release_8() -> None:
+    text = (
+        "a = link([0 1 0 0]); a.m = 1; b = link(a); b.m = 2; L = {a b};"
+        "r = robot(L); s = robot(r, 'S'); s.name"
+    )
+    script = read_script(text.encode(), "a.m")
+    assert [link.mass for link in script.robots["r"].links] == [1, 2]
+    assert (script.robots["s"].name, script.robots["r"].name) == ("S", "noname")
+
+
 def test_nested_fields_are_read_and_set() -> None:
     text = (
         "L{1} = link([0 1 0 0]); L{1}.r = [1 2 3]; L{1}.r(2) = 5; L{1}.I = eye(3); L{1}.Tc = 0.4;"

@@ -32,6 +32,7 @@ from armblocks.formats.matlab.syntax import (
     Range,
     Statement,
     Step,
+    Target,
     Text,
     Transpose,
 )
@@ -148,7 +149,7 @@ class Interpreter:
             self.joined_lines.append(matrix.line)
         return broken
 
-    def _stored(self, place: Place, old: Value | None, steps: tuple[Step, ...], new: Value) -> Value:
+    def _stored(self, place: Place, old: Value | None, steps: tuple[Target, ...], new: Value) -> Value:
         """``old`` with ``new`` put where ``steps`` lead: ``L{2}.r(1) = …``."""
         if not steps:
             return new
@@ -161,11 +162,9 @@ class Interpreter:
                 return self._stored_cell(place, old, [self._value(a) for a in arguments], rest, new)
             case Parentheses(arguments=arguments):
                 return self._stored_element(place, old, [self._value(a) for a in arguments], rest, new)
-            case Transpose():  # the parser lets none through
-                raise place.error("a transpose cannot be assigned to")
 
     def _stored_field(
-        self, place: Place, old: Value | None, name: str, rest: tuple[Step, ...], new: Value
+        self, place: Place, old: Value | None, name: str, rest: tuple[Target, ...], new: Value
     ) -> Value:
         match old:
             case LinkRecord():
@@ -189,7 +188,7 @@ class Interpreter:
         return old
 
     def _stored_cell(
-        self, place: Place, old: Value | None, indices: list[Value], rest: tuple[Step, ...], new: Value
+        self, place: Place, old: Value | None, indices: list[Value], rest: tuple[Target, ...], new: Value
     ) -> Value:
         if old is None or (isinstance(old, np.ndarray) and old.size == 0):
             old = Cell()
@@ -207,7 +206,7 @@ class Interpreter:
         return old
 
     def _stored_element(
-        self, place: Place, old: Value | None, indices: list[Value], rest: tuple[Step, ...], new: Value
+        self, place: Place, old: Value | None, indices: list[Value], rest: tuple[Target, ...], new: Value
     ) -> Value:
         if isinstance(old, LinkRecord):
             old = LinkArray([old])

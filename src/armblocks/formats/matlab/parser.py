@@ -24,6 +24,7 @@ from armblocks.formats.matlab.syntax import (
     Range,
     Statement,
     Step,
+    Target,
     Text,
     Transpose,
 )
@@ -115,20 +116,23 @@ class _Parser:
         if not self._is("="):
             return Evaluation(value, token.line)
         self.position += 1
+        targets: list[Target] = []
         match value:
             case Name(name=name):
-                steps: tuple[Step, ...] = ()
-            case Postfix(base=Name(name=name), steps=steps) if not any(
-                isinstance(s, Transpose) for s in steps
-            ):
                 pass
+            case Postfix(base=Name(name=name), steps=steps):
+                targets = [step for step in steps if not isinstance(step, Transpose)]
+                if len(targets) < len(steps):
+                    raise place.error(
+                        "a transpose cannot be assigned to", allowed="name, name{i}, name.field …"
+                    )
             case Matrix():
                 raise place.error("assignment to several variables at once is not supported")
             case _:
                 raise place.error(
                     "the left side of '=' is not a variable", allowed="name, name{i}, name.field …"
                 )
-        result = Assignment(name, steps, self._expression(), token.line)
+        result = Assignment(name, tuple(targets), self._expression(), token.line)
         if self._is("="):
             raise place.error("two '=' in one statement", allowed="one assignment a statement")
         return result

@@ -106,7 +106,9 @@ class Transpose:
     line: int
 
 
-Step = Parentheses | Braces | Field | Transpose
+Target = Parentheses | Braces | Field
+"""What may follow a name left of ``=``."""
+Step = Target | Transpose
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +128,7 @@ class Assignment:
     """``name steps = value``"""
 
     name: str
-    steps: tuple[Step, ...]
+    steps: tuple[Target, ...]
     value: Expression
     line: int
 

@@ -1,0 +1,119 @@
+"""The shipped diagrams, run as a user runs them, against closed forms and other people's integrators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram
+from armblocks.formats import list_examples, load_diagram
+
+PROMISED = {"falling_pendulum", "kr180model", "puma560_computed_torque", "van_der_pol_pid"}
+
+
+@pytest.fixture(params=list_examples())
+def example(request: pytest.FixtureRequest) -> Diagram:
+    return load_diagram(request.param, BLOCKS)
+
+
+def test_the_promised_examples_are_shipped() -> None:
+    assert set(list_examples()) >= PROMISED
+
+
+def test_example_is_named_as_its_file_and_every_block_is_placed(example: Diagram) -> None:
+    assert example.name in list_examples()
+    assert set(example.layout) == set(example.blocks)
+    assert example.views(), "something is to be seen"
+
+
+def test_blocks_do_not_lie_on_one_another(example: Diagram) -> None:
+    corners = sorted((place.x, place.y) for place in example.layout.values())
+    for i, (x, y) in enumerate(corners):
+        for other_x, other_y in corners[i + 1 :]:
+            assert abs(other_x - x) >= 50 or abs(other_y - y) >= 50
+
+
+def test_kr180model_is_the_papers_figure_9() -> None:
+    diagram = load_diagram("kr180model", BLOCKS)
+    kinds = {name: block.title for name, block in diagram.blocks.items()}
+    assert kinds == {
+        "jtraj": "jtraj",
+        "kuka": "fkine",
+        "plot": "plot",
+        "T2xyz": "T2xyz",
+        "XY Graph": "XY Graph",
+        "XZ Graph": "XY Graph",
+        "YZ Graph": "XY Graph",
+        "Display": "Display",
+        "Joint angles": "Scope",
+        "speed": "Derivative",
+        "acceleration": "Derivative",
+        "Joint speeds": "Scope",
+        "Joint accelerations": "Scope",
+        "rne": "rne",
+        "Joint torques": "Scope",
+    }
+    assert diagram.settings.stop_time == 10
+
+
+PAPER = {
+    0: (1.95, -1.25, -1.85),
+    2: (2.36963237462, -0.835183999087, -1.693963015984),
+    5: (1.252643063297, 3.318570240624, 0.041710789934),
+    10: (-2.949278739196, 1.254698768685, 2.347929043243),
+}
+
+
+def test_kr180model_moves_as_computed_independently() -> None:
+    """Reference: a plain NumPy computation, printed to 12 digits; the promise is 1e-9 m."""
+    result = ab.simulate("kr180model")
+    for t, expected in PAPER.items():
+        (i,) = np.flatnonzero(result.time == t)
+        found = [result[f"T2xyz/{axis}"][i] for axis in "xyz"]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)
+    peak = np.degrees(np.abs(result["speed/y"]).max(axis=0))
+    np.testing.assert_allclose(peak, [33.73, 0, 16.87, 0], atol=0.005)
+    assert result["Joint torques/u"].shape == (1001, 4)
+
+
+PENDULUM = {
+    1: (0.98629175113187532, -0.16501085312554117),
+    2: (-0.79356619534332175, -0.60848393044379151),
+    5: (-0.94230543504375734, -0.33475433841400058),
+    10: (-0.27508746257611686, -0.96141920509912506),
+}
+
+
+def test_falling_pendulum_follows_the_elliptic_function() -> None:
+    """Exact: modulus sin(pi/4), period 4 K(1/2) / sqrt(9.81); rtol 1e-10 grows to some 1e-8 in 10 s."""
+    result = ab.simulate("falling_pendulum")
+    for t, (x, z) in PENDULUM.items():
+        (i,) = np.flatnonzero(result.time == t)
+        np.testing.assert_allclose(result["T2xyz/x"][i], x, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(result["T2xyz/z"][i], z, rtol=0, atol=1e-7)
+    energy = 0.5 * result["pendulum/qd"][:, 0] ** 2 + 9.81 * result["T2xyz/z"]
+    np.testing.assert_allclose(energy, 0, atol=1e-6)
+
+
+def test_computed_torque_makes_the_error_obey_its_own_equation() -> None:
+    """The loop is e'' + 20 e' + 100 e = 0 with e(0) = -0.1: e = -0.1 (1 + 10 t) exp(-10 t)."""
+    result = ab.simulate("puma560_computed_torque")
+    t = result.time[:, np.newaxis]
+    exact = -0.1 * (1 + 10 * t) * np.exp(-10 * t)
+    np.testing.assert_allclose(result["angle error/y"], np.broadcast_to(exact, (t.size, 6)), atol=1e-7)
+
+
+def test_van_der_pol_with_pid_agrees_with_scipy() -> None:
+    def equations(t: float, x: np.ndarray) -> list[float]:
+        e = np.sin(2 * np.pi * 0.1 * t) - x[0]
+        u = 2 * e + x[2] - 0.5 * x[1]
+        return [x[1], (1 - x[0] ** 2) * x[1] - x[0] + u, 0.5 * e]
+
+    reference = solve_ivp(equations, (0, 100), [1, 0, 0], method="DOP853", rtol=1e-11, atol=1e-12)
+    result = ab.simulate("van_der_pol_pid")
+    found = [result["x1/y"][-1], result["x2/y"][-1]]
+    # 100 s on a limit cycle at rtol 1e-6: the phase has drifted by some 1e-5 s.
+    np.testing.assert_allclose(found, reference.y[:2, -1], atol=2e-4)

@@ -1,0 +1,76 @@
+"""The shipped robots: complete, canonical, and what their sources say."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from armblocks import formats
+from armblocks.formats import list_robots, load_robot, write_robot
+from armblocks.formats.robot_files import shipped_folder
+from armblocks.robot import Robot, inertia_findings
+from robots_for_tests import evaluate
+
+FOLDER = shipped_folder("robots")
+SCHEMA = Path(formats.__file__).parent / "schema" / "robot.schema.json"
+
+
+@pytest.fixture(params=list_robots())
+def shipped(request: pytest.FixtureRequest) -> Robot:
+    return load_robot(request.param)
+
+
+def test_the_promised_robots_are_shipped() -> None:
+    assert {"kr180", "puma560", "twolink", "planar3r"} <= set(list_robots())
+
+
+def test_file_is_canonical_and_follows_the_schema(shipped: Robot) -> None:
+    text = (FOLDER / shipped.source / "robot.json").read_text(encoding="utf-8")
+    document = json.loads(text)
+    jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text())).validate(document)
+    notes = document.pop("notes")
+    assert len(notes) > 80, "the notes say where the numbers come from"
+    written = [line for line in text.splitlines() if not line.startswith('  "notes": ')]
+    # Without the notes the comma of the line before may be missing.
+    assert [line.rstrip(",") for line in written] == [
+        line.rstrip(",") for line in write_robot(shipped).decode().splitlines()
+    ]
+
+
+def test_robot_can_be_said_again_as_a_value(shipped: Robot) -> None:
+    assert load_robot(shipped.source) == shipped
+    assert hash(replace(shipped, comment=shipped.comment)) == hash(shipped)
+
+
+def test_puma560_is_corkes_set(puma560: Robot) -> None:
+    """Against the same numbers written out in Python."""
+    assert replace(load_robot("puma560"), name="puma560") == puma560
+
+
+def test_published_impossible_inertias_are_known() -> None:
+    found = {name: [finding.link for finding in inertia_findings(load_robot(name))] for name in list_robots()}
+    assert found["kr180"] == found["puma560"] == ["link1", "link3"]
+    assert found["twolink"] == found["planar3r"] == []
+
+
+def test_twolink_hangs_in_the_vertical_plane() -> None:
+    """Holding it out straight: 9.81 (0.5 + 1.5) N m at the shoulder, 9.81 0.5 N m at the elbow."""
+    arm = load_robot("twolink")
+    np.testing.assert_allclose(evaluate(arm, "gravload", np.zeros(2)), [19.62, 4.905], rtol=1e-14)
+    tip = evaluate(arm, "fkine", np.array([np.pi / 2, 0.0]))[:3, 3]
+    np.testing.assert_allclose(tip, [0, 0, 2], atol=1e-15)
+    # Two uniform rods: M11 = 5/3 m l^2 + m l^2 cos q2, M22 = m l^2 / 3 (Siciliano, example 7.2).
+    M = evaluate(arm, "inertia", np.array([0.3, np.pi / 3]))
+    np.testing.assert_allclose(M, [[5 / 3 + 0.5, 1 / 3 + 0.25], [1 / 3 + 0.25, 1 / 3]], rtol=1e-14)
+
+
+def test_planar3r_feels_no_gravity() -> None:
+    arm = load_robot("planar3r")
+    np.testing.assert_allclose(evaluate(arm, "gravload", np.array([0.1, 0.2, 0.3])), 0, atol=1e-15)
+    tip = evaluate(arm, "fkine", np.array([0.0, np.pi / 2, -np.pi / 2]))[:3, 3]
+    np.testing.assert_allclose(tip, [0.8, 0.4, 0], atol=1e-15)
