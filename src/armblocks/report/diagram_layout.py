@@ -17,7 +17,7 @@ PORT_TEXT = 9.0
 _ROW_GAP = 26.0
 _COLUMN_GAP = 52.0
 _LANE = 11.0
-_STRAIGHTEN = 18.0
+_STRAIGHTEN = 13.0
 """px that a block may be moved to make a wire straight."""
 
 
@@ -121,18 +121,18 @@ def _turned(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
             if wire.target.block == name
         }
         ports = [spot.name for spot in box.inputs]
-        by_height = sorted(ports, key=lambda port: (height[port], port))
+        # From behind comes what comes most nearly straight; a loop's return never does.
+        behind = {
+            wire.target.port: placed[wire.source.block].x < box.x
+            for wire in diagram.connections
+            if wire.target.block == name
+        }
+        west = min(ports, key=lambda port: (not behind[port], abs(height[port]), port))
+        others = sorted((port for port in ports if port != west), key=lambda port: (height[port], port))
         if count == 3:
-            north, west, south = by_height
+            north, south = others
         else:
-            # From behind comes what comes most nearly straight; a loop's return never does.
-            behind = {
-                wire.target.port: placed[wire.source.block].x < box.x
-                for wire in diagram.connections
-                if wire.target.block == name
-            }
-            west = min(ports, key=lambda port: (not behind[port], abs(height[port]), port))
-            (other,) = (port for port in ports if port != west)
+            (other,) = others
             north, south = (other, "") if behind[other] and height[other] < -box.height else ("", other)
         x, top, bottom = box.x + box.width / 2, box.y, box.y + box.height
         first = box.inputs[0]
@@ -263,7 +263,7 @@ def _assign(
             placed[name] = sized[name].at(x + (width - sized[name].width) / 2, y)
         leaving = {wire.source for wire in diagram.connections if wire.source.block in column}
         x += width + _COLUMN_GAP + _LANE * len(leaving)
-    top = min(box.y for box in placed.values())
+    top = min((box.y for box in placed.values()), default=0.0)
     return {name: placed[name].at(placed[name].x, placed[name].y - top) for name in diagram.blocks}
 
 

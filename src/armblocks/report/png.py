@@ -6,6 +6,7 @@ pyplot and axes saves more time than all the painting takes.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Raster, Rectangle, Text
 from armblocks.report.png_file import png_bytes
 from armblocks.report.style import PALETTE, Theme, Tone, rgb
+from armblocks.report.text_width import printable
 
 if TYPE_CHECKING:
     from matplotlib.path import Path
@@ -28,9 +30,12 @@ _KAPPA = 0.5522847498  # control points of a quarter circle as a cubic Bezier cu
 
 def picture_png(picture: Picture, *, theme: Theme = "light", scale: float = PIXELS_PER_PX) -> bytes:
     """The picture as an opaque PNG file with ``scale`` pixels for each px."""
-    painter = _Painter.open(picture, theme, scale)
-    painter.paint(picture.marks)
-    return png_bytes(painter.pixels())
+    with warnings.catch_warnings():
+        # A name in a script that the font lacks becomes boxes; the SVG has it right, and the run is fine.
+        warnings.filterwarnings("ignore", message="(?s)Glyph .* missing from font")
+        painter = _Painter.open(picture, theme, scale)
+        painter.paint(picture.marks)
+        return png_bytes(painter.pixels())
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +134,8 @@ class _Painter:
         gc.restore()
 
     def _text(self, mark: Text) -> None:
-        if not mark.text.strip():
+        text = printable(mark.text)
+        if not text.strip():
             return
         from matplotlib.font_manager import FontProperties
 
@@ -139,13 +145,13 @@ class _Painter:
             weight="bold" if mark.bold else "normal",
             style="oblique" if mark.italic else "normal",
         )
-        width, _, _ = self.renderer.get_text_width_height_descent(mark.text, font, False)
+        width, _, _ = self.renderer.get_text_width_height_descent(text, font, False)
         back = {"start": 0.0, "middle": 0.5, "end": 1.0}[mark.anchor] * width
         x, y = mark.x * self.scale, mark.y * self.scale
         x, y = (x, y + back) if mark.turn else (x - back, y)
         gc = self.renderer.new_gc()
         gc.set_foreground(self._colour(mark.tone, 1.0), isRGBA=True)
-        self.renderer.draw_text(gc, x, y, mark.text, font, float(mark.turn), ismath=False)
+        self.renderer.draw_text(gc, x, y, text, font, float(mark.turn), ismath=False)
         gc.restore()
 
     def _raster(self, mark: Raster) -> None:

@@ -26,19 +26,16 @@ from armblocks.report.picture import (
 )
 from armblocks.report.png_file import png_bytes
 from armblocks.report.style import FONT_STACK, MONO_STACK, PALETTE, Theme, Tone
+from armblocks.report.text_width import printable
 
 _MANY = 24
 
 
 def escape(text: str) -> str:
     """Text for XML content and attributes: markup escaped, characters that XML forbids dropped."""
-    kept = "".join(
-        c
-        for c in text
-        if c in "\t\n" or 0x20 <= ord(c) < 0xD800 or 0xE000 <= ord(c) <= 0xFFFD or c >= "\U00010000"
-    )
     return (
-        kept.replace("&", "&amp;")
+        printable(text)
+        .replace("&", "&amp;")
         .replace("<", "&lt;")
         .replace(">", "&gt;")
         .replace('"', "&quot;")

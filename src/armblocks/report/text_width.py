@@ -50,3 +50,12 @@ def shorten(text: str, size: float, room: float, *, bold: bool = False) -> str:
     while kept and text_width(kept + "…", size, bold=bold) > room:
         kept = kept[:-1]
     return kept.rstrip() + "…"
+
+
+def printable(text: str) -> str:
+    """The text without characters that XML 1.0 (section 2.2) and fonts lack: controls, surrogates."""
+    return "".join(c for c in text if _allowed(ord(c)))
+
+
+def _allowed(code: int) -> bool:
+    return code in (9, 10) or 0x20 <= code < 0xD800 or 0xE000 <= code <= 0xFFFD or code >= 0x10000

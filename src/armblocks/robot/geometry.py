@@ -72,12 +72,25 @@ def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
 def reach(robot: Robot) -> float:
     """An upper bound of the distance from base to tip with sliding joints at rest, m; at least 0.1."""
     length: dict[str, float] = {}
-    for link in robot.links:
+    for link in _parents_first(robot):
         own = math.hypot(*link.before.translation) + math.hypot(*link.after.translation)
         if link.joint.slide and link.joint.limits.position:
             own += max(abs(value + link.joint.offset) for value in link.joint.limits.position)
         length[link.name] = own + (length[link.parent] if link.parent is not None else 0.0)
     return max(0.1, *length.values()) + math.hypot(*robot.tool.translation)
+
+
+def _parents_first(robot: Robot) -> tuple[Link, ...]:
+    """The links, each after the one that carries it; a description may name them in any order."""
+    known: set[str | None] = {None}
+    ordered: list[Link] = []
+    waiting = list(robot.links)
+    while waiting:  # Robot has checked that there is no circle, so every round places a link
+        ready = [link for link in waiting if link.parent in known]
+        ordered += ready
+        known.update(link.name for link in ready)
+        waiting = [link for link in waiting if link.name not in known]
+    return tuple(ordered)
 
 
 def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
@@ -87,11 +100,9 @@ def link_frames(robot: Robot, q: Sequence[float]) -> NDArray[np.float64]:
     signal to read. ``q`` is not checked.
     """
     frames: dict[str | None, Transform] = {None: robot.base}
-    coordinates = iter(q)
-    for link in robot.links:
-        frames[link.name] = frames[link.parent] @ link.pose(
-            float(next(coordinates)) if link.joint.moves else 0.0
-        )
+    coordinates = {link.name: float(value) for link, value in zip(robot.moving_links, q)}
+    for link in _parents_first(robot):
+        frames[link.name] = frames[link.parent] @ link.pose(coordinates.get(link.name, 0.0))
     tip = frames[robot.links[-1].name] @ robot.tool
     rows = [robot.base, *(frames[link.name] for link in robot.links), tip]
     return np.stack([row.matrix for row in rows])
@@ -113,7 +124,7 @@ class _Plan:
         children: dict[str | None, list[Link]] = {}
         depth: dict[str | None, int] = {None: 0}
         radius: dict[str, float] = {}
-        for link in robot.links:
+        for link in _parents_first(robot):
             children.setdefault(link.parent, []).append(link)
             depth[link.name] = depth[link.parent] + (1 if link.joint.moves else 0)
             joints_before = depth[link.parent] if link.joint.moves else max(depth[link.parent] - 1, 0)

@@ -1,0 +1,118 @@
+"""Charts: labels that do not collide, peaks that stay, limits that show."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armblocks.report.charts import Panel, Trace, spread, thin_out, time_chart
+from armblocks.report.path_chart import path_chart
+from armblocks.report.picture import Picture, Polyline, Text, text_marks
+from armblocks.report.scale import padded
+from armblocks.report.style import Tone
+from armblocks.report.text_width import text_width
+
+
+def boxes(picture: Picture) -> list[tuple[float, float, float, float]]:
+    """The rectangle of every text: left, top, right, bottom."""
+    found: list[tuple[float, float, float, float]] = []
+    for mark in text_marks(picture):
+        width = text_width(mark.text, mark.size, bold=mark.bold, mono=mark.mono)
+        left = mark.x - {"start": 0.0, "middle": 0.5, "end": 1.0}[mark.anchor] * width
+        found.append((left, mark.y - 0.75 * mark.size, left + width, mark.y + 0.2 * mark.size))
+    return found
+
+
+def overlapping(picture: Picture) -> list[tuple[str, str]]:
+    texts, rectangles = text_marks(picture), boxes(picture)
+    return [
+        (texts[i].text, texts[j].text)
+        for i, a in enumerate(rectangles)
+        for j, b in enumerate(rectangles[:i])
+        if a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+    ]
+
+
+def chart(values: np.ndarray, limits: tuple[float, float] | None = None) -> Picture:
+    time = np.linspace(0, 10, len(values))
+    traces = tuple(
+        Trace(label=f"joint {k}", values=values[:, k], index=k, limits=limits) for k in range(values.shape[1])
+    )
+    panel = Panel(quantity="Joint angle", unit="deg", traces=traces)
+    return time_chart(time, [panel, panel], title="t", description="d")
+
+
+@pytest.mark.parametrize("scale", [0.0, 1e-9, 1.0, 1e7])
+def test_no_text_overlaps_another_and_none_leaves_the_picture(scale: float) -> None:
+    values = scale * np.random.default_rng(2).normal(size=(200, 7)).cumsum(axis=0)
+    picture = chart(values)
+    assert overlapping(picture) == []
+    for left, top, right, bottom in boxes(picture):
+        assert left >= 0 and top >= 0 and right <= picture.width and bottom <= picture.height
+
+
+@given(st.lists(st.floats(0, 150), min_size=1, max_size=9))
+def test_labels_are_spread_within_their_panel(wanted: list[float]) -> None:
+    places = spread(sorted(wanted), 15.0, 0.0, 150.0)
+    assert all(b - a >= 15.0 - 1e-9 for a, b in itertools.pairwise(places))
+    assert places[0] >= 0.0 and places[-1] <= 150.0 + 1e-9
+
+
+def test_labels_that_do_not_collide_stay_where_they_are_wanted() -> None:
+    assert spread([10.0, 60.0, 120.0], 15.0, 0.0, 150.0) == [10.0, 60.0, 120.0]
+
+
+def test_thinning_keeps_the_ends_and_every_peak() -> None:
+    time = np.linspace(0, 1, 100_000)
+    values = np.zeros_like(time)
+    values[54_321], values[7] = 5.0, -3.0
+    t, v = thin_out(time, values, 800)
+    assert len(t) <= 4 * 800 + 1
+    assert (v.max(), v.min()) == (5.0, -3.0)
+    assert (t[0], t[-1]) == (0.0, 1.0)
+
+
+def test_a_limit_is_drawn_when_near_and_stands_out_when_broken() -> None:
+    ramp = np.linspace(0, 80, 50)[:, None]
+    far = chart(ramp, (-500.0, 500.0))
+    near = chart(ramp, (-500.0, 90.0))
+    broken = chart(ramp, (-500.0, 70.0))
+
+    def dashed(picture: Picture) -> int:
+        return sum(isinstance(mark, Polyline) and mark.dash == (7.0, 4.0) for mark in picture.marks)
+
+    assert (dashed(far), dashed(near)) == (0, 2)
+    assert not any(isinstance(m, Polyline) and m.stroke is Tone.ERROR for m in near.marks)
+    assert any(isinstance(m, Polyline) and m.stroke is Tone.ERROR for m in broken.marks)
+    assert any("over limit" in mark.text for mark in text_marks(broken))
+
+
+def test_a_gap_in_a_signal_stays_a_gap() -> None:
+    values = np.ones((100, 1))
+    values[40:60] = np.nan
+    line = max((m for m in chart(values).marks if isinstance(m, Polyline)), key=lambda m: len(m.points))
+    assert np.isnan(np.asarray(line.points)[:, 1]).sum() == 20
+
+
+def test_equal_axes_have_one_scale() -> None:
+    angle = np.linspace(0, 2 * np.pi, 400)
+    picture = path_chart(
+        3 * np.cos(angle), np.sin(angle), x_label="x, m", y_label="y, m", width=320, height=340, equal=True
+    )
+    path = max((m for m in picture.marks if isinstance(m, Polyline)), key=lambda m: len(m.points))
+    width, height = np.ptp(np.asarray(path.points), axis=0)
+    assert width / height == pytest.approx(3.0, rel=1e-3)
+
+
+def test_start_and_end_are_told_apart() -> None:
+    x = np.linspace(0, 1, 50)
+    picture = path_chart(x, x**2, x_label="x", y_label="y", width=320, height=340, equal=False)
+    assert {"start", "end"} <= {mark.text for mark in text_marks(picture) if isinstance(mark, Text)}
+
+
+@pytest.mark.parametrize("values", [[1.0, 1.0], [0.0, 0.0], [np.nan, np.nan], [1.0, 1.0 + 1e-15]])
+def test_a_constant_has_a_range_too(values: list[float]) -> None:
+    low, high = padded(np.array(values), 0.1)
+    assert high - low > 0.1

@@ -1,0 +1,200 @@
+"""Drawings of diagrams: no wire through a block, no block on another, every wire there."""
+
+import dataclasses
+import itertools
+import xml.etree.ElementTree as ET
+
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    BLOCKS,
+    PID,
+    Clock,
+    Constant,
+    Demux,
+    Display,
+    Gain,
+    Integrator,
+    MathFunction,
+    Mux,
+    Product,
+    Saturation,
+    Scope,
+    SineWave,
+    StateSpace,
+    Step,
+    Sum,
+    TransferFunction,
+    Trigonometry,
+)
+from armblocks.diagram import Diagram, DiagramBuilder, PortRef
+from armblocks.report.block_faces import face_size
+from armblocks.report.diagram_drawing import _nets, _obstacle, diagram_picture, diagram_svg
+from armblocks.report.diagram_layout import boxes
+from armblocks.report.picture import text_marks
+from armblocks.report.wire_routing import Net, Obstacle, RoutedNet, WireEnd, route
+
+EXAMPLES = ("kr180model", "falling_pendulum", "puma560_computed_torque", "van_der_pol_pid")
+
+
+def feedback_loop() -> Diagram:
+    builder = DiagramBuilder("loop <&>")
+    reference = builder.add("reference", Step())
+    error = builder.add("error", Sum(signs="+-"), reference)
+    control = builder.add("a controller with quite a long name", PID(), error)
+    plant = builder.add(
+        "plant", TransferFunction(numerator=(1.0, -2.5), denominator=(1.0, 0.0, 3.0, 1.0)), control
+    )
+    builder.connect(plant, error["u2"])
+    builder.add("scope", Scope(inputs=2), reference, plant)
+    builder.add("clock", Clock())
+    return builder.build()
+
+
+def many_kinds() -> Diagram:
+    builder = DiagramBuilder("many kinds")
+    a, b = builder.add("a", Constant(value=(1.0, 2.0))), builder.add("b", SineWave())
+    mux = builder.add("mux", Mux(inputs=2), a, b)
+    gain = builder.add("gain", Gain(gain=-12345.678), mux)
+    parts = builder.add("demux", Demux(parts=3), gain)
+    product = builder.add("ratio", Product(operators="*/*"), parts["y1"], parts["y2"], parts["y3"])
+    total = builder.add("sum of four", Sum(signs="+-+-"), product, b, parts["y1"], parts["y2"])
+    bounded = builder.add("bounded", Saturation(), total)
+    sine = builder.add("sine", Trigonometry(function="cos"), bounded)
+    square = builder.add("square", MathFunction(function="exp"), sine)
+    memory = builder.add("memory", Integrator(), square)
+    space = builder.add("space", StateSpace(), memory)
+    builder.add("shown", Display(), space)
+    return builder.build()
+
+
+def diagrams() -> list[Diagram]:
+    shipped = [ab.load_diagram(name) for name in EXAMPLES]
+    bare = [dataclasses.replace(diagram, layout={}) for diagram in shipped]
+    return [*shipped, *bare, feedback_loop(), many_kinds()]
+
+
+CASES = diagrams()
+IDS = [f"{diagram.name}-{'placed' if diagram.layout else 'layered'}" for diagram in CASES]
+
+
+@pytest.fixture(params=CASES, ids=IDS, scope="module")
+def diagram(request: pytest.FixtureRequest) -> Diagram:
+    return request.param
+
+
+def routed(
+    diagram: Diagram,
+) -> tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]:
+    placed = boxes(diagram)
+    nets, wires = _nets(diagram, placed)
+    obstacles = [_obstacle(box) for box in placed.values()]
+    return wires, nets, route(obstacles, nets), obstacles
+
+
+def test_blocks_do_not_overlap(diagram: Diagram) -> None:
+    for a, b in itertools.combinations(boxes(diagram).values(), 2):
+        apart = a.x + a.width <= b.x or b.x + b.width <= a.x or a.y + a.height <= b.y or b.y + b.height <= a.y
+        assert apart, (a.name, b.name)
+
+
+def test_no_wire_passes_through_a_block(diagram: Diagram) -> None:
+    _, _, nets, obstacles = routed(diagram)
+    for net in nets:
+        for path in net.paths:
+            for (ax, ay), (bx, by) in itertools.pairwise(path):
+                for box in obstacles:
+                    clear = (
+                        max(ax, bx) <= box.x + 1e-6
+                        or min(ax, bx) >= box.x + box.width - 1e-6
+                        or max(ay, by) <= box.y + 1e-6
+                        or min(ay, by) >= box.y + box.height - 1e-6
+                    )
+                    assert clear, (path, box)
+
+
+def test_wires_are_orthogonal_and_reach_their_ports(diagram: Diagram) -> None:
+    _, nets, found, _ = routed(diagram)
+    for net, wires in zip(nets, found):
+        assert len(wires.paths) == len(net.targets)
+        for target, path in zip(net.targets, wires.paths):
+            assert path[-1] == (target.x, target.y)
+            assert all(ax == bx or ay == by for (ax, ay), (bx, by) in itertools.pairwise(path))
+        assert any(path[0] == (net.source.x, net.source.y) for path in wires.paths)
+
+
+def test_branches_start_on_their_own_net(diagram: Diagram) -> None:
+    _, nets, found, _ = routed(diagram)
+    for net, wires in zip(nets, found):
+        for path in wires.paths:
+            if path[0] == (net.source.x, net.source.y):
+                continue
+            assert any(_on(path[0], other) for other in wires.paths if other is not path)
+
+
+def test_wires_of_different_nets_never_lie_on_each_other(diagram: Diagram) -> None:
+    _, _, found, _ = routed(diagram)
+    runs = [
+        (number, a, b)
+        for number, wires in enumerate(found)
+        for path in wires.paths
+        for a, b in itertools.pairwise(path)
+    ]
+    for (i, a, b), (j, c, d) in itertools.combinations(runs, 2):
+        if i == j:
+            continue
+        for axis in (0, 1):
+            if a[axis] == b[axis] == c[axis] == d[axis]:
+                low = max(min(a[1 - axis], b[1 - axis]), min(c[1 - axis], d[1 - axis]))
+                high = min(max(a[1 - axis], b[1 - axis]), max(c[1 - axis], d[1 - axis]))
+                assert high - low < 1e-6, (a, b, c, d)
+
+
+def test_a_drawing_is_valid_and_repeatable(diagram: Diagram) -> None:
+    text = diagram_svg(diagram)
+    assert text == diagram_svg(diagram)
+    root = ET.fromstring(text)
+    width, height = float(root.get("width") or 0), float(root.get("height") or 0)
+    assert width > 0 and height > 0
+    for mark in text_marks(diagram_picture(diagram)):
+        assert 0 <= mark.x <= width and 0 <= mark.y <= height
+    names = {element.text for element in root.iter("{http://www.w3.org/2000/svg}title")}
+    for name, block in diagram.blocks.items():
+        assert f"{name} ({block.title})" in names
+
+
+def test_every_shipped_block_has_a_face_of_sensible_size() -> None:
+    for name in BLOCKS:
+        kind = BLOCKS[name]
+        if any(rule.required for rule in kind.parameters()):
+            continue
+        _, width, height = face_size(kind())
+        assert 5 <= width <= 160 and 20 <= height <= 160
+
+
+def test_a_run_shows_on_the_sinks_faces() -> None:
+    diagram = ab.load_diagram("kr180model")
+    result = ab.simulate(diagram)
+    texts = [mark.text for mark in text_marks(diagram_picture(diagram, result))]
+    assert {"−2.9493", "1.2547", "2.3479"} <= set(texts)
+
+
+def test_wires_that_find_no_way_are_still_drawn() -> None:
+    """Two blocks that touch leave the grid no room."""
+    left, right = (Obstacle(x, 0.0, 50.0, 50.0, (x, 52.0, 50.0, 16.0)) for x in (0.0, 55.0))
+    net = Net(WireEnd(50.0, 25.0, 1, 0), (WireEnd(55.0, 20.0, 1, 0),))
+    (wires,) = route([left, right], [net])
+    assert wires.paths[0][0] == (50.0, 25.0) and wires.paths[0][-1] == (55.0, 20.0)
+
+
+def test_an_empty_diagram_has_a_drawing() -> None:
+    assert "0 blocks." in diagram_picture(Diagram(name="empty", blocks={})).description
+
+
+def _on(point: tuple[float, float], path: tuple[tuple[float, float], ...]) -> bool:
+    x, y = point
+    return any(
+        min(ax, bx) - 1e-6 <= x <= max(ax, bx) + 1e-6 and min(ay, by) - 1e-6 <= y <= max(ay, by) + 1e-6
+        for (ax, ay), (bx, by) in itertools.pairwise(path)
+    )
