@@ -64,15 +64,19 @@ class _MethodDefinition(ctypes.Structure):
     )
 
 
+# A builtin reads its definition when it is taken down, and the collector of cycles may clear the builtin's
+# ``self`` before: definitions (some hundred bytes each) are therefore kept for the life of the process.
+_DEFINITIONS: list[_MethodDefinition] = []
+
+
 class _Owner:
     """The builtin's ``self``: what it falls back to, and what must live as long as it does."""
 
-    __slots__ = ("call", "definition", "kept")
+    __slots__ = ("call", "kept")
 
     def __init__(self, call: Callback, kept: object) -> None:
         self.call = call
         self.kept = kept
-        self.definition = _MethodDefinition()
 
     def __call__(self, *arguments: object, **options: object) -> object:
         return self.call(*arguments, **options)
@@ -91,15 +95,12 @@ def make_entry(
     if addresses is None:
         return fallback
     (ctypes.c_void_p * len(addresses)).from_address(table)[:] = addresses
-    owner = _Owner(fallback, kept)
-    owner.definition.ml_name = name.encode()
-    owner.definition.ml_meth = address
-    owner.definition.ml_flags = _FASTCALL_WITH_KEYWORDS
-    owner.definition.ml_doc = doc.encode()
+    definition = _MethodDefinition(name.encode(), address, _FASTCALL_WITH_KEYWORDS, doc.encode())
+    _DEFINITIONS.append(definition)
     new = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(
         ("PyCFunction_NewEx", ctypes.pythonapi)
     )
-    return new(ctypes.addressof(owner.definition), owner, None)
+    return new(ctypes.addressof(definition), _Owner(fallback, kept), None)
 
 
 @dataclass(frozen=True)

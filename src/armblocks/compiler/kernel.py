@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_ROWS, _COLUMNS, _SHARED = Layout.ROWS.value, Layout.COLUMNS.value, Layout.SHARED.value
+
 _SMALLEST_SHARE = 2048
 """Samples below which a share of a batch is not worth another thread."""
 
@@ -134,9 +136,8 @@ class Kernel:
             arrays = [_in_place(array) for array in arrays]
             self._evaluate(*(_address(array) for array in (*arrays, *written)))
         else:
-            layouts, arrays = self._lay_out(arrays, columns=columns)
-            outputs = (Layout.COLUMNS if columns else Layout.ROWS,) * len(self.outputs)
-            batch = self._batch(BatchLayout(inputs=layouts, outputs=outputs))
+            key, arrays = self._lay_out(arrays, columns=columns)
+            batch = self._batches.get(key) or self._load_batch(key)
             addresses = [_address(array) for array in (*arrays, *written)]
             _share(batch, samples, addresses, workers)
         for source, result in zip(written, results):
@@ -146,19 +147,20 @@ class Kernel:
             results = [result if result.ndim else result[()] for result in results]
         return results[0] if len(results) == 1 else tuple(results)
 
-    def _lay_out(self, arrays: Sequence[Array], *, columns: bool) -> tuple[tuple[Layout, ...], list[Array]]:
-        layouts: list[Layout] = []
+    def _lay_out(self, arrays: Sequence[Array], *, columns: bool) -> tuple[str, list[Array]]:
+        """The key of the batch layout, and the arrays as native code reads them."""
+        key = ""
         ready: list[Array] = []
         for slot, array in zip(self.inputs, arrays):
             shared = array.ndim == len(slot.shape)
             in_columns = columns and not shared and array.ndim == 2 and array.flags.f_contiguous
             if in_columns and array.flags.aligned and not array.flags.c_contiguous:
-                layouts.append(Layout.COLUMNS)
+                key += _COLUMNS
                 ready.append(array.T)
             else:
-                layouts.append(Layout.SHARED if shared else Layout.ROWS)
+                key += _SHARED if shared else _ROWS
                 ready.append(_in_place(array))
-        return tuple(layouts), ready
+        return f"{key}>{(_COLUMNS if columns else _ROWS) * len(self.outputs)}", ready
 
     @cached_property
     def _single(self) -> NativeCode:
@@ -182,23 +184,22 @@ class Kernel:
         prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(self.inputs) + len(self.outputs)))
         return prototype(code.address("evaluate"))
 
-    def _batch(self, layout: BatchLayout) -> Callable[..., None]:
+    def _load_batch(self, key: str) -> Callable[..., None]:
         with self._lock:
-            function = self._batches.get(layout.key)
-            if function is None:
-                code = load_code(("batch", self._digest, layout.key), lambda: self._write_batch(layout))
+            if key not in self._batches:
+                code = load_code(("batch", self._digest, key), lambda: self._write_batch(key))
                 pointers = [ctypes.c_void_p] * (len(self.inputs) + len(self.outputs))
                 prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *pointers)
-                function = self._batches[layout.key] = prototype(code.address("batch"))
                 self._loaded.append(code)
-        return function
+                self._batches[key] = prototype(code.address("batch"))
+            return self._batches[key]
 
-    def _write_batch(self, layout: BatchLayout) -> str:
+    def _write_batch(self, key: str) -> str:
         from armblocks.compiler.batch import emit_batch
         from armblocks.compiler.ir_text import Module
 
         module = Module()
-        emit_batch(module, self.tape, layout, host_target().lanes, "batch")
+        emit_batch(module, self.tape, BatchLayout.of(key), host_target().lanes, "batch")
         return module.text
 
     def __repr__(self) -> str:

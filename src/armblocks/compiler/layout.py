@@ -31,3 +31,9 @@ class BatchLayout:
             "".join(layout.value for layout in layouts) for layouts in (self.inputs, self.outputs)
         )
         return f"{inputs}>{outputs}"
+
+    @classmethod
+    def of(cls, key: str) -> BatchLayout:
+        """The layout of a key."""
+        inputs, outputs = (tuple(Layout(letter) for letter in part) for part in key.split(">"))
+        return cls(inputs=inputs, outputs=outputs)
