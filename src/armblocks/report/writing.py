@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armblocks.diagram import Diagram
@@ -94,7 +94,13 @@ def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]
     for number, motion in enumerate(found):
         prefix = "" if len(found) == 1 else f"{file_name(motion.robot.name)}-{number + 1}-"
         figures += motion_figures(motion, prefix)
-    return figures + list(view_figures(diagram, result))
+    figures += view_figures(diagram, result)
+    taken: dict[str, int] = {}
+    named: list[Figure] = []
+    for figure in figures:  # names of blocks that differ, but not as names of files
+        count = taken[figure.name] = taken.get(figure.name, 0) + 1
+        named.append(figure if count == 1 else replace(figure, name=f"{figure.name}-{count}"))
+    return named
 
 
 def _encoded(figure: Figure, kind: str) -> bytes:

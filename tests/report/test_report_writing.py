@@ -1,0 +1,234 @@
+"""The report folder: complete, self-contained, escaped, and honest about what went wrong."""
+
+import dataclasses
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import Constant, Display, Integrator, JTraj, Rne, RobotPlot, Scope, SineWave, XYGraph
+from armblocks.diagram import DiagramBuilder
+from armblocks.equations import SimulationOptions
+from armblocks.errors import FormatError, UnknownNameError
+from armblocks.report import write_report
+from armblocks.report.figures import file_name, for_people
+from armblocks.robot import JointLimits, Robot
+
+VOID = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
+
+
+class Outline(HTMLParser):
+    """What a page holds: tags, headings, table heads without scope, and whether every tag is closed."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[str] = []
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str, str | None]] = []
+        self.mistakes: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.attributes += [(tag, name, value) for name, value in attrs]
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.mistakes.append(tag)
+
+
+def outline(page: Path) -> Outline:
+    parsed = Outline()
+    parsed.feed(page.read_text(encoding="utf-8"))
+    return parsed
+
+
+def small_run(nasty: str = "wave") -> tuple[ab.Diagram, ab.SimulationResult]:
+    builder = DiagramBuilder(nasty, settings=SimulationOptions(stop_time=1.0, sample_time=0.05))
+    wave = builder.add(f"{nasty} source", SineWave(amplitude=(1.0, 2.0)))
+    total = builder.add("total", Integrator(initial=(0.0, 0.0)), wave)
+    builder.add("Scope", Scope(inputs=2), wave, total)
+    level = builder.add("level", Constant(value=0.25))
+    builder.add("Graph", XYGraph(), level, level)
+    builder.add("Display", Display(inputs=2), total, level)
+    diagram = builder.build()
+    return diagram, ab.simulate(diagram)
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("paper")
+    diagram = ab.load_diagram("kr180model")
+    write_report(folder, diagram, ab.simulate(diagram))
+    return folder
+
+
+def test_the_papers_report_is_complete(paper: Path) -> None:
+    figures = {path.name for path in (paper / "figures").iterdir()}
+    sinks = ("xy-xy-graph", "xy-xz-graph", "xy-yz-graph", "scope-joint-angles", "scope-joint-torques")
+    for name in ("moments", "tool-path", "joints", *sinks):
+        assert {f"{name}.svg", f"{name}.png"} <= figures
+    for name in ("report.html", "diagram.svg", "data.csv", "data.parquet"):
+        assert (paper / name).stat().st_size > 1000
+    assert (paper / "report.html").stat().st_size < 3_000_000
+
+
+def test_the_page_says_what_the_paper_looks_at(paper: Path) -> None:
+    text = (paper / "report.html").read_text(encoding="utf-8")
+    for piece in (
+        "33.73",
+        "16.87",
+        "−2.94927874",
+        "1.25469877",
+        "2.34792904",
+        "No rigid body has this inertia",
+    ):
+        assert piece in text
+
+
+def test_the_page_needs_no_network_and_no_script(paper: Path) -> None:
+    parsed = outline(paper / "report.html")
+    assert not {"script", "iframe", "object", "embed", "base"} & set(parsed.tags)
+    assert ("meta", "http-equiv", "Content-Security-Policy") in parsed.attributes
+    for tag, name, value in parsed.attributes:
+        if name in ("src", "href") and value is not None:
+            assert value.startswith(("data:image/png;base64,", "#")), (tag, value[:60])
+        assert not name.startswith("on")
+    assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)", (paper / "report.html").read_text("utf-8"))
+
+
+def test_the_page_is_well_formed_and_can_be_read_aloud(paper: Path) -> None:
+    parsed = outline(paper / "report.html")
+    assert parsed.mistakes == [] and parsed.open == []
+    headings = [tag for tag in parsed.tags if re.fullmatch("h[1-6]", tag)]
+    assert headings[0] == "h1" and headings.count("h1") == 1 and "h3" in headings
+    identifiers = [value for _, name, value in parsed.attributes if name == "id"]
+    assert len(identifiers) == len(set(identifiers))
+    for _, name, value in parsed.attributes:
+        if name in ("aria-labelledby", "aria-describedby"):
+            assert value in identifiers
+    assert parsed.tags.count("th") == sum(name == "scope" for _, name, _ in parsed.attributes)
+
+
+def test_the_same_run_gives_the_same_bytes(tmp_path: Path) -> None:
+    diagram, result = small_run()
+    for name in ("a", "b"):
+        write_report(tmp_path / name, diagram, result)
+    for path in sorted((tmp_path / "a").rglob("*")):
+        if path.is_file() and path.suffix != ".parquet":
+            assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
+
+
+def test_names_from_users_are_text_and_nothing_else(tmp_path: Path) -> None:
+    diagram, result = small_run("<img src=x onerror=alert(1)>")
+    files = write_report(tmp_path, diagram, result)
+    parsed = outline(files.page)
+    assert "img" not in parsed.tags
+    for path in (files.page, files.diagram, *(p for p in files.figures if p.suffix == ".svg")):
+        assert "<img" not in path.read_text(encoding="utf-8")
+
+
+def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
+    diagram, result = small_run()
+    files = write_report(tmp_path, diagram, result, formats=("svg",), data=("npz",))
+    assert {path.suffix for path in files.figures} == {".svg"}
+    assert [path.name for path in files.data] == ["data.npz"]
+    assert {path.name for path in tmp_path.iterdir()} == {"figures", "diagram.svg", "data.npz", "report.html"}
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_unknown_formats_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    diagram, result = small_run()
+    with pytest.raises(UnknownNameError, match="there is no figure format named 'pdf'"):
+        write_report(tmp_path / "out", diagram, result, formats=("pdf",))
+    with pytest.raises(UnknownNameError, match="there is no data format named 'xlsx'"):
+        write_report(tmp_path / "out", diagram, result, data=("xlsx",))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    diagram, result = small_run()
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(FormatError, match="the report cannot be written") as caught:
+        write_report(tmp_path / "file" / "report", diagram, result)
+    assert "file" in str(caught.value) and "give another folder or change its permissions" in str(
+        caught.value
+    )
+    (tmp_path / "out" / "report.html").mkdir(parents=True)
+    with pytest.raises(FormatError, match="a folder that you may write to"):
+        write_report(tmp_path / "out", diagram, result)
+
+
+def test_a_run_that_stopped_early_is_marked(tmp_path: Path) -> None:
+    diagram, result = small_run()
+    stopped = dataclasses.replace(result.run, complete=False, message="Stopped by Ctrl-C.")
+    files = write_report(tmp_path, diagram, dataclasses.replace(result, run=stopped))
+    text = files.page.read_text(encoding="utf-8")
+    assert "Incomplete: the run stopped at t = 1 s" in text and "Stopped by Ctrl-C." in text
+
+
+def test_a_run_of_one_instant_still_has_a_report(tmp_path: Path) -> None:
+    diagram, result = small_run()
+    first = dataclasses.replace(
+        result, time=result.time[:1], signals=result.signals[:, :1], states=result.states[:1]
+    )
+    files = write_report(tmp_path, diagram, first)
+    assert files.figures == () and files.page.exists()
+
+
+def test_a_broken_limit_stands_out_in_words(tmp_path: Path, puma560: Robot) -> None:
+    tight = puma560.with_link(
+        "link1", joint=dataclasses.replace(puma560.links[0].joint, limits=JointLimits(position=(-0.1, 0.2)))
+    )
+    builder = DiagramBuilder("tight", settings=SimulationOptions(stop_time=1.0, sample_time=0.02))
+    plan = builder.add("plan", JTraj(q0=(0.0,) * 6, qf=(0.5,) * 6, tmax=1.0))
+    builder.add("plot", RobotPlot(robot=tight), plan["q"])
+    builder.add("rne", Rne(robot=tight), plan["q"], plan["qd"], plan["qdd"])
+    diagram = builder.build()
+    files = write_report(tmp_path, diagram, ab.simulate(diagram), formats=("svg",))
+    text = files.page.read_text(encoding="utf-8")
+    assert "Limit broken: joint &#39;link1&#39; leaves its range" in text
+    assert 'class="bad"' in text and "over limit from" in text
+
+
+def test_sinks_with_almost_the_same_name_have_a_file_each(tmp_path: Path) -> None:
+    builder = DiagramBuilder("twins", settings=SimulationOptions(stop_time=1.0, sample_time=0.1))
+    wave = builder.add("wave", SineWave())
+    for name in ("view 1", "view-1", "view_1"):
+        builder.add(name, Scope(), wave)
+    diagram = builder.build()
+    files = write_report(tmp_path, diagram, ab.simulate(diagram), formats=("svg",))
+    names = [path.name for path in files.figures]
+    assert names == ["scope-view-1.svg", "scope-view-1-2.svg", "scope-view-1-3.svg"]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("Joint angles", "joint-angles"), ("../etc", "etc"), ("機械", "unnamed"), ("", "unnamed")],
+)
+def test_files_of_figures_have_harmless_names(name: str, expected: str) -> None:
+    assert file_name(name) == expected
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "shown", "shown_unit"),
+    [
+        (np.pi, "rad", 180.0, "deg"),
+        (2000.0, "N m", 2.0, "kN m"),
+        (2000.0, "", 2000.0, ""),
+        (1.0, "rad/s2", 57.3, "deg/s²"),
+    ],
+)
+def test_quantities_are_shown_in_peoples_units(
+    value: float, unit: str, shown: float, shown_unit: str
+) -> None:
+    values, found = for_people(np.array([value]), unit)
+    assert (values[0], found) == (pytest.approx(shown, rel=1e-3), shown_unit)
