@@ -49,7 +49,7 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.92re
 caption{text-align:left;color:var(--muted);font-size:.88rem;padding-bottom:6px}
 th,td{padding:6px 10px;text-align:right;border-bottom:1px solid var(--grid);white-space:nowrap;
  vertical-align:top}
-thead th{border-bottom-color:var(--hairline);font-weight:600;vertical-align:bottom}
+thead th{white-space:normal;border-bottom-color:var(--hairline);font-weight:600;vertical-align:bottom}
 th:first-child,td:first-child{text-align:left;padding-left:0}
 tbody th{font-weight:600}
 th .unit{display:block}

@@ -15,6 +15,7 @@ from armblocks.report.svg import escape
 
 
 def limits_table(summary: MotionSummary) -> str:
+    """Each joint's range and speed over the run against its limits, in degrees or m; what is broken says so."""
     broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
     heads = [
         ("Joint", ""), ("Range used", ""), ("Range allowed", ""), ("Margin", ""), ("Peak speed", ""),
@@ -49,6 +50,7 @@ def limits_table(summary: MotionSummary) -> str:
 
 
 def loads_table(motion: Motion, summary: MotionSummary) -> str:
+    """Each joint's torque and power, at the joint and at its motor, and the work; torques in N m, forces in N."""
     broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
     torque = "N m" if set(motion.robot.joint_units) == {"rad"} else "N m or N"
     heads = [
@@ -85,6 +87,7 @@ def loads_table(motion: Motion, summary: MotionSummary) -> str:
 
 
 def tool_table(summary: MotionSummary) -> str:
+    """Where the tool starts and ends (m, world frame), how far it goes and how fast."""
     heads = [("", ""), ("x", "m"), ("y", "m"), ("z", "m")]
     rows = [
         f'<tr><th scope="row">{word}</th>{"".join(_cell(_fixed(v)) for v in place)}</tr>'
@@ -143,6 +146,7 @@ def _span(low: float, high: float) -> str:
 
 
 def value_cell(value: NDArray[np.float64]) -> str:
+    """A scalar with nine digits, a vector as a row, a matrix (or a stack of them) as rows."""
     if value.ndim == 0:
         return table_number(float(value), 9)
     lines = value.reshape(-1, value.shape[-1]) if value.ndim > 1 else value[None]
