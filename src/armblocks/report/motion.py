@@ -44,7 +44,7 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True)
 class MovingArm:
-    """Where the motion of one arm stands in the results of a diagram: paths of signals, ``None`` if absent."""
+    """Where one arm's motion stands in the results of a diagram: paths of signals, ``None`` if absent."""
 
     robot: Robot
     blocks: tuple[str, ...]

@@ -15,7 +15,7 @@ from armblocks.report.svg import escape
 
 
 def limits_table(summary: MotionSummary) -> str:
-    """Each joint's range and speed over the run against its limits, in degrees or m; what is broken says so."""
+    """Each joint's range and speed over the run against its limits, in degrees or m."""
     broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
     heads = [
         ("Joint", ""), ("Range used", ""), ("Range allowed", ""), ("Margin", ""), ("Peak speed", ""),
@@ -50,7 +50,7 @@ def limits_table(summary: MotionSummary) -> str:
 
 
 def loads_table(motion: Motion, summary: MotionSummary) -> str:
-    """Each joint's torque and power, at the joint and at its motor, and the work; torques in N m, forces in N."""
+    """Each joint's torque (N m, or force in N), also at its motor, power (W) and work (J)."""
     broken = {(finding.joint, finding.kind): finding for finding in summary.findings}
     torque = "N m" if set(motion.robot.joint_units) == {"rad"} else "N m or N"
     heads = [
