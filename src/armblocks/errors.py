@@ -33,7 +33,7 @@ def compose_message(what: str, where: str = "", allowed: str = "", fix: str = ""
         parts.append(f"Allowed: {allowed}")
     if fix:
         parts.append(f"Fix: {fix}")
-    return ". ".join(part.rstrip(".") for part in parts) + "."
+    return " ".join(part if part.endswith(("?", "!")) else part.rstrip(".") + "." for part in parts)
 
 
 class ArmblocksError(ValueError):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import armblocks as ab
-from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.errors import DiagramError, LimitWarning, UnknownNameError
 
 POSITIONS = {  # paper/specification.md: an independent plain-NumPy computation
     0.0: (1.95, -1.25, -1.85),
@@ -61,3 +61,20 @@ def test_every_example_runs_and_shows_itself(name: str) -> None:
     result = ab.simulate(name, stop_time=0.5)
     assert result.run.complete
     assert "<svg" in result._repr_html_()
+
+
+def test_a_trajectory_beyond_the_joint_limits_is_warned_of(paper: ab.Diagram) -> None:
+    """Joint 2 ends at 90 deg, so 2 rad = 114.6 deg is beyond; it passes 90 deg where the quintic says so."""
+    with pytest.warns(LimitWarning) as caught:
+        ab.simulate(paper, parameters={"jtraj.qf": (3.14, 2.0, 1.57, 0.0)})
+    (text,) = (str(warning.message) for warning in caught)
+    assert "joint 'link2' leaves its range" in text
+    assert "114.6 deg at t = 10 s" in text
+    s = np.linspace(0, 1, 100_001)
+    crossing = 10 * s[np.searchsorted(2.0 * (10 * s**3 - 15 * s**4 + 6 * s**5), np.pi / 2)]
+    assert f"from t = {crossing:.4g} s on" in text
+
+
+def test_a_joint_that_is_too_fast_is_warned_of(paper: ab.Diagram) -> None:
+    with pytest.warns(LimitWarning, match=r"joint 'link1' is faster than allowed \(at most 105 deg/s\)"):
+        ab.simulate(paper, parameters={"jtraj.tmax": 3.0}, stop_time=3.0)

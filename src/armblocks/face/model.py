@@ -17,6 +17,7 @@ from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import UnknownNameError
 from armblocks.face.diagrams import load_diagram
+from armblocks.face.limit_watch import LimitWatch
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
 from armblocks.simulation.simulate import Progress
@@ -27,6 +28,7 @@ class CompiledDiagram:
 
     def __init__(self, diagram: Diagram) -> None:
         self.diagram = diagram
+        self._watch: LimitWatch | None = None
 
     @cached_property
     def system(self) -> HybridSystem:
@@ -46,15 +48,19 @@ class CompiledDiagram:
         progress: Progress | None = None,
     ) -> SimulationResult:
         """Run once; see :func:`simulate`."""
-        if not parameters:
-            return run_system(self.compiled, options or self.diagram.settings, progress=progress)
-        changed = with_parameters(self.diagram, parameters)
-        values = self._retuned(changed, parameters)
-        if values is None:
-            return CompiledDiagram(changed).simulate(options, progress=progress)
-        return run_system(
+        values = None
+        if parameters:
+            changed = with_parameters(self.diagram, parameters)
+            values = self._retuned(changed, parameters)
+            if values is None:
+                return CompiledDiagram(changed).simulate(options, progress=progress)
+        result = run_system(
             self.compiled, options or self.diagram.settings, parameters=values, progress=progress
         )
+        if self._watch is None:
+            self._watch = LimitWatch(self.diagram, result)
+        self._watch.warn(result)
+        return result
 
     def _retuned(self, changed: Diagram, parameters: Mapping[str, object]) -> NDArray[np.float64] | None:
         """The parameter vector with the new values, or ``None`` where a structural parameter changes."""

@@ -1,0 +1,42 @@
+"""Runs from Python say it when an arm leaves its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.diagram import Diagram
+from armblocks.report.analysis import limit_findings, warn_of_limits
+from armblocks.report.motion import MovingArm, moving_arms
+from armblocks.simulation import SimulationResult
+
+_Array = NDArray[np.float64]
+
+
+class LimitWatch:
+    """Knows the joint signals of a diagram and looks at every run of it; cheap where all limits are kept."""
+
+    def __init__(self, diagram: Diagram, result: SimulationResult) -> None:
+        self._arms = [(arm, *_limits(arm)) for arm in moving_arms(diagram, result)]
+
+    def warn(self, result: SimulationResult) -> None:
+        """Issue a ``LimitWarning`` for each limit of position, speed or torque that the run breaks."""
+        for arm, q_low, q_high, qd_most, tau_most in self._arms:
+            q = result[arm.q]
+            qd = None if arm.qd is None else result[arm.qd]
+            tau = None if arm.tau is None else result[arm.tau]
+            if (
+                _beyond(q, q_low, q_high)
+                or (qd is not None and _beyond(qd, -qd_most, qd_most))
+                or (tau is not None and _beyond(tau, -tau_most, tau_most))
+            ):
+                warn_of_limits(limit_findings(arm.robot, result.time, q, qd, tau))
+
+
+def _limits(arm: MovingArm) -> tuple[_Array, _Array, _Array, _Array]:
+    robot = arm.robot
+    return robot.qlim[:, 0], robot.qlim[:, 1], robot.speed_limits, robot.torque_limits
+
+
+def _beyond(values: _Array, low: _Array, high: _Array) -> bool:
+    return bool((values.min(axis=0) < low).any() or (values.max(axis=0) > high).any())
