@@ -10,12 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import ArmblocksWarning
-from armblocks.formats.matlab.interpreter import Interpreter
-from armblocks.formats.matlab.page_layout import without_page_breaks
-from armblocks.formats.matlab.parser import parse
-from armblocks.formats.matlab.records import RobotRecord
-from armblocks.formats.matlab.robot_records import finished_robot
-from armblocks.formats.matlab.source import decode
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.robot import FrictionModel, Robot
 
@@ -47,6 +41,14 @@ def read_script(
     Raises ``FormatError`` with file, line and text at the first line that is not understood. Warns where
     lines were broken as on a printed page and were joined.
     """
+    # Here and not above: half of what loading a shipped robot would cost, without a script anywhere.
+    from armblocks.formats.matlab.interpreter import Interpreter
+    from armblocks.formats.matlab.page_layout import without_page_breaks
+    from armblocks.formats.matlab.parser import parse
+    from armblocks.formats.matlab.records import RobotRecord
+    from armblocks.formats.matlab.robot_records import finished_robot
+    from armblocks.formats.matlab.source import decode
+
     source, uncommented = without_page_breaks(decode(data, name))
     statements = parse(source)
     interpreter = Interpreter(source)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from typing import cast
 
 from armblocks.errors import ArmblocksError, FormatError, RobotError
 from armblocks.formats.json_document import Node, canonical_bytes, closed_members, read_document
@@ -115,7 +116,7 @@ def robot_to(robot: Robot) -> dict[str, object]:
     for key in ("base", "tool"):
         if not getattr(robot, key).is_identity:
             document[key] = _transform_to(getattr(robot, key))
-    return document
+    return {key: _without_signed_zeros(value) for key, value in document.items()}
 
 
 # -- reading -----------------------------------------------------------------------------------------------
@@ -309,6 +310,23 @@ def _link_to(link: Link) -> dict[str, object]:
     if link.geometry is not None:
         entry["geometry"] = [shape_to(shape) for shape in link.geometry]
     return entry
+
+
+def _without_signed_zeros(value: object) -> object:
+    """The same with 0.0 for -0.0: equal robots have equal files."""
+    match value:
+        case float():
+            return value + 0.0
+        case dict():
+            return {
+                key: _without_signed_zeros(entry) for key, entry in cast("dict[str, object]", value).items()
+            }
+        case list() | tuple():
+            return [
+                _without_signed_zeros(entry) for entry in cast("list[object] | tuple[object, ...]", value)
+            ]
+        case _:
+            return value
 
 
 def _dh_to(dh: DhRow) -> dict[str, object]:

@@ -13,7 +13,7 @@ from armblocks.formats.matlab.link_constructors import CONSTRUCTORS
 from armblocks.formats.matlab.link_fields import VECTORS, link_field, set_link_field
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.formats.matlab.robot_records import make_robot, make_serial_link, robot_field, set_robot_field
-from armblocks.formats.matlab.source import SUPPORTED, Place, Source
+from armblocks.formats.matlab.source import Place, Source
 from armblocks.formats.matlab.syntax import (
     Assignment,
     Braces,
@@ -378,10 +378,10 @@ class Interpreter:
             return CONSTRUCTORS[name](place, arguments)
         if name in FUNCTIONS:
             return call_function(place, self.budget, name, arguments)
-        known = [*self.variables, *FUNCTIONS, *CONSTRUCTORS, "robot", "SerialLink"]
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+        callable_names = ["robot", "SerialLink", *CONSTRUCTORS, *FUNCTIONS]
+        near = difflib.get_close_matches(name, [*self.variables, *callable_names], n=1, cutoff=0.6)
         raise place.error(
             f"'{name}' is neither a variable nor a supported function",
-            allowed=f"{SUPPORTED}; functions: {', '.join(FUNCTIONS)}",
+            allowed=f"straight-line robot scripts, with {', '.join(callable_names)}",
             fix=f"did you mean '{near[0]}'?" if near else "define it, or remove the line",
         )
