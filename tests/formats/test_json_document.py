@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armblocks.errors import FormatError
+from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import (
     DEEPEST,
     Node,
-    canonical_bytes,
     closed_members,
     path_text,
     read_document,

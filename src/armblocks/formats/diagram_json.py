@@ -41,10 +41,10 @@ from armblocks.diagram import (
 )
 from armblocks.equations import SimulationOptions
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError, FormatError, UnknownNameError
+from armblocks.formats.canonical_json import canonical_bytes
 from armblocks.formats.json_document import (
     KeyPath,
     Node,
-    canonical_bytes,
     read_document,
     split_members,
 )

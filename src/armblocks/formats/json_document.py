@@ -1,9 +1,7 @@
-"""Canonical JSON: strict when read, the same bytes for the same content when written.
+"""JSON read strictly, with messages that give file, line and the path inside the document.
 
-Read: UTF-8, at most so many bytes and so deep, no duplicate keys, no NaN or infinity (``json`` alone accepts
-``NaN`` and ``1e999``), and messages that give file, line and the path inside the document. Written: keys
-sorted, two blanks per level, every member on a line of its own, rows of numbers on one line, floats with the
-fewest digits that read back to the same bits, a newline at the end.
+UTF-8, at most so many bytes and so deep, no duplicate keys, no NaN or infinity (``json`` alone accepts
+``NaN`` and ``1e999``). Written it is by :mod:`armblocks.formats.canonical_json`.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import cast
 
@@ -145,22 +143,6 @@ def read_document(data: bytes, name: str, most_bytes: int) -> Node:
     root = Node(document, (), value)
     _check_text(root)
     return root
-
-
-def canonical_bytes(value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False) -> bytes:
-    """The one way to write a document of dicts, lists, texts, numbers, booleans and ``None``.
-
-    ``one_line`` says of the path of an object or array whether it is kept on one line. Raises ``FormatError``
-    for numbers that are not finite, texts that are no Unicode, keys that are no texts, and foreign types.
-    """
-    pieces: list[str] = []
-    _write(value, (), 0, one_line, pieces.append)
-    try:
-        return ("".join(pieces) + "\n").encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise FormatError(
-            "a text cannot be written, as it is not valid Unicode", fix="correct the text"
-        ) from error
 
 
 def describe(value: object) -> str:
@@ -345,78 +327,6 @@ def _line_of(text: str, path: KeyPath) -> int:
             if token in ("[", "{"):
                 stack.append(_Level(token, 0 if token == "[" else None))
     return 0
-
-
-def _write(
-    value: object, path: KeyPath, depth: int, one_line: Callable[[KeyPath], bool], put: Callable[[str], None]
-) -> None:
-    """Append the text of one value."""
-    if depth > DEEPEST:
-        raise FormatError("objects and arrays lie too deep in each other", allowed=f"{DEEPEST} levels")
-    match value:
-        case Mapping():
-            members = cast("Mapping[object, object]", value)
-            keys = [key for key in members if isinstance(key, str)]
-            if len(keys) < len(members):
-                raise FormatError("a key is not text", where=path_text(path), allowed="texts as keys")
-            flat = one_line(path)
-            _write_group(
-                "{}",
-                [(json.dumps(key, ensure_ascii=False) + ": ", key, members[key]) for key in sorted(keys)],
-                (path, depth, flat, one_line, put),
-            )
-        case list() | tuple():
-            elements = cast("list[object] | tuple[object, ...]", value)
-            flat = not any(isinstance(element, Mapping | list | tuple | str) for element in elements)
-            _write_group(
-                "[]",
-                [("", i, element) for i, element in enumerate(elements)],
-                (path, depth, flat or not elements or one_line(path), one_line, put),
-            )
-        case _:
-            put(_scalar(value, path))
-
-
-def _write_group(
-    brackets: str,
-    entries: list[tuple[str, str | int, object]],
-    context: tuple[KeyPath, int, bool, Callable[[KeyPath], bool], Callable[[str], None]],
-) -> None:
-    path, depth, flat, one_line, put = context
-    outer, inner = ("", "") if flat else ("\n" + "  " * depth, "\n" + "  " * (depth + 1))
-    put(brackets[0])
-    for position, (label, step, entry) in enumerate(entries):
-        put(("," + (" " if flat else "") if position else "") + inner + label)
-        _write(entry, (*path, step), depth + 1, (lambda path: True) if flat else one_line, put)
-    put((outer if entries else "") + brackets[1])
-
-
-def _scalar(value: object, path: KeyPath) -> str:
-    match value:
-        case None:
-            return "null"
-        case bool():
-            return "true" if value else "false"
-        case str():
-            return json.dumps(value, ensure_ascii=False)
-        case int():
-            return str(value)
-        case float():
-            if not math.isfinite(value):
-                raise FormatError(
-                    f"the number {value} cannot be written", where=path_text(path), allowed="finite numbers"
-                )
-            # 10.0 as 10, which is how JavaScript writes it; the sign of -0.0 would be lost so.
-            whole = (
-                value.is_integer() and abs(value) < 1e15 and math.copysign(1.0, value) * (value or 1.0) > 0
-            )
-            return str(int(value)) if whole else repr(value)
-        case _:
-            raise FormatError(
-                f"a {type(value).__name__} cannot be written",
-                where=path_text(path),
-                allowed="JSON's own types",
-            )
 
 
 def _short(text: str) -> str:

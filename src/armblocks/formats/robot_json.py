@@ -16,7 +16,8 @@ from collections.abc import Mapping
 from typing import cast
 
 from armblocks.errors import ArmblocksError, FormatError, RobotError
-from armblocks.formats.json_document import Node, canonical_bytes, closed_members, read_document
+from armblocks.formats.canonical_json import canonical_bytes
+from armblocks.formats.json_document import Node, closed_members, read_document
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.shapes_json import shape_from, shape_to
 from armblocks.robot import (
