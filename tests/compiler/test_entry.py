@@ -104,7 +104,7 @@ def test_whatever_the_kernel_takes_the_builtin_takes(kernel: Kernel, kind: str) 
         object(),
         {},
     ],
-    ids=repr,
+    ids=lambda value: f"{type(value).__name__} {value!r}".split(" at 0x")[0],
 )
 def test_whatever_the_kernel_refuses_the_builtin_refuses(kernel: Kernel, value: object) -> None:
     b = arguments(1)[1]

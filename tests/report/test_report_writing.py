@@ -142,7 +142,7 @@ def test_only_what_is_asked_for_is_written(tmp_path: Path) -> None:
     assert {path.suffix for path in files.figures} == {".svg"}
     assert [path.name for path in files.data] == ["data.npz"]
     assert {path.name for path in tmp_path.iterdir()} == {"figures", "diagram.svg", "data.npz", "report.html"}
-    assert not list(tmp_path.rglob("*.part"))
+    assert not list(tmp_path.rglob("*.tmp"))
 
 
 def test_unknown_formats_are_refused_before_anything_is_written(tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         caught.value
     )
     (tmp_path / "out" / "report.html").mkdir(parents=True)
-    with pytest.raises(FormatError, match="a folder that you may write to"):
+    with pytest.raises(FormatError, match="a folder stands where the file should go"):
         write_report(tmp_path / "out", diagram, result)
 
 

@@ -66,7 +66,6 @@ def options(
         bool,
         typer.Option("--version", help="Say the version and stop.", callback=_say_version, is_eager=True),
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", hidden=True, envvar="ARMBLOCKS_DEBUG")] = False,
 ) -> None:
     """Options that stand before the command."""
 

@@ -205,7 +205,14 @@ def _run(contents: ReportContents) -> str:
     result, run = contents.result, contents.result.run
     settings = contents.diagram.settings
     facts = [
-        ("Solver", f"{run.solver} ({run.reason})" if run.reason else run.solver),
+        (
+            "Solver",
+            run.reason
+            if run.solver == "none"
+            else f"{run.solver} ({run.reason})"
+            if run.reason
+            else run.solver,
+        ),
         ("Stop time asked for", f"{axis_number(settings.stop_time)} s by the diagram"),
         ("Steps accepted, rejected", f"{axis_number(run.steps)}, {axis_number(run.rejected)}"),
         ("Evaluations of the equations", axis_number(run.evaluations)),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from armblocks.diagram import Diagram
 from armblocks.errors import FormatError, UnknownNameError
+from armblocks.files import write_atomically
 from armblocks.report.analysis import MotionSummary, summarise
 from armblocks.report.diagram_drawing import diagram_picture
 from armblocks.report.figures import Figure, file_name, motion_figures, view_figures
@@ -62,10 +63,10 @@ def write_report(
     for figure in figures:
         for kind in formats:
             path = place / "figures" / f"{figure.name}.{kind}"
-            _write(path, _encoded(figure, kind))
+            write_atomically(path, _encoded(figure, kind))
             written.append(path)
     diagram_path = place / "diagram.svg"
-    _write(diagram_path, svg_file(drawing).encode())
+    write_atomically(diagram_path, svg_file(drawing).encode())
     data_paths = tuple(place / f"data.{kind}" for kind in data)
     for path in data_paths:
         result.save(path)
@@ -79,7 +80,7 @@ def write_report(
         files=tuple(path.relative_to(place).as_posix() for path in (diagram_path, *data_paths, *written)),
     )
     page = place / "report.html"
-    _write(page, report_page(contents).encode())
+    write_atomically(page, report_page(contents).encode())
     return ReportFiles(folder=place, page=page, diagram=diagram_path, figures=tuple(written), data=data_paths)
 
 
@@ -115,24 +116,9 @@ def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _refusal(folder, error) from error
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Beside its place first, then renamed: a reader never sees half a file."""
-    temporary = path.with_name(f".{path.name}.part")
-    try:
-        temporary.write_bytes(data)
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise _refusal(path, error) from error
-
-
-def _refusal(path: Path, error: OSError) -> FormatError:
-    return FormatError(
-        f"the report cannot be written ({error.strerror or error})",
-        where=str(path),
-        allowed="a folder that you may write to, on a disk with room",
-        fix="give another folder or change its permissions",
-    )
+        raise FormatError(
+            f"the report cannot be written ({error.strerror or error})",
+            where=str(folder),
+            allowed="a folder that you may write to, on a disk with room",
+            fix="give another folder or change its permissions",
+        ) from error

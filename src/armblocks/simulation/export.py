@@ -9,16 +9,15 @@ suffix   holds                                                            how th
 .mat     ``time`` and a structure a block with a field a port             structure ``run``
 ======== ================================================================ =========================
 
-A file is written beside its place, synchronised to disk and renamed, so it is there completely or not at all.
+A file is there completely or not at all (:func:`armblocks.files.write_atomically`).
 """
 
 from __future__ import annotations
 
+import csv
 import io
 import json
-import os
 import re
-import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
 from os import PathLike
@@ -27,10 +26,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armblocks.errors import FormatError, UnknownNameError
+from armblocks.errors import UnknownNameError
+from armblocks.files import write_atomically
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
     from armblocks.simulation.result import SimulationResult
 
@@ -51,7 +52,7 @@ def save(result: SimulationResult, path: str | PathLike[str]) -> None:
     write = _WRITERS.get(place.suffix.lower())
     if write is None:
         raise UnknownNameError("file type", place.suffix or place.name, list(_WRITERS), where=str(place))
-    _write_whole(place, write(result))
+    write_atomically(place, write(result))
 
 
 def _description(result: SimulationResult) -> dict[str, Any]:
@@ -65,20 +66,31 @@ def _description(result: SimulationResult) -> dict[str, Any]:
 
 
 def _csv(result: SimulationResult) -> bytes:
-    text = to_dataframe(result).to_csv()  # pyright: ignore[reportUnknownMemberType]
-    return text.encode()
+    from pyarrow import csv as arrow_csv
+
+    head = io.StringIO()
+    csv.writer(head, lineterminator="\n").writerow(["time", *result.columns()])
+    body = io.BytesIO()
+    arrow_csv.write_csv(_table(result), body, arrow_csv.WriteOptions(include_header=False))
+    return head.getvalue().encode() + body.getvalue()
 
 
 def _parquet(result: SimulationResult) -> bytes:
-    import pyarrow as pa
     import pyarrow.parquet as pq
+
+    buffer = io.BytesIO()
+    pq.write_table(_table(result), buffer)
+    return buffer.getvalue()
+
+
+def _table(result: SimulationResult) -> pa.Table:
+    """Column ``time`` and one column a scalar; how the run went is in the metadata."""
+    import pyarrow as pa
 
     names = ["time", *result.columns()]
     metadata = {"armblocks": json.dumps(_description(result))}
     arrays = [pa.array(result.time), *(pa.array(np.ascontiguousarray(row)) for row in result.signals)]
-    buffer = io.BytesIO()
-    pq.write_table(pa.table(arrays, names=names, metadata=metadata), buffer)
-    return buffer.getvalue()
+    return pa.table(arrays, names=names, metadata=metadata)
 
 
 def _npz(result: SimulationResult) -> bytes:
@@ -128,43 +140,3 @@ _WRITERS: dict[str, Callable[[SimulationResult], bytes]] = {
     ".npz": _npz,
     ".mat": _mat,
 }
-
-
-def _write_whole(place: Path, data: bytes) -> None:
-    """Write beside ``place``, synchronise, rename: a reader sees the old file or the new one."""
-    temporary: str | None = None
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        # mkstemp makes files that only their owner may read; a result is an ordinary file.
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(place)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise FormatError(
-            f"cannot be written: {error.strerror or error}",
-            where=str(place),
-            allowed="a file in an existing folder that you may write to, on a disk with room",
-            fix="choose another place or change the folder's permissions",
-        ) from error
-    _synchronise_folder(place.parent)
-
-
-def _synchronise_folder(folder: Path) -> None:
-    """Make the rename itself last; systems that cannot open a folder do without."""
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return
-    try:
-        os.fsync(handle)
-    except OSError:
-        pass
-    finally:
-        os.close(handle)
