@@ -15,6 +15,7 @@ from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind
 from armblocks.report.analysis import JointSummary, LimitKind, people_unit, summarise
 from armblocks.report.motion import motions
+from armblocks.report.numbers import wall_time
 
 if TYPE_CHECKING:
     from armblocks import Diagram, SimulationResult
@@ -31,7 +32,7 @@ def print_run(result: SimulationResult, console: Console) -> None:
     how = "evaluated at" if run.solver == "none" else f"{run.solver}, {run.steps:,} steps, recorded at"
     text = Text.assemble(
         (f"{result.name}: ", STRONG),
-        f"{end} in {run.wall_time:.3g} s, {factor_text(run.real_time_factor)} x real time; ",
+        f"{end} in {' '.join(wall_time(run.wall_time))}, {factor_text(run.real_time_factor)} x real time; ",
         f"{how} {result.time.size:,} instants",
     )
     console.print(text)

@@ -127,6 +127,12 @@ class CompiledSystem:
     def _signals(self) -> Callable[..., None]:
         return self._entry("signals", 3, 4)
 
+    def prepare(self, tableau: ButcherTableau | None) -> None:
+        """Compile, or load from disk, all that a run by this method needs (``None``: no integration)."""
+        _ = self._signals
+        if tableau is not None:
+            self.integrator(tableau)
+
     def initial_states(self, p: Vector) -> Vector:
         """``x(0)``, ``(nx,)``, for parameters ``p`` ``(np,)``."""
         x = np.empty(self.states.size)

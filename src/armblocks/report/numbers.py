@@ -65,3 +65,9 @@ def si_prefix(largest: float) -> tuple[float, str]:
     power = 3 * math.floor(math.log10(largest * (1 + 1e-12)) / 3)
     power = min(max(power, -12), 12)
     return 10.0**-power, _PREFIXES[power]
+
+
+def wall_time(seconds: float) -> tuple[str, str]:
+    """A duration with three digits, and its unit: s, or ms, µs … below one second."""
+    factor, prefix = si_prefix(seconds) if 0 < seconds < 1 else (1.0, "")
+    return axis_number(float(f"{seconds * factor:.3g}")), f"{prefix}s"

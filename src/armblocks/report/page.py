@@ -11,7 +11,7 @@ from armblocks.diagram import Diagram, ViewKind
 from armblocks.report.analysis import MotionSummary
 from armblocks.report.figures import Figure
 from armblocks.report.motion import Motion
-from armblocks.report.numbers import axis_number, si_prefix
+from armblocks.report.numbers import axis_number, wall_time
 from armblocks.report.page_style import page_css
 from armblocks.report.page_tables import html_table, limits_table, loads_table, tool_table, value_cell
 from armblocks.report.picture import Picture
@@ -95,7 +95,7 @@ def _facts(contents: ReportContents) -> str:
         ("Solver", escape(solver), ""),
         ("Steps", axis_number(run.steps), f"{axis_number(run.rejected)} rejected" if run.rejected else ""),
         ("Instants recorded", axis_number(contents.result.time.size), ""),
-        ("Wall time", *_seconds(run.wall_time)),
+        ("Run in", *wall_time(run.wall_time)),
         ("Speed", axis_number(float(f"{run.real_time_factor:.3g}")), "× real time"),
     ]
     if run.solver == "none":
@@ -104,11 +104,6 @@ def _facts(contents: ReportContents) -> str:
         f"<div><dt>{label}</dt><dd>{value} <small>{unit}</small></dd></div>" for label, value, unit in facts
     )
     return f'<dl class="facts">{items}</dl>'
-
-
-def _seconds(value: float) -> tuple[str, str]:
-    factor, prefix = si_prefix(value) if value < 1 else (1.0, "")
-    return axis_number(float(f"{value * factor:.3g}")), f"{prefix}s"
 
 
 def _notices(contents: ReportContents) -> str:
@@ -205,18 +200,12 @@ def _run(contents: ReportContents) -> str:
     result, run = contents.result, contents.result.run
     settings = contents.diagram.settings
     facts = [
-        (
-            "Solver",
-            run.reason
-            if run.solver == "none"
-            else f"{run.solver} ({run.reason})"
-            if run.reason
-            else run.solver,
-        ),
+        ("Solver", run.reason if run.solver == "none" else f"{run.solver} ({run.reason})"),
         ("Stop time asked for", f"{axis_number(settings.stop_time)} s by the diagram"),
         ("Steps accepted, rejected", f"{axis_number(run.steps)}, {axis_number(run.rejected)}"),
         ("Evaluations of the equations", axis_number(run.evaluations)),
         ("Continuous states", axis_number(result.states.shape[1])),
+        ("Native code ready in", " ".join(wall_time(run.preparation_time))),
         ("Signals recorded", axis_number(len(result.names))),
         ("Complete", "yes" if run.complete else "no"),
     ]

@@ -33,9 +33,11 @@ class RunReport:
     """How a run went.
 
     ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
-    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``wall_time`` s
-    of the whole run; ``real_time_factor`` simulated seconds per second. ``complete``: whether the stop
-    time was reached; ``message``: what a person should know (why it stopped, stiffness), else empty.
+    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative.
+    ``preparation_time`` s for the native code to be compiled or loaded, next to nothing when it is there;
+    ``wall_time`` s of the run itself; ``real_time_factor`` simulated seconds per second of it. ``complete``:
+    whether the stop time was reached; ``message``: what a person should know (why it stopped, stiffness),
+    else empty.
     """
 
     solver: str
@@ -43,6 +45,7 @@ class RunReport:
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
+    preparation_time: float = 0.0
     wall_time: float = 0.0
     real_time_factor: float = 0.0
     complete: bool = True

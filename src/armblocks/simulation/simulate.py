@@ -48,10 +48,12 @@ def simulate(
     ``SimulationError`` where a signal or a derivative is not finite or the step becomes too small; its
     ``partial`` is the result up to the last good instant.
     """
-    begun = perf_counter()
     p = parameter_vector(compiled, parameters)
     plan = make_plan(compiled, options)
-    return _Run(compiled, options, plan, p, begun, progress).result()
+    started = perf_counter()
+    compiled.prepare(plan.tableau)
+    begun = perf_counter()
+    return _Run(compiled, options, plan, p, begun, begun - started, progress).result()
 
 
 class _Run:
@@ -64,6 +66,7 @@ class _Run:
         plan: Plan,
         p: Array,
         begun: float,
+        preparation_time: float,
         progress: Progress | None,
     ) -> None:
         self.compiled = compiled
@@ -71,6 +74,7 @@ class _Run:
         self.plan = plan
         self.p = p
         self.begun = begun
+        self.preparation_time = preparation_time
         self.progress = progress
         self.integration: Integration | None = None
         self.message = ""
@@ -166,6 +170,7 @@ class _Run:
             steps=0 if integration is None else integration.accepted,
             rejected=0 if integration is None else integration.rejected,
             evaluations=0 if integration is None else integration.evaluations,
+            preparation_time=self.preparation_time,
             wall_time=wall_time,
             real_time_factor=reached / wall_time,
             complete=self.complete,
