@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ("armblocks", "armblocks.formats")
+PACKAGES = ("armblocks", "armblocks.equations", "armblocks.formats")
 
 
 def homes_for_type_checkers(package: str) -> dict[str, str]:

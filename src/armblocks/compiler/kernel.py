@@ -25,7 +25,10 @@ from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.tape import OperationCount, Tape
 from armblocks.compiler.target import host_target
-from armblocks.equations import Shape, Signature, TracedFunction
+from armblocks.equations import Shape, Signature
+
+if TYPE_CHECKING:
+    from armblocks.equations import TracedFunction
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from armblocks.compiler import cache
 from armblocks.compiler.kernel import Kernel
 from armblocks.compiler.tape import Tape
-from armblocks.equations import Signature, Slot, TracedFunction
+from armblocks.equations import Signature, Slot
 from armblocks.errors import CompileError
+
+if TYPE_CHECKING:
+    from armblocks.equations import TracedFunction
 
 
 def recall(key: str, trace: Callable[[], TracedFunction]) -> Kernel:

@@ -6,7 +6,7 @@ import ctypes
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,11 @@ from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.native_integrator import NativeIntegrator
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
-from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction
+from armblocks.equations import Signature, Slot
 from armblocks.errors import CompileError
+
+if TYPE_CHECKING:
+    from armblocks.equations import HybridSystem, TracedFunction
 
 Vector = NDArray[np.float64]
 

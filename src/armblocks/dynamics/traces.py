@@ -29,7 +29,7 @@ from armblocks.dynamics.kinematics import body_poses, constant_pose, frame_pose
 from armblocks.dynamics.loads import PAYLOAD_SLOT, WRENCH_SLOT, at_tip, carrying
 from armblocks.dynamics.rnea import rnea
 from armblocks.equations import Signature, TracedFunction, signature
-from armblocks.equations.signature import Slot
+from armblocks.equations.signatures import Slot
 from armblocks.errors import RobotError
 from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree

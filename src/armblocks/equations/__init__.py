@@ -1,17 +1,31 @@
 """The narrow waist: typed sets of equations, and nothing else, pass between modelling and numerics."""
 
-from armblocks.equations.hybrid_system import HybridSystem
-from armblocks.equations.options import SimulationOptions
-from armblocks.equations.signature import (
-    Shape,
-    Signature,
-    Slot,
-    flatten,
-    matrix_shape,
-    signature,
-    unflatten,
-)
-from armblocks.equations.traced_function import TracedFunction
+from typing import TYPE_CHECKING
+
+from armblocks.lazy_exports import lazy_exports
+
+if TYPE_CHECKING:
+    from armblocks.equations.hybrid_system import HybridSystem
+    from armblocks.equations.options import SimulationOptions
+    from armblocks.equations.signatures import Shape, Signature, Slot, signature
+    from armblocks.equations.symbols import flatten, matrix_shape, unflatten
+    from armblocks.equations.traced_function import TracedFunction
+else:
+    __getattr__ = lazy_exports(
+        __name__,
+        {
+            "HybridSystem": "armblocks.equations.hybrid_system",
+            "Shape": "armblocks.equations.signatures",
+            "Signature": "armblocks.equations.signatures",
+            "SimulationOptions": "armblocks.equations.options",
+            "Slot": "armblocks.equations.signatures",
+            "TracedFunction": "armblocks.equations.traced_function",
+            "flatten": "armblocks.equations.symbols",
+            "matrix_shape": "armblocks.equations.symbols",
+            "signature": "armblocks.equations.signatures",
+            "unflatten": "armblocks.equations.symbols",
+        },
+    )
 
 __all__ = [
     "HybridSystem",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.equations.signature import Signature
-from armblocks.equations.traced_function import TracedFunction
+from armblocks.equations.signatures import Signature
+
+if TYPE_CHECKING:
+    from armblocks.equations.traced_function import TracedFunction
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -9,7 +9,8 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.equations.signature import Signature, flatten, matrix_shape, unflatten
+from armblocks.equations.signatures import Signature
+from armblocks.equations.symbols import flatten, matrix_shape, unflatten
 from armblocks.errors import InputError
 
 
@@ -18,7 +19,7 @@ class TracedFunction:
     """``results = f(arguments)``, written once in symbols.
 
     ``arguments[i]`` is the flat column of symbols of input slot ``i`` and ``results[j]`` the flat dense
-    column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signature`).
+    column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signatures`).
     """
 
     name: str

@@ -6,17 +6,19 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler import Kernel, OperationCount, recall
-from armblocks.equations import TracedFunction
 from armblocks.errors import UnknownNameError
 from armblocks.face.payload import Payload
 from armblocks.face.robot_html import robot_html
 from armblocks.robot import FrictionModel, Robot
+
+if TYPE_CHECKING:
+    from armblocks.equations import TracedFunction
 
 Array = NDArray[np.float64]
 
