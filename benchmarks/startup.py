@@ -10,9 +10,9 @@ FIRST_RNE = "import armblocks as ab; arm = ab.load_robot('puma560'); arm.rne([0]
 
 
 def imports(repeats: int) -> tuple[Timing, Timing]:
-    """Whole processes: ``import numpy``, ``import armblocks``."""
+    """Whole processes: ``import numpy``, and the same with ``armblocks`` on top."""
     numpy, armblocks = process_in_turn(
-        [[PYTHON, "-c", "import numpy"], [PYTHON, "-c", "import armblocks"]], repeats
+        [[PYTHON, "-c", "import numpy"], [PYTHON, "-c", "import numpy, armblocks"]], repeats
     )
     return numpy, armblocks
 

@@ -1,0 +1,32 @@
+"""Make the pictures of README and docs anew from the paper's experiment, into docs/pictures.
+
+``python3 scripts/pictures.py``; commit what it changes.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from environment import PYTHON, ROOT, prepare, run
+
+PICTURES = ("figures/moments.svg", "figures/tool-path.svg", "figures/joints.svg", "diagram.svg")
+TARGET = ROOT / "docs" / "pictures"
+
+
+def main() -> int:
+    """Run the experiment into a temporary folder and keep the pictures that the documents show."""
+    prepare()
+    with tempfile.TemporaryDirectory() as folder:
+        code = run(PYTHON, "-m", "armblocks", "run", "kr180model", "--out", folder)
+        if code == 0:
+            TARGET.mkdir(exist_ok=True)
+            for picture in PICTURES:
+                shutil.copyfile(Path(folder) / picture, TARGET / f"kr180-{Path(picture).name}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
