@@ -73,6 +73,7 @@ class Arm:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+        self._kernels: dict[str, Kernel] = {}
 
     # ---- description -------------------------------------------------------------------------------------
     @property
@@ -190,7 +191,11 @@ class Arm:
         return hashlib.sha256(repr(replace(self.robot, links=links, source="")).encode()).hexdigest()
 
     def _kernel(self, method: str) -> Kernel:
-        return recall(f"robot/{method}/{self._description_key}", lambda: _traces()[method](self.robot))
+        kernel = self._kernels.get(method)
+        if kernel is None:
+            key = f"robot/{method}/{self._description_key}"
+            kernel = self._kernels[method] = recall(key, lambda: _traces()[method](self.robot))
+        return kernel
 
     def _loadable(self, method: str) -> OfMotion:
         """The plain kernel, and the one with wrench and payload as soon as a call names either."""
