@@ -15,6 +15,6 @@ def evaluate(block: Block, *inputs: ArrayLike, t: float = 0.0, x: ArrayLike = ()
     sources = [builder.add(f"in{k}", Constant(value=value)) for k, value in enumerate(inputs)]
     builder.add("block", block, *sources)
     system = trace_diagram(builder.build())
-    (y,) = system.signals(t, x, system.parameter_values)
+    (y,) = system.signals(t, x, (), (), system.parameter_values)
     values = system.signals_layout.unpack(y)
     return {path.removeprefix("block/"): value for path, value in values.items() if path[:6] == "block/"}

@@ -10,7 +10,7 @@ import pytest
 
 from armblocks.compiler import cache
 from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
-from armblocks.equations import HybridSystem, TracedFunction, signature
+from armblocks.equations import HybridSystem, TracedFunction, continuous_system, signature
 from armblocks.errors import CompileError
 
 
@@ -18,7 +18,7 @@ def pendulum(length: float = 2.0) -> HybridSystem:
     """Angle and rate, two signals, a parameter and a breakpoint."""
     ends = signature(("t", ()), ("x", (2,)), ("p", (2,)))
     p = signature(("p", (2,)))
-    return HybridSystem(
+    return continuous_system(
         name="pendulum",
         states=signature(("arm/q", (2,), "rad")),
         parameters=signature(("arm.g", (), "m/s^2"), ("step.time", (), "s")),
@@ -54,7 +54,7 @@ def test_signals_of_a_batch_are_those_of_casadi(count: int) -> None:
     t, x, p = random.uniform(0, 1, count), random.normal(size=(count, 2)), np.array([9.81, 0.3])
     y = compiled.evaluate_signals(t, x, p)
     assert y.shape == (5, count)
-    expected = np.array([system.signals(t[k], x[k], p)[0] for k in range(min(count, 20))])
+    expected = np.array([system.signals(t[k], x[k], (), (), p)[0] for k in range(min(count, 20))])
     np.testing.assert_allclose(y[:, :20].T, expected, rtol=1e-14, atol=1e-15)
 
 

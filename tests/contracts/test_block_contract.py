@@ -197,7 +197,8 @@ def test_outputs_that_are_said_to_be_rates_are_rates(
         ]
         builder.add("derivative", Derivative(), builder.add("block", block, *sources)[port])
         system = trace_diagram(builder.build())
-        (y,) = system.signals(0.37, random.uniform(0.1, 0.9, system.states.size), system.parameter_values)
+        x = random.uniform(0.1, 0.9, system.states.size)
+        (y,) = system.signals(0.37, x, (), (), system.parameter_values)
         signals = system.signals_layout.unpack(y)
         # the same quantity by another order of operations
         assert signals["derivative/y"] == pytest.approx(signals[f"block/{rate}"], rel=1e-13)

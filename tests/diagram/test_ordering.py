@@ -99,7 +99,7 @@ def test_higher_derivatives_of_a_state_are_no_loop() -> None:
     for k in range(4):
         last = builder.add(f"rate{k}", Derivative(), last)
     system = trace_diagram(builder.build())
-    (y,) = system.signals(0.0, [2.0], system.parameter_values)
+    (y,) = system.signals(0.0, [2.0], (), (), system.parameter_values)
     signals = system.signals_layout.unpack(y)
     assert [float(signals[f"rate{k}/y"]) for k in range(4)] == [-6.0, 18.0, -54.0, 162.0]
 

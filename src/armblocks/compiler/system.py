@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -171,7 +172,17 @@ class CompiledSystem:
 def _tape_of(traced: TracedFunction) -> Tape:
     from armblocks.compiler.from_casadi import tape_from
 
-    return tape_from(traced)
+    return tape_from(_without_empty_ends(traced))
+
+
+def _without_empty_ends(traced: TracedFunction) -> TracedFunction:
+    """Without the inputs that a system which only flows leaves empty: its code is over ``t, x, p`` alone."""
+    kept = [k for k, slot in enumerate(traced.inputs) if slot.size or slot.name not in ("z", "w")]
+    return dataclasses.replace(
+        traced,
+        inputs=Signature(tuple(traced.inputs.slots[k] for k in kept)),
+        arguments=tuple(traced.arguments[k] for k in kept),
+    )
 
 
 def _tape_name(digest: str) -> str:

@@ -23,7 +23,7 @@ from armblocks.diagram.ordering import Network, Node, Value, evaluation_order
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
 from armblocks.diagram.units import infer_units
-from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, signature
+from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, continuous_system, signature
 from armblocks.errors import ArmblocksError, DiagramError
 
 
@@ -71,7 +71,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     ]
     parameters = signature(*tracing.parameter_slots)
     ends = (tracing.t, tracing.x, tracing.p)
-    return HybridSystem(
+    return continuous_system(
         name=diagram.name,
         states=signature(*tracing.state_slots),
         parameters=parameters,

@@ -6,37 +6,143 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from casadi import SX
 from numpy.typing import NDArray
 
-from armblocks.equations.signature import Signature
+from armblocks.equations.signature import Signature, signature
 from armblocks.equations.traced_function import TracedFunction
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True)
+class SampleClock:
+    """Ticks at ``offset + k period`` (s), ``k = 0, 1, …``: computed, never accumulated."""
+
+    period: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.period < np.inf and 0.0 <= self.offset < self.period):
+            raise InputError(
+                f"a clock has the period {self.period:g} s and the offset {self.offset:g} s",
+                allowed="a finite period > 0 and 0 <= offset < period",
+                fix="change the sample time",
+            )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HybridSystem:
-    """``x' = derivative(t, x, p)``, ``y = signals(t, x, p)``, ``x(0) = initial_states(p)``.
+    """Continuous flow, sampled parts, events and implicit equations of one diagram.
 
-    The flat vectors ``x`` (states), ``p`` (tunable parameters) and ``y`` (signals) are laid out by the three
-    signatures. Slot names are paths: a signal is ``block/port``, a state ``block/state``, a parameter
-    ``block.parameter``; signals stand in evaluation order, so the first non-finite one is the culprit.
+    ``x' = derivative(t, x, z, w, p)``, ``y = signals(t, x, z, w, p)``, ``x(0) = initial_states(p)``, where
+    ``w`` solves ``0 = residual(t, x, z, w, p)``. ``z`` jumps at instants and is constant in between.
 
-    All four functions have flat ends:
-    ``derivative`` and ``signals``: inputs ``t ()``, ``x (nx,)``, ``p (np,)``; one output ``xd (nx,)`` or
-    ``y (ny,)``.
-    ``initial_states``: input ``p``; output ``x0 (nx,)``.
+    The flat vectors ``x`` (states), ``z`` (discrete), ``w`` (algebraic), ``p`` (tunable parameters) and ``y``
+    (signals) are laid out by the signatures. Slot names are paths: a signal is ``block/port``, a state
+    ``block/state``, a parameter ``block.parameter``; signals stand in evaluation order, so the first
+    non-finite one is the culprit.
+
+    All functions have flat ends. ``derivative``, ``signals``, ``residual``, ``residual_jacobian`` and
+    ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``; one output ``xd (nx,)``,
+    ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``.
+    ``update``: one input more, ``m (nclocks,)``; output ``z (nz,)``: what z becomes at an instant at which
+    the clocks with ``m[k] = 1`` tick. ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired
+    upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``.
+    ``initial_states``, ``initial_discrete``, ``initial_algebraic``: input ``p``; output ``x0``, ``z0``,
+    ``w0``. At the start all clocks without an offset tick, before the first derivative.
     ``breakpoints``: input ``p``; output ``times (nb,)``: known instants at which signals jump (a step
-    source). A signal is right-continuous there: at the instant itself it has its new value.
+    source). A signal is right-continuous: at such an instant, a tick or an event it has its new value.
     """
 
     name: str
     states: Signature
+    discrete: Signature
+    """Held outputs, discrete states and modes: slots ``block/state``."""
+    algebraic: Signature
+    """Unknowns of implicit equations: slots ``block/port``."""
     parameters: Signature
     signals_layout: Signature
+    clocks: tuple[SampleClock, ...]
+    """The distinct sample times, fastest first."""
     parameter_values: NDArray[np.float64]
     derivative: TracedFunction
     signals: TracedFunction
+    residual: TracedFunction
+    residual_jacobian: TracedFunction
+    """Derivative of ``residual`` by ``w``."""
+    update: TracedFunction
+    guards: TracedFunction
+    """An event happens where one of its entries crosses zero."""
+    guard_directions: tuple[int, ...]
+    """+1 upwards, -1 downwards, 0 both."""
+    guard_names: tuple[str, ...]
+    """The block of each guard, for messages."""
+    reset: TracedFunction
     initial_states: TracedFunction
+    initial_discrete: TracedFunction
+    initial_algebraic: TracedFunction
     breakpoints: TracedFunction
     aliases: Mapping[str, str]
     """Other names of signals: the block's bare name where it has one output, and an input port
     (``scope/u``) for the signal that drives it."""
+
+
+def continuous_system(
+    *,
+    name: str,
+    states: Signature,
+    parameters: Signature,
+    signals_layout: Signature,
+    parameter_values: NDArray[np.float64],
+    derivative: TracedFunction,
+    signals: TracedFunction,
+    initial_states: TracedFunction,
+    breakpoints: TracedFunction,
+    aliases: Mapping[str, str],
+) -> HybridSystem:
+    """A system that only flows; ``derivative`` and ``signals`` take ``t, x, p``."""
+    nothing = Signature()
+    t, x, p = derivative.arguments
+    z, w, m, e = (SX.sym(letter, 0) for letter in "zwme")
+    flat = {"t": t, "x": x, "z": z, "w": w, "p": p, "m": m, "e": e}
+
+    def function(
+        name: str, letters: str, outputs: Signature, results: tuple[SX, ...], given: TracedFunction | None
+    ) -> TracedFunction:
+        symbols = flat if given is None else {**flat, **dict(zip("txp", given.arguments))}
+        ends = signature(*((letter, () if letter == "t" else (flat[letter].numel(),)) for letter in letters))
+        return TracedFunction(
+            name if given is None else given.name,
+            ends,
+            outputs,
+            tuple(symbols[letter] for letter in letters),
+            results,
+        )
+
+    def empty(name: str, letters: str, output: str, *axes: int) -> TracedFunction:
+        return function(name, letters, signature((output, axes or (0,))), (SX(0, 1),), None)
+
+    return HybridSystem(
+        name=name,
+        states=states,
+        discrete=nothing,
+        algebraic=nothing,
+        parameters=parameters,
+        signals_layout=signals_layout,
+        clocks=(),
+        parameter_values=parameter_values,
+        derivative=function("derivative", "txzwp", derivative.outputs, derivative.results, derivative),
+        signals=function("signals", "txzwp", signals.outputs, signals.results, signals),
+        residual=empty("residual", "txzwp", "r"),
+        residual_jacobian=empty("residual_jacobian", "txzwp", "J", 0, 0),
+        update=empty("update", "txzwpm", "z"),
+        guards=empty("guards", "txzwp", "g"),
+        guard_directions=(),
+        guard_names=(),
+        reset=function("reset", "txzwpe", signature(("x", (x.numel(),)), ("z", (0,))), (x, SX(0, 1)), None),
+        initial_states=initial_states,
+        initial_discrete=empty("initial_discrete", "p", "z0"),
+        initial_algebraic=empty("initial_algebraic", "p", "w0"),
+        breakpoints=breakpoints,
+        aliases=aliases,
+    )
