@@ -2,8 +2,47 @@
 
 from types import ModuleType
 
-from armblocks.blocks import continuous, maths, robots, routing, sinks, sources, transforms
+from armblocks.blocks import (
+    arithmetic,
+    continuous,
+    logic,
+    maths,
+    matrices,
+    reductions,
+    robots,
+    routing,
+    selection,
+    sinks,
+    sources,
+    transforms,
+)
+from armblocks.blocks.arithmetic import (
+    Abs,
+    AngleDifference,
+    Bias,
+    CartesianToPolar,
+    DegreesToRadians,
+    Divide,
+    Hypot,
+    Modulo,
+    PolarToCartesian,
+    Polynomial,
+    RadiansToDegrees,
+    Rounding,
+    Sign,
+    Sqrt,
+    UnaryMinus,
+)
 from armblocks.blocks.continuous import PID, Derivative, Integrator, StateSpace, TransferFunction
+from armblocks.blocks.logic import (
+    CombinatorialLogic,
+    CompareToConstant,
+    CompareToZero,
+    IntervalTest,
+    IntervalTestDynamic,
+    LogicalOperator,
+    RelationalOperator,
+)
 from armblocks.blocks.maths import (
     Atan2,
     Gain,
@@ -16,6 +55,27 @@ from armblocks.blocks.maths import (
     Saturation,
     Sum,
     Trigonometry,
+)
+from armblocks.blocks.matrices import (
+    CrossProduct,
+    Determinant,
+    DiagonalMatrix,
+    ExtractDiagonal,
+    LinearSolve,
+    MatrixConcatenate,
+    MatrixInverse,
+    MatrixPower,
+    Reshape,
+    Trace,
+    Transpose,
+)
+from armblocks.blocks.reductions import (
+    CumulativeSum,
+    DotProduct,
+    Extremum,
+    Norm,
+    ProductOfElements,
+    SumOfElements,
 )
 from armblocks.blocks.robots import (
     Coriolis,
@@ -30,6 +90,14 @@ from armblocks.blocks.robots import (
     RobotPlot,
 )
 from armblocks.blocks.routing import Demux, Mux
+from armblocks.blocks.selection import (
+    Assignment,
+    IndexVector,
+    ManualSwitch,
+    MultiportSwitch,
+    Selector,
+    SubMatrix,
+)
 from armblocks.blocks.sinks import Display, Scope, Terminator, ToWorkspace, XYGraph
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
 from armblocks.blocks.transforms import T2xyz, Xyz2T
@@ -43,7 +111,20 @@ def _defined_in(family: ModuleType) -> list[type[Block]]:
 
 BLOCKS = BlockLibrary(
     kind
-    for family in (sources, maths, continuous, routing, transforms, robots, sinks)
+    for family in (
+        sources,
+        maths,
+        continuous,
+        routing,
+        transforms,
+        robots,
+        sinks,
+        arithmetic,
+        reductions,
+        matrices,
+        selection,
+        logic,
+    )
     for kind in _defined_in(family)
 )
 """Every kind of block by type name."""
@@ -51,43 +132,88 @@ BLOCKS = BlockLibrary(
 __all__ = [
     "BLOCKS",
     "PID",
+    "Abs",
+    "AngleDifference",
+    "Assignment",
     "Atan2",
+    "Bias",
+    "CartesianToPolar",
     "Clock",
+    "CombinatorialLogic",
+    "CompareToConstant",
+    "CompareToZero",
     "Constant",
     "Coriolis",
+    "CrossProduct",
+    "CumulativeSum",
+    "DegreesToRadians",
     "Demux",
     "Derivative",
+    "Determinant",
+    "DiagonalMatrix",
     "Display",
+    "Divide",
+    "DotProduct",
+    "ExtractDiagonal",
+    "Extremum",
     "Fkine",
     "ForwardDynamics",
     "Gain",
     "Gravload",
+    "Hypot",
+    "IndexVector",
     "Inertia",
     "Integrator",
+    "IntervalTest",
+    "IntervalTestDynamic",
     "JTraj",
     "Jacob0",
     "Jacobe",
+    "LinearSolve",
+    "LogicalOperator",
+    "ManualSwitch",
     "MathFunction",
+    "MatrixConcatenate",
     "MatrixGain",
+    "MatrixInverse",
+    "MatrixPower",
     "MatrixProduct",
     "MinMax",
+    "Modulo",
+    "MultiportSwitch",
     "Mux",
+    "Norm",
+    "PolarToCartesian",
+    "Polynomial",
     "Power",
     "Product",
+    "ProductOfElements",
+    "RadiansToDegrees",
     "Ramp",
+    "RelationalOperator",
+    "Reshape",
     "Rne",
     "RobotPlot",
+    "Rounding",
     "Saturation",
     "Scope",
+    "Selector",
+    "Sign",
     "SineWave",
+    "Sqrt",
     "StateSpace",
     "Step",
+    "SubMatrix",
     "Sum",
+    "SumOfElements",
     "T2xyz",
     "Terminator",
     "ToWorkspace",
+    "Trace",
     "TransferFunction",
+    "Transpose",
     "Trigonometry",
+    "UnaryMinus",
     "XYGraph",
     "Xyz2T",
 ]

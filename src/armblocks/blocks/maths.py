@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -149,12 +150,18 @@ class MatrixProduct(Block):
 
 
 _FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
+    "10^u": lambda u: casadi.exp(u * math.log(10.0)),
     "abs": casadi.fabs,
+    "cbrt": lambda u: casadi.sign(u) * casadi.fabs(u) ** (1.0 / 3.0),
     "ceil": casadi.ceil,
+    "cube": lambda u: u * u * u,
     "exp": casadi.exp,
+    "expm1": casadi.expm1,
     "floor": casadi.floor,
     "log": casadi.log,
     "log10": casadi.log10,
+    "log1p": casadi.log1p,
+    "log2": lambda u: casadi.log(u) / math.log(2.0),
     "negate": lambda u: -u,
     "reciprocal": lambda u: 1.0 / u,
     "sign": casadi.sign,
@@ -164,7 +171,20 @@ _FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
 
 _TRIGONOMETRY: Mapping[str, Callable[[SX], SX]] = {
     name: getattr(casadi, name)
-    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+    for name in (
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "asinh",
+        "acosh",
+        "atanh",
+    )
 }
 
 
