@@ -6,6 +6,7 @@ from armblocks.blocks import (
     arithmetic,
     continuous,
     logic,
+    lookup,
     maths,
     matrices,
     reductions,
@@ -15,6 +16,7 @@ from armblocks.blocks import (
     sinks,
     sources,
     transforms,
+    waveforms,
 )
 from armblocks.blocks.arithmetic import (
     Abs,
@@ -43,6 +45,15 @@ from armblocks.blocks.logic import (
     LogicalOperator,
     RelationalOperator,
 )
+from armblocks.blocks.lookup import (
+    DirectLookup,
+    InterpolationUsingPrelookup,
+    LookupTable1D,
+    LookupTable2D,
+    LookupTableDynamic,
+    LookupTableND,
+    Prelookup,
+)
 from armblocks.blocks.maths import (
     Atan2,
     Gain,
@@ -52,7 +63,6 @@ from armblocks.blocks.maths import (
     MinMax,
     Power,
     Product,
-    Saturation,
     Sum,
     Trigonometry,
 )
@@ -101,6 +111,7 @@ from armblocks.blocks.selection import (
 from armblocks.blocks.sinks import Display, Scope, Terminator, ToWorkspace, XYGraph
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
 from armblocks.blocks.transforms import T2xyz, Xyz2T
+from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
 from armblocks.diagram import Block, BlockLibrary
 
 
@@ -124,6 +135,8 @@ BLOCKS = BlockLibrary(
         matrices,
         selection,
         logic,
+        lookup,
+        waveforms,
     )
     for kind in _defined_in(family)
 )
@@ -138,6 +151,7 @@ __all__ = [
     "Atan2",
     "Bias",
     "CartesianToPolar",
+    "Chirp",
     "Clock",
     "CombinatorialLogic",
     "CompareToConstant",
@@ -151,6 +165,7 @@ __all__ = [
     "Derivative",
     "Determinant",
     "DiagonalMatrix",
+    "DirectLookup",
     "Display",
     "Divide",
     "DotProduct",
@@ -158,12 +173,15 @@ __all__ = [
     "Extremum",
     "Fkine",
     "ForwardDynamics",
+    "FromTable",
     "Gain",
     "Gravload",
+    "Ground",
     "Hypot",
     "IndexVector",
     "Inertia",
     "Integrator",
+    "InterpolationUsingPrelookup",
     "IntervalTest",
     "IntervalTestDynamic",
     "JTraj",
@@ -171,6 +189,10 @@ __all__ = [
     "Jacobe",
     "LinearSolve",
     "LogicalOperator",
+    "LookupTable1D",
+    "LookupTable2D",
+    "LookupTableDynamic",
+    "LookupTableND",
     "ManualSwitch",
     "MathFunction",
     "MatrixConcatenate",
@@ -186,8 +208,10 @@ __all__ = [
     "PolarToCartesian",
     "Polynomial",
     "Power",
+    "Prelookup",
     "Product",
     "ProductOfElements",
+    "Pulse",
     "RadiansToDegrees",
     "Ramp",
     "RelationalOperator",
@@ -195,7 +219,6 @@ __all__ = [
     "Rne",
     "RobotPlot",
     "Rounding",
-    "Saturation",
     "Scope",
     "Selector",
     "Sign",
