@@ -14,7 +14,7 @@ from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.simulation.tableaux import DEFAULT, RK4, find_tableau
+from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, find_tableau
 
 Array = NDArray[np.float64]
 
@@ -28,9 +28,10 @@ SMALLEST_RTOL = 1e-13
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """One run, settled. ``tableau`` is ``None`` where there are no states and so nothing to integrate."""
+    """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time."""
 
     tableau: ButcherTableau | None
+    solver: str
     reason: str
     instants: Array
     step: float
@@ -64,8 +65,10 @@ def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
     max_step = math.inf
     if options.max_step is not None:
         max_step = _number("max_step", options.max_step, "a time in s above 0", above=0.0)
+    solver = "none" if tableau is None or system.states.size == 0 else tableau.name
     return Plan(
         tableau=tableau,
+        solver=solver,
         reason=reason,
         instants=sample_instants(stop, sample_time),
         step=step if step is not None else sample_time,
@@ -87,6 +90,9 @@ def _number(
 def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[ButcherTableau | None, str]:
     automatic = options.solver.casefold() == "auto"
     named = None if automatic else find_tableau(options.solver)
+    if system.states.size == 0 and system.sizes.hybrid:
+        # Steps of no states: what they do is to go from instant to instant, and to look at guards.
+        return EULER, "none needed: the system has no continuous states, only instants are worked out"
     if system.states.size == 0:
         return None, "none needed: the system has no states, every instant is evaluated directly"
     if named is None and options.step is not None:

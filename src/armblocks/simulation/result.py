@@ -33,9 +33,10 @@ class RunReport:
     """How a run went.
 
     ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
-    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``wall_time`` s
-    of the whole run; ``real_time_factor`` simulated seconds per second. ``complete``: whether the stop
-    time was reached; ``message``: what a person should know (why it stopped, stiffness), else empty.
+    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``ticks``:
+    instants at which a clock ticked; ``events``: guards that fired. ``wall_time`` s of the whole run;
+    ``real_time_factor`` simulated seconds per second. ``complete``: whether the stop time was reached;
+    ``message``: what a person should know (why it stopped, stiffness), else empty.
     """
 
     solver: str
@@ -43,6 +44,8 @@ class RunReport:
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
+    ticks: int = 0
+    events: int = 0
     wall_time: float = 0.0
     real_time_factor: float = 0.0
     complete: bool = True

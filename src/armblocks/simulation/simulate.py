@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import Integration
+from armblocks.compiler.native_integrator import Integration, RunPoint
 from armblocks.compiler.system import CompiledSystem
-from armblocks.equations import SimulationOptions
+from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import SimulationError
 from armblocks.simulation.diagnosis import first_bad_signal, integration_failure, stiffness_hint
 from armblocks.simulation.plan import Plan, make_plan, parameter_vector
@@ -54,6 +54,19 @@ def simulate(
     return _Run(compiled, options, plan, p, begun, progress).result()
 
 
+def _check_initial(compiled: CompiledSystem, layout: Signature, values: Array) -> None:
+    """Raise ``SimulationError`` naming the first variable that does not start at finite numbers."""
+    for slot in layout:
+        given = values[layout.ranges[slot.name]]
+        if not np.isfinite(given).all():
+            raise SimulationError(
+                f"the initial value of state '{slot.name}' is {given.tolist()}",
+                where=compiled.name,
+                allowed="finite numbers",
+                fix="change the block's initial value",
+            )
+
+
 class _Run:
     """One run in progress."""
 
@@ -80,17 +93,18 @@ class _Run:
     def result(self) -> SimulationResult:
         instants = self.plan.instants
         failure: SimulationError | None = None
-        if self.plan.tableau is None:
-            states = np.empty((instants.size, 0))
-        else:
+        states, discrete, algebraic = (np.empty((instants.size, 0)) for _ in range(3))
+        if self.plan.tableau is not None:
             integration = self.integrate()
-            states = integration.states[: integration.recorded]
-            instants = instants[: integration.recorded]
+            recorded = integration.recorded
+            instants = instants[:recorded]
+            states, discrete = integration.states[:recorded], integration.discrete[:recorded]
+            algebraic = integration.algebraic[:recorded]
             if integration.status not in (Status.DONE, Status.PAUSED):
                 failure = integration_failure(self.compiled, integration, self.p)
             self.note_stiffness(integration)
-        signals = self.compiled.evaluate_signals(instants, states, self.p)
-        bad = first_bad_signal(self.compiled, instants, signals)
+        signals = self.compiled.evaluate_signals(instants, states, discrete, algebraic, self.p)
+        bad = first_bad_signal(self.compiled, instants, signals, algebraic)
         if bad is not None:
             failure, good = bad
             instants, states, signals = instants[:good], states[:good], signals[:, :good]
@@ -107,19 +121,16 @@ class _Run:
         """Take all steps, in chunks, until the end, a failure or Ctrl-C."""
         compiled, options, plan = self.compiled, self.options, self.plan
         assert plan.tableau is not None
-        x0 = compiled.initial_states(self.p)
-        if not np.isfinite(x0).all():
-            bad = next(
-                s.name for s in compiled.states if not np.isfinite(x0[compiled.states.ranges[s.name]]).all()
-            )
-            raise SimulationError(
-                f"the initial value of state '{bad}' is {x0[compiled.states.ranges[bad]].tolist()}",
-                where=compiled.name,
-                allowed="finite numbers",
-                fix="change the block's initial value",
-            )
+        start = RunPoint(
+            time=0.0,
+            x=compiled.initial_states(self.p),
+            z=compiled.initial_discrete(self.p),
+            w=compiled.initial_algebraic(self.p),
+        )
+        for layout, values in ((compiled.states, start.x), (compiled.discrete, start.z)):
+            _check_initial(compiled, layout, values)
         integration = compiled.integrator(plan.tableau).begin(
-            x0,
+            start,
             self.p,
             plan.instants,
             compiled.breakpoints(self.p),
@@ -161,11 +172,13 @@ class _Run:
         wall_time = perf_counter() - self.begun
         reached = float(instants[-1]) if instants.size else 0.0
         report = RunReport(
-            solver="none" if plan.tableau is None else plan.tableau.name,
+            solver=plan.solver,
             reason=plan.reason,
             steps=0 if integration is None else integration.accepted,
             rejected=0 if integration is None else integration.rejected,
             evaluations=0 if integration is None else integration.evaluations,
+            ticks=0 if integration is None else integration.instants,
+            events=0 if integration is None else integration.events,
             wall_time=wall_time,
             real_time_factor=reached / wall_time,
             complete=self.complete,
