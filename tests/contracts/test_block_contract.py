@@ -66,20 +66,27 @@ def numbers(
     States and inputs lie between ``least`` and ``least + 0.8``.
     """
     random = np.random.default_rng(1)
+    states = (*block.states(shapes), *block.discrete_states(shapes), *block.modes(shapes))
+    rates = [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs]
     ends = [
-        [Slot(state.name, state.shape) for state in block.states(shapes)],
-        [Slot(name, shape) for name, shape in shapes.items()],
+        [Slot(state.name, state.shape) for state in states],
+        [Slot(name, shape) for name, shape in shapes.items()] + rates,
+        [Slot(guard.name, guard.shape) for guard in block.guards(shapes)],
         list(tunable_slots(block)),
     ]
     t, *symbols = SX.sym("t"), *(SX.sym("s", sum(slot.size for slot in slots)) for slots in ends)
-    x, u, p = (natural(slots, symbol) for slots, symbol in zip(ends, symbols))
+    x, u, e, p = (dict(natural(slots, symbol)) for slots, symbol in zip(ends, symbols))
+    if block.sampled:
+        p["T"] = SX(0.1)
     found = [block.outputs(t, x, u, p), block.derivatives(t, x, u, p), block.records(t, x, u, p)]
+    found += [block.updates(t, x, u, p), block.guard_values(t, x, u, p), block.mode_values(t, x, u, p)]
+    found += [block.resets(t, x, u, p, e) if block.guards(shapes) else {}, block.initial_outputs(p)]
     found += [block.initial_states(p), dict(enumerate(map(SX, block.breakpoints(p))))]
     function = Function("f", [t, *symbols], [SX(value) for group in found for value in group.values()])
     tunables = [
         np.ravel((values or block).parameter_value(rule.name)) for rule in block.parameters() if rule.tunable
     ]
-    points = [0.37, *(random.uniform(least, least + 0.8, symbol.numel()) for symbol in symbols[:2])]
+    points = [0.37, *(random.uniform(least, least + 0.8, symbol.numel()) for symbol in symbols[:3])]
     points.append(np.concatenate([*tunables, []]))
     return [np.asarray(value) for value in function.call([np.asarray(point) for point in points])]
 
@@ -165,7 +172,7 @@ def test_its_start_values_fit_its_states(kind: type[Block]) -> None:
     slots = list(tunable_slots(block))
     p = natural(slots, SX.sym("p", sum(slot.size for slot in slots)))
     for shapes in fitting_shapes(block):
-        states = block.states(shapes)
+        states = (*block.states(shapes), *block.discrete_states(shapes))
         start = block.initial_states(p)
         assert set(start) == {state.name for state in states}
         for state in states:

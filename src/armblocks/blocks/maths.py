@@ -296,30 +296,3 @@ class MinMax(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": reduce(fmin if self.function == "min" else fmax, u.values())}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Saturation(Block):
-    """The input held between two limits: y = min(max(u, lower), upper)."""
-
-    family: ClassVar[str] = "maths"
-    title: ClassVar[str] = "Saturation"
-
-    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
-    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is limited"),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        shapes = {"lower": shape_of(self.lower), "upper": shape_of(self.upper)}
-        return {"y": broadcast({**inputs, **shapes})}
-
-    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        return {"y": inputs["u"]}
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": fmin(fmax(u["u"], p["lower"]), p["upper"])}

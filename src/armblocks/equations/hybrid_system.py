@@ -47,7 +47,7 @@ class HybridSystem:
     ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``.
     ``update``: one input more, ``m (nclocks,)``; output ``z (nz,)``: what z becomes at an instant at which
     the clocks with ``m[k] = 1`` tick. ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired
-    upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it settles the modes
+    upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it settles modes
     (a limiter that starts beyond its limit) and changes nothing else: a run calls it so once, at the start
     after the ticks, and takes the signs of the guards then. A breakpoint is an instant like a tick: guards
     are compared across it.
