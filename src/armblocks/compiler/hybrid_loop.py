@@ -135,6 +135,7 @@ class HybridLoop(Loop):
         until = w.multiply(time, number_text(SAME_ABOVE))
         self.emit_ticks(time, until)
         if self.guards:
+            self.emit_settling(time)
             self.emit_events(time)
         else:
             w.put(time, self.instant)
@@ -173,6 +174,23 @@ class HybridLoop(Loop):
         m, new = (f"ptr {self.at(place)}" for place in (places.ticking, places.new_z))
         w.do(f"call void @update(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {m}, {new})")
         self.copy(places.new_z, places.z, self.sizes.discrete)
+        w.place(on)
+
+    def emit_settling(self, time: str) -> None:
+        """At the start, a reset without events: modes take the value that the signals ask for."""
+        w, places = self.w, self.places
+        settle, on = w.fresh("settle"), w.fresh("on")
+        w.branch(w.compare("oeq", time, number_text(0.0)), settle, on)
+        w.place(settle)
+        w.put(time, self.instant)
+        self.emit_solve(self.instant, self.at(places.x))
+        zero = number_text(0.0)
+        w.for_each(self.guards, lambda i: w.put(zero, self.step.element(places.fired, i)))
+        arguments = (places.x, places.z, places.trial_w, places.fired, places.new_x, places.new_z)
+        x, z, unknowns, e, new_x, new_z = (f"ptr {self.at(place)}" for place in arguments)
+        w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
+        self.copy(places.new_z, places.z, self.sizes.discrete)
+        w.jump(on)
         w.place(on)
 
     def emit_events(self, time: str) -> None:
