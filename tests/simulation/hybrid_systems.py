@@ -43,7 +43,10 @@ def hybrid(
     guard: Equation = lambda t, x, z, w, p: column(),
     reset: Callable[..., tuple[SX, SX]] = lambda t, x, z, w, p, e: (x, z),
 ) -> HybridSystem:
-    """All ends flat; ``guards`` are pairs of a block's name and a direction."""
+    """All ends flat; ``guards`` are pairs of a block's name and a direction.
+
+    ``reset`` is asked only where some guard fired: these systems have no modes to settle.
+    """
     sizes = {
         "x": len(states),
         "z": len(discrete),
@@ -61,6 +64,18 @@ def hybrid(
 
     def jacobian(t: SX, x: SX, z: SX, w: SX, p: SX) -> SX:
         return ca.densify(ca.jacobian(residual(t, x, z, w, p), w)) if algebraic else SX(0, 0)
+
+    def reset_of_events(t: SX, x: SX, z: SX, w: SX, p: SX, e: SX) -> tuple[SX, SX]:
+        """A reset without events, as at the start, leaves everything as it is."""
+        fired = ca.sum1(ca.fabs(e)) > 0
+        return tuple(ca.if_else(fired, new, old) for new, old in zip(reset(t, x, z, w, p, e), (x, z)))  # pyright: ignore
+
+    def fired_reset(t: SX, x: SX, z: SX, w: SX, p: SX, e: SX) -> tuple[SX, SX]:
+        new_x, new_z = reset(t, x, z, w, p, e)
+        if not guards:
+            return new_x, new_z
+        quiet = ca.dot(e, e) == 0.0
+        return ca.if_else(quiet, x, new_x), ca.if_else(quiet, z, new_z)
 
     flat = {letter: (size,) for letter, size in sizes.items()}
     constant = lambda numbers: lambda p: column(*map(SX, numbers))  # noqa: E731
@@ -83,7 +98,7 @@ def hybrid(
         guards=trace("guards", "txzwp", signature(("g", flat["e"])), guard),
         guard_directions=tuple(direction for _, direction in guards),
         guard_names=tuple(block for block, _ in guards),
-        reset=trace("reset", "txzwpe", signature(("x", flat["x"]), ("z", flat["z"])), reset),
+        reset=trace("reset", "txzwpe", signature(("x", flat["x"]), ("z", flat["z"])), reset_of_events),
         initial_states=trace("initial_states", "p", signature(("x0", flat["x"])), constant(x0)),
         initial_discrete=trace("initial_discrete", "p", signature(("z0", flat["z"])), constant(z0)),
         initial_algebraic=trace("initial_algebraic", "p", signature(("w0", flat["w"])), constant(w0)),
