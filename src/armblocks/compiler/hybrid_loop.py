@@ -232,7 +232,8 @@ class HybridLoop(Loop):
         w.branch(fresh, choose, chosen)
         w.place(choose)
         interval = w.subtract(w.get(self.end), time)
-        length = self.step.first_step(time, interval, self.max_step)
+        length, bounded = self.step.first_step(time, interval, self.max_step)
+        self.emit_checkpoint(w.both(bounded, w.compare("oge", w.get(self.end), self.last_end)))
         w.put(w.minimum(length, w.get(self.kept[Real.BOUND])), self.kept[Real.STEP])
         w.place(chosen)
 

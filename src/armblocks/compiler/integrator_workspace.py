@@ -69,7 +69,9 @@ class Count(IntEnum):
     """Events in a row that are as good as at one instant."""
     GUARD = 13
     """The guard that fired last, counted from 1."""
-    END = 14
+    SAVED = 14
+    """Whether the checkpoint is written."""
+    END = 15
 
 
 class Stage(IntEnum):

@@ -33,10 +33,14 @@ NO_NUMBERS: Vector = np.empty(0)
 
 @dataclass(frozen=True, kw_only=True)
 class RunPoint:
-    """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations."""
+    """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations.
+
+    ``begun``: the ticks at this time have happened already.
+    """
 
     time: float
     x: Vector
+    begun: bool = False
     z: Vector = field(default_factory=lambda: NO_NUMBERS)
     w: Vector = field(default_factory=lambda: NO_NUMBERS)
 
@@ -92,8 +96,7 @@ class NativeIntegrator:
     ) -> Integration:
         """A run from ``start`` to ``samples[-1]``, ready for its first step.
 
-        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point at which ticks have happened already
-        unless its time is 0. ``samples`` (N,) s, rising strictly: the instants that are recorded.
+        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, rising strictly: the instants that are recorded.
         ``breakpoints`` (nb,) s, in any order: a step ends exactly on each that lies inside, what comes before
         sees ``f`` at most at the last double before it, and what comes after starts anew. ``step`` s: grid of
         a fixed-step method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive
@@ -115,7 +118,7 @@ class NativeIntegrator:
             run.counts[Count.STARTED :] = checkpoint.counts[Count.STARTED :]
             run.counts[[Count.ACCEPTED, Count.REJECTED, Count.EVALUATIONS, Count.INSTANTS, Count.EVENTS]] = 0
         else:
-            run.place(start, step=step, first=start.time == 0.0)
+            run.place(start, step=step, first=not start.begun)
         run.reals[Real.RTOL] = rtol
         run.reals[Real.ATOL] = atol
         run.reals[Real.MAX_STEP] = max_step
@@ -207,6 +210,10 @@ class Integration:
         if np.isnan(self._saved.reals[Real.TIME]):
             return None
         return Checkpoint(reals=self._saved.reals.copy(), counts=self._saved.counts.copy())
+
+    def now(self) -> Checkpoint:
+        """The arrays as they are, between two calls of :meth:`advance`."""
+        return Checkpoint(reals=self.reals.copy(), counts=self.counts.copy())
 
     @property
     def point(self) -> RunPoint:

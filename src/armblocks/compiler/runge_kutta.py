@@ -44,6 +44,7 @@ _KEPT_COUNTS = (
     Count.REJECTED,
     Count.EVALUATIONS,
     Count.FRESH,
+    Count.SAVED,
 )
 
 
@@ -135,14 +136,15 @@ class Loop:
         for place, variable in self.counts.items():
             w.put(w.get(variable, "i64"), w.at("%counts", place, "i64"), "i64")
 
-    def emit_checkpoint(self, new_time: str) -> None:
-        """Save the state before a step that would end with the run: a longer run would take another step.
+    def emit_checkpoint(self, condition: str) -> None:
+        """Save the state, once, before the end of the run first bounds a step: a longer run would go on here.
 
-        The first step after a start is saved as the start, because the end of the run bounds its length.
+        The first step after a start is saved as the start, because the end bounds the choice of its length.
         """
         w = self.w
         last, on = w.fresh("last"), w.fresh("on")
-        w.branch(w.compare("oge", new_time, self.last_end), last, on)
+        unsaved = w.word_test("eq", w.get(self.counts[Count.SAVED], "i64"), "0")
+        w.branch(w.both(condition, unsaved), last, on)
         w.place(last)
         self.emit_keep()
         w.module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
@@ -153,6 +155,7 @@ class Loop:
         fresh = w.word_test("ne", w.get(self.counts[Count.FRESH], "i64"), "0")
         stage = w.let(f"select i1 {fresh}, i64 {int(Stage.START)}, i64 {int(Stage.RUNNING)}")
         w.put(stage, w.at("%saved_counts", Count.STARTED, "i64"), "i64")
+        w.put("1", self.counts[Count.SAVED], "i64")
         w.place(on)
 
     def leave(self, status: Status) -> None:
@@ -184,7 +187,9 @@ class Loop:
         """The length of the step after a start."""
         w = self.w
         interval = w.subtract(w.get(self.end), time)
-        w.put(self.step.first_step(time, interval, self.max_step), self.kept[Real.STEP])
+        length, bounded = self.step.first_step(time, interval, self.max_step)
+        self.emit_checkpoint(w.both(bounded, w.compare("oge", w.get(self.end), self.last_end)))
+        w.put(length, self.kept[Real.STEP])
 
     def emit_trial(self, time: str, new_time: str) -> str:
         """Stages of a step to ``new_time``; gives its length."""
@@ -204,7 +209,8 @@ class Loop:
         following = w.from_bits(w.word_op("add", w.bits(time), "1"))
         shortest = w.multiply(number_text(10.0), w.subtract(following, time))
         w.put(w.minimum(w.maximum(w.get(length), shortest), self.max_step), length)
-        self.emit_checkpoint(w.add(time, w.get(length)))
+        new_time = w.minimum(w.add(time, w.get(length)), w.get(self.end))
+        self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
         growth = w.variable("double", number_text(GROW))
         attempt, rejected, too_small, accepted = (
             w.fresh(stem) for stem in ("attempt", "rejected", "small", "accepted")
@@ -254,7 +260,7 @@ class Loop:
         # An instant a rounding error before the end is the end: no step of 1e-16 s.
         last = w.compare("oge", w.fma(spacing, number_text(1e-9), instant), end)
         new_time = self.bounded(time, w.select(last, end, instant))
-        self.emit_checkpoint(new_time)
+        self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
         self.emit_trial(time, new_time)
         self.leave_unless(step.all_finite(step.y, step.K(self.tableau.stages)), Status.NON_FINITE)
 

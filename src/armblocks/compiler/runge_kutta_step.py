@@ -114,8 +114,11 @@ class StepWriter:
         nothing = w.compare("oeq", denominator, number_text(0.0))
         return w.select(nothing, number_text(0.0), norm)
 
-    def first_step(self, time: str, interval: str, max_step: str) -> str:
-        """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it."""
+    def first_step(self, time: str, interval: str, max_step: str) -> tuple[str, str]:
+        """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it.
+
+        And whether the interval's length, the end of the run perhaps, has had a part in it.
+        """
         w = self.w
 
         def weighted(value: Callable[[str], str]) -> Callable[[str], str]:
@@ -126,6 +129,7 @@ class StepWriter:
         tiny = number_text(1e-5)
         small = w.either(w.compare("olt", d0, tiny), w.compare("olt", d1, tiny))
         h0 = w.select(small, number_text(1e-6), w.divide(w.multiply(number_text(0.01), d0), d1))
+        clipped = w.compare("oge", h0, interval)
         h0 = w.minimum(h0, interval)
         self.move((1.0,), h0)
         self.evaluate(w.add(time, h0), self.y, 1)
@@ -141,7 +145,7 @@ class StepWriter:
             w.inverse_root(bounded, self.tableau.error_order + 1),
         )
         h = w.minimum(h1, w.multiply(number_text(100.0), h0))
-        return w.minimum(w.minimum(h, interval), max_step)
+        return w.minimum(w.minimum(h, interval), max_step), clipped
 
     # Between steps.
 

@@ -38,9 +38,19 @@ class Plan:
     max_step: float
 
 
-def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
-    """Settle every open choice of ``options``. Raises ``InputError`` for values that cannot be run."""
+def make_plan(system: CompiledSystem, options: SimulationOptions, start: float = 0.0) -> Plan:
+    """Settle every open choice of ``options`` for a run that begins at ``start``.
+
+    Raises ``InputError`` for values that cannot be run.
+    """
     stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
+    if start > 0.0 and stop <= start:
+        raise InputError(
+            f"stop_time is {stop:g} s, and the run goes on from {start:g} s",
+            where=system.name,
+            allowed=f"a time after {start:g} s: stop_time counts from 0, not from the saved state",
+            fix=f"for 1 s more, stop_time={start + 1.0:g}",
+        )
     step = options.step
     if step is not None:
         step = _number("step", step, "a time in s above 0, at most the stop time", above=0.0)
@@ -70,7 +80,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
         tableau=tableau,
         solver=solver,
         reason=reason,
-        instants=sample_instants(stop, sample_time),
+        instants=sample_instants(stop, sample_time, start),
         step=step if step is not None else sample_time,
         max_step=max_step,
     )
@@ -131,8 +141,8 @@ def _sample_time(
     return sample_time
 
 
-def sample_instants(stop: float, sample_time: float) -> Array:
-    """``k sample_time`` for ``k = 0, 1, …`` below ``stop``, and ``stop`` itself, ``(N,)`` s.
+def sample_instants(stop: float, sample_time: float, start: float = 0.0) -> Array:
+    """``start``, ``k sample_time`` for ``k = 0, 1, …`` between, and ``stop`` itself, ``(N,)`` s.
 
     Each is one product, never a sum, so no error grows. An instant within a billionth of a sample time of the
     stop time is the stop time.
@@ -140,6 +150,9 @@ def sample_instants(stop: float, sample_time: float) -> Array:
     last = math.ceil(stop / sample_time - 1e-9)
     instants: Array = np.arange(last + 1, dtype=np.float64) * sample_time
     instants[-1] = stop
+    if start > 0.0:
+        after = instants[instants > start + 1e-9 * sample_time]
+        instants = np.concatenate([[start], after if after.size else [stop]])
     return instants
 
 

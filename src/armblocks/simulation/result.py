@@ -17,6 +17,8 @@ from armblocks.errors import UnknownNameError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from armblocks.simulation.run_state import RunState
+
 Array = NDArray[np.float64]
 
 
@@ -57,7 +59,8 @@ class SimulationResult:
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
-    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used.
+    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used;
+    ``final_state`` what a run needs to go on from here, ``None`` where it failed.
     """
 
     name: str
@@ -70,6 +73,7 @@ class SimulationResult:
     parameter_values: Array
     aliases: Mapping[str, str]
     run: RunReport
+    final_state: RunState | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

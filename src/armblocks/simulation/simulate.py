@@ -16,6 +16,7 @@ from armblocks.errors import SimulationError
 from armblocks.simulation.diagnosis import first_bad_signal, integration_failure, stiffness_hint
 from armblocks.simulation.plan import Plan, make_plan, parameter_vector
 from armblocks.simulation.result import RunReport, SimulationResult
+from armblocks.simulation.run_state import RunState, check_state, settings_text, slot_names
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, float, float], None]
@@ -31,8 +32,13 @@ def simulate(
     options: SimulationOptions,
     parameters: Mapping[str, ArrayLike] | ArrayLike | None = None,
     progress: Progress | None = None,
+    initial_state: RunState | None = None,
 ) -> SimulationResult:
     """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
+
+    With an ``initial_state``, another run's ``final_state``, it goes on from there to ``stop_time``: bit for
+    bit as if that run had not ended, if solver, settings and parameters are the same, else started anew from
+    its values; ``run.reason`` says which.
 
     ``parameters`` changes tunable ones: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
     ``progress(time, fraction, real_time_factor)`` is called at most some 16 times a second and at the end.
@@ -50,8 +56,10 @@ def simulate(
     """
     begun = perf_counter()
     p = parameter_vector(compiled, parameters)
-    plan = make_plan(compiled, options)
-    return _Run(compiled, options, plan, p, begun, progress).result()
+    if initial_state is not None:
+        check_state(compiled, initial_state)
+    plan = make_plan(compiled, options, 0.0 if initial_state is None else initial_state.time)
+    return _Run(compiled, options, plan, p, begun, progress, initial_state).result()
 
 
 def _check_initial(compiled: CompiledSystem, layout: Signature, values: Array) -> None:
@@ -78,6 +86,7 @@ class _Run:
         p: Array,
         begun: float,
         progress: Progress | None,
+        initial_state: RunState | None,
     ) -> None:
         self.compiled = compiled
         self.options = options
@@ -85,6 +94,9 @@ class _Run:
         self.p = p
         self.begun = begun
         self.progress = progress
+        self.initial_state = initial_state
+        self.reason = plan.reason
+        self.settings = ""
         self.integration: Integration | None = None
         self.message = ""
         self.complete = True
@@ -111,7 +123,7 @@ class _Run:
         if failure is not None:
             self.complete = False
             self.message = " ".join(part for part in (failure.what + ".", self.message) if part)
-            failure.partial = self.make_result(instants, states, signals)
+            failure.partial = self.make_result(instants, states, signals, failed=True)
             raise failure
         if self.progress is not None and self.complete:
             self.show(float(instants[-1]))
@@ -121,15 +133,27 @@ class _Run:
         """Take all steps, in chunks, until the end, a failure or Ctrl-C."""
         compiled, options, plan = self.compiled, self.options, self.plan
         assert plan.tableau is not None
-        start = RunPoint(
-            time=0.0,
-            x=compiled.initial_states(self.p),
-            z=compiled.initial_discrete(self.p),
-            w=compiled.initial_algebraic(self.p),
-        )
-        for layout, values in ((compiled.states, start.x), (compiled.discrete, start.z)):
-            _check_initial(compiled, layout, values)
-        integration = compiled.integrator(plan.tableau).begin(
+        native = compiled.integrator(plan.tableau)
+        step = 0.0 if plan.tableau.adaptive else plan.step
+        numbers = (step, options.rtol, options.atol, plan.max_step)
+        self.settings = settings_text(native.key, numbers, self.p)
+        checkpoint = None
+        if self.initial_state is not None:
+            start = self.resume_from(self.initial_state)
+            if self.initial_state.settings == self.settings:
+                checkpoint = self.initial_state.checkpoint
+            how = "exactly as the run before" if checkpoint is not None else "started anew"
+            self.reason = f"{plan.reason}; goes on from {start.time:g} s, {how}"
+        else:
+            start = RunPoint(
+                time=0.0,
+                x=compiled.initial_states(self.p),
+                z=compiled.initial_discrete(self.p),
+                w=compiled.initial_algebraic(self.p),
+            )
+            for layout, values in ((compiled.states, start.x), (compiled.discrete, start.z)):
+                _check_initial(compiled, layout, values)
+        integration = native.begin(
             start,
             self.p,
             plan.instants,
@@ -138,6 +162,7 @@ class _Run:
             rtol=options.rtol,
             atol=options.atol,
             max_step=plan.max_step,
+            checkpoint=checkpoint,
         )
         self.integration = integration
         steps = 1000
@@ -155,6 +180,33 @@ class _Run:
             self.message = f"stopped by Ctrl-C at {integration.time:g} s of {options.stop_time:g} s"
         return integration
 
+    @staticmethod
+    def resume_from(state: RunState) -> RunPoint:
+        """The values of a saved state."""
+        return RunPoint(time=state.time, x=state.states, z=state.discrete, w=state.algebraic, begun=True)
+
+    def final_state(self) -> RunState:
+        """What a run needs to go on from where this one stands."""
+        compiled, integration = self.compiled, self.integration
+        checkpoint = None
+        if integration is None:
+            point = RunPoint(time=float(self.plan.instants[-1]), x=np.empty(0))
+        else:
+            point = integration.point
+            checkpoint = integration.checkpoint
+            if checkpoint is None and integration.status is Status.PAUSED:
+                checkpoint = integration.now()  # stopped between two steps: the next one goes on from here
+        return RunState(
+            name=compiled.name,
+            time=point.time,
+            states=point.x,
+            discrete=point.z,
+            algebraic=point.w,
+            names=slot_names(compiled),
+            settings=self.settings,
+            checkpoint=checkpoint,
+        )
+
     def show(self, time: float) -> None:
         """Tell the progress."""
         self.shown = perf_counter()
@@ -167,13 +219,15 @@ class _Run:
         if hint:
             self.message = f"{self.message}. {hint}" if self.message else hint
 
-    def make_result(self, instants: Array, states: Array, signals: Array) -> SimulationResult:
+    def make_result(
+        self, instants: Array, states: Array, signals: Array, *, failed: bool = False
+    ) -> SimulationResult:
         compiled, plan, integration = self.compiled, self.plan, self.integration
         wall_time = perf_counter() - self.begun
         reached = float(instants[-1]) if instants.size else 0.0
         report = RunReport(
             solver=plan.solver,
-            reason=plan.reason,
+            reason=self.reason,
             steps=0 if integration is None else integration.accepted,
             rejected=0 if integration is None else integration.rejected,
             evaluations=0 if integration is None else integration.evaluations,
@@ -195,4 +249,5 @@ class _Run:
             parameter_values=self.p,
             aliases=compiled.aliases,
             run=report,
+            final_state=None if failed else self.final_state(),
         )
