@@ -7,6 +7,7 @@ from armblocks.blocks import (
     continuous,
     discontinuities,
     discrete,
+    expression,
     joint_control,
     joint_paths,
     logic,
@@ -73,6 +74,7 @@ from armblocks.blocks.discrete import (
     UnitDelay,
     ZeroOrderHold,
 )
+from armblocks.blocks.expression import Expression
 from armblocks.blocks.joint_control import (
     ComputedTorque,
     FeedForward,
@@ -218,6 +220,7 @@ BLOCKS = BlockLibrary(
         poses,
         joint_paths,
         joint_control,
+        expression,
     )
     for kind in _defined_in(family)
 )
@@ -270,6 +273,7 @@ __all__ = [
     "Divide",
     "DotProduct",
     "Eul2T",
+    "Expression",
     "ExtractDiagonal",
     "Extremum",
     "FeedForward",

@@ -267,7 +267,7 @@ class FeedForward(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive(Block):
-    """A drive's limits: y = u held within its current limit, peak, and its voltage limit, stall (1 -+ w / w0).
+    """A drive's limits: y = u held within its current limit, peak, and voltage limit, stall (1 -+ w / w0).
 
     The voltage limit is the torque-speed line of a DC motor: ``stall`` at rest and 0 at ``no_load_speed`` w0,
     for torques that drive; beyond w0 the drive can only brake.
