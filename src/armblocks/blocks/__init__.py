@@ -5,11 +5,15 @@ from types import ModuleType
 from armblocks.blocks import (
     arithmetic,
     continuous,
+    delays,
     discontinuities,
     discrete,
+    discrete_filters,
+    dry_friction,
     expression,
     joint_control,
     joint_paths,
+    limited_integrators,
     logic,
     lookup,
     maths,
@@ -43,36 +47,40 @@ from armblocks.blocks.arithmetic import (
     UnaryMinus,
 )
 from armblocks.blocks.continuous import PID, Derivative, Integrator, StateSpace, TransferFunction
-from armblocks.blocks.discontinuities import (
-    Backlash,
-    CoulombFriction,
-    DeadZone,
-    IntegratorLimited,
-    PulseGenerator,
-    Quantizer,
-    Relay,
-    ResettableIntegrator,
-    Saturation,
-    StickSlipFriction,
-    Switch,
-)
-from armblocks.blocks.discrete import (
-    CounterLimited,
+from armblocks.blocks.delays import (
     Delay,
-    Difference,
-    DigitalClock,
-    DiscreteDerivative,
-    DiscreteFilter,
-    DiscreteFir,
-    DiscreteIntegrator,
-    DiscretePID,
-    DiscreteStateSpace,
-    DiscreteTransferFunction,
-    RateLimiter,
     RateTransition,
     TappedDelay,
     UnitDelay,
     ZeroOrderHold,
+)
+from armblocks.blocks.discontinuities import (
+    DeadZone,
+    PulseGenerator,
+    Quantizer,
+    Relay,
+    Saturation,
+    Switch,
+)
+from armblocks.blocks.discrete import (
+    CounterLimited,
+    Difference,
+    DigitalClock,
+    DiscreteDerivative,
+    DiscreteIntegrator,
+    DiscretePID,
+    RateLimiter,
+)
+from armblocks.blocks.discrete_filters import (
+    DiscreteFilter,
+    DiscreteFir,
+    DiscreteStateSpace,
+    DiscreteTransferFunction,
+)
+from armblocks.blocks.dry_friction import (
+    Backlash,
+    CoulombFriction,
+    StickSlipFriction,
 )
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.joint_control import (
@@ -88,6 +96,10 @@ from armblocks.blocks.joint_control import (
     RobotEnergy,
 )
 from armblocks.blocks.joint_paths import CirclePath, CTraj, MultiSegment, Trapezoidal
+from armblocks.blocks.limited_integrators import (
+    IntegratorLimited,
+    ResettableIntegrator,
+)
 from armblocks.blocks.logic import (
     CombinatorialLogic,
     CompareToConstant,
@@ -203,8 +215,12 @@ BLOCKS = BlockLibrary(
         sources,
         maths,
         continuous,
+        limited_integrators,
         discontinuities,
+        dry_friction,
+        delays,
         discrete,
+        discrete_filters,
         routing,
         transforms,
         robots,
