@@ -96,12 +96,12 @@ class NativeIntegrator:
     ) -> Integration:
         """A run from ``start`` to ``samples[-1]``, ready for its first step.
 
-        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, rising strictly: the instants that are recorded.
-        ``breakpoints`` (nb,) s, in any order: a step ends exactly on each that lies inside, what comes before
-        sees ``f`` at most at the last double before it, and what comes after starts anew. ``step`` s: grid of
-        a fixed-step method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive
-        methods. With a ``checkpoint`` the run goes on from there, as the run that left it would have. Nothing
-        is checked.
+        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, rising strictly:
+        the instants that are recorded. ``breakpoints`` (nb,) s, in any order: a step ends exactly on each
+        that lies inside, what comes before sees ``f`` at most at the last double before it, and what comes
+        after starts anew. ``step`` s: grid of a fixed-step method (its instants are ``k step``); ``rtol``,
+        ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the run goes on from there, as
+        the run that left it would have. Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
