@@ -47,21 +47,8 @@ from armblocks.blocks.arithmetic import (
     UnaryMinus,
 )
 from armblocks.blocks.continuous import PID, Derivative, Integrator, StateSpace, TransferFunction
-from armblocks.blocks.delays import (
-    Delay,
-    RateTransition,
-    TappedDelay,
-    UnitDelay,
-    ZeroOrderHold,
-)
-from armblocks.blocks.discontinuities import (
-    DeadZone,
-    PulseGenerator,
-    Quantizer,
-    Relay,
-    Saturation,
-    Switch,
-)
+from armblocks.blocks.delays import Delay, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
+from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
 from armblocks.blocks.discrete import (
     CounterLimited,
     Difference,
@@ -77,11 +64,7 @@ from armblocks.blocks.discrete_filters import (
     DiscreteStateSpace,
     DiscreteTransferFunction,
 )
-from armblocks.blocks.dry_friction import (
-    Backlash,
-    CoulombFriction,
-    StickSlipFriction,
-)
+from armblocks.blocks.dry_friction import Backlash, CoulombFriction, StickSlipFriction
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.joint_control import (
     ComputedTorque,
@@ -96,10 +79,7 @@ from armblocks.blocks.joint_control import (
     RobotEnergy,
 )
 from armblocks.blocks.joint_paths import CirclePath, CTraj, MultiSegment, Trapezoidal
-from armblocks.blocks.limited_integrators import (
-    IntegratorLimited,
-    ResettableIntegrator,
-)
+from armblocks.blocks.limited_integrators import IntegratorLimited, ResettableIntegrator
 from armblocks.blocks.logic import (
     CombinatorialLogic,
     CompareToConstant,
