@@ -19,15 +19,18 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
     circle whose residual is not linear in its unknowns remains.
     """
     solution, remaining = SX(w), list[int]()
-    for circle in _circles(jacobian(residual, w)):
-        unknowns = w[circle]
-        own = substitute(residual[circle], w, solution)
-        slope = jacobian(own, unknowns)
+    slopes = jacobian(residual, w)
+    needs = _needs(slopes)
+    for circle in _circles(needs):
+        unknowns, slope = w[circle], slopes[circle, circle]
         if depends_on(slope, unknowns):
             remaining.extend(circle)
-        else:
-            constant = substitute(own, unknowns, SX.zeros(len(circle)))
-            solution[circle] = -_divided(densify(constant), slope)
+            continue
+        constant = substitute(residual[circle], unknowns, SX.zeros(len(circle)))
+        solved = -_divided(densify(constant), slope)
+        # What was solved before is put in last, into a small expression, so that work grows with the count.
+        before = sorted({place for row in circle for place in needs[row]} - set(circle))
+        solution[circle] = substitute(solved, w[before], solution[before]) if before else solved
     return solution, sorted(remaining)
 
 
@@ -44,13 +47,18 @@ def _divided(right: SX, matrix: SX) -> SX:
     return solve(matrix, right)
 
 
-def _circles(slope: SX) -> list[list[int]]:
-    """The strongly connected components of who needs whom, those needed first (Tarjan, iterative)."""
-    count = slope.shape[0]
-    needs: list[list[int]] = [[] for _ in range(count)]
+def _needs(slope: SX) -> list[list[int]]:
+    """The unknowns in each residual, by the sparsity of its derivative."""
+    needs: list[list[int]] = [[] for _ in range(slope.shape[0])]
     sparsity = slope.sparsity()
     for row, column in zip(sparsity.row(), sparsity.get_col()):
         needs[row].append(column)
+    return needs
+
+
+def _circles(needs: list[list[int]]) -> list[list[int]]:
+    """The strongly connected components of who needs whom, those needed first (Tarjan, iterative)."""
+    count = len(needs)
     number: dict[int, int] = {}
     lowest: dict[int, int] = {}
     stack: list[int] = []
@@ -91,9 +99,9 @@ def check_solvable(
     ``loops[i]``: the signals around the loop of unknown ``i``. Only what follows from the parameters alone is
     found here; what depends on states or the time is noticed when it happens.
     """
-    for circle in _circles(jacobian(residual, w)):
-        unknowns, own = w[circle], residual[circle]
-        slope = jacobian(own, unknowns)
+    slopes = jacobian(residual, w)
+    for circle in _circles(_needs(slopes)):
+        unknowns, own, slope = w[circle], residual[circle], slopes[circle, circle]
         if not _over(slope, p):
             continue
         matrix = _number(slope, p, values)
