@@ -81,15 +81,25 @@ class DiagramError(ArmblocksError):
 
 
 class AlgebraicLoopError(DiagramError):
-    """Blocks that feed each other with nothing in between that holds a state; ``loop`` lists them."""
+    """Signals that depend on each other at the same instant in a way that cannot be solved.
 
-    def __init__(self, loop: Sequence[str], *, where: str = "") -> None:
+    ``loop`` lists them in the direction in which they flow; ``why`` says what stands in the way.
+    """
+
+    def __init__(
+        self,
+        loop: Sequence[str],
+        *,
+        where: str = "",
+        why: str = "",
+        allowed: str = "every loop passes through a block with a state, such as Integrator",
+        fix: str = "break the loop with an Integrator or remove one of these connections",
+    ) -> None:
         self.loop = tuple(loop)
+        self.why = why
+        chain = " -> ".join((*self.loop, *self.loop[:1]))
         super().__init__(
-            "algebraic loop: " + " -> ".join((*self.loop, *self.loop[:1])),
-            where=where,
-            allowed="every loop passes through a block with a state, such as Integrator",
-            fix="break the loop with an Integrator or remove one of these connections",
+            f"algebraic loop{' ' * bool(why)}{why}: {chain}", where=where, allowed=allowed, fix=fix
         )
 
 

@@ -15,6 +15,10 @@ def evaluate(block: Block, *inputs: ArrayLike, t: float = 0.0, x: ArrayLike = ()
     sources = [builder.add(f"in{k}", Constant(value=value)) for k, value in enumerate(inputs)]
     builder.add("block", block, *sources)
     system = trace_diagram(builder.build())
-    (y,) = system.signals(t, x, system.parameter_values)
+    p = system.parameter_values
+    (z,) = system.initial_discrete(p)
+    # a reset without events: the modes settle
+    _, settled = system.reset(t, x, z, (), p, np.zeros(system.guards.outputs.size))
+    (y,) = system.signals(t, x, settled, (), p)
     values = system.signals_layout.unpack(y)
     return {path.removeprefix("block/"): value for path, value in values.items() if path[:6] == "block/"}

@@ -13,7 +13,7 @@ from casadi import SX
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, hermite_dense
 from armblocks.compiler.from_casadi import tape_from
-from armblocks.compiler.integrator_workspace import Status
+from armblocks.compiler.integrator_workspace import LoopSizes, Status
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.native import load_code
@@ -52,12 +52,12 @@ def integrator(
 ) -> NativeIntegrator:
     traced = TracedFunction.trace(
         "f",
-        signature(("t", ()), ("x", (states,)), ("p", (parameters,))),
+        signature(("t", ()), ("x", (states,)), ("z", (0,)), ("w", (0,)), ("p", (parameters,))),
         signature(("xd", (states,))),
-        equations,
+        lambda t, x, z, w, p: equations(t, x, p),
     )
     tape = tape_from(traced)
-    return NativeIntegrator(states, tape.digest, lambda: tape, tableau)
+    return NativeIntegrator(LoopSizes(states=states), {"derivative": tape.digest}, lambda name: tape, tableau)
 
 
 NONE = np.empty(0)

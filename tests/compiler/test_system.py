@@ -10,7 +10,7 @@ import pytest
 
 from armblocks.compiler import cache
 from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
-from armblocks.equations import HybridSystem, TracedFunction, signature
+from armblocks.equations import HybridSystem, TracedFunction, continuous_system, signature
 from armblocks.errors import CompileError
 
 
@@ -18,7 +18,7 @@ def pendulum(length: float = 2.0) -> HybridSystem:
     """Angle and rate, two signals, a parameter and a breakpoint."""
     ends = signature(("t", ()), ("x", (2,)), ("p", (2,)))
     p = signature(("p", (2,)))
-    return HybridSystem(
+    return continuous_system(
         name="pendulum",
         states=signature(("arm/q", (2,), "rad")),
         parameters=signature(("arm.g", (), "m/s^2"), ("step.time", (), "s")),
@@ -51,21 +51,24 @@ def test_signals_of_a_batch_are_those_of_casadi(count: int) -> None:
     system = pendulum()
     compiled = compile_system(system)
     random = np.random.default_rng(count)
+    no = np.empty((count, 0))
     t, x, p = random.uniform(0, 1, count), random.normal(size=(count, 2)), np.array([9.81, 0.3])
-    y = compiled.evaluate_signals(t, x, p)
+    y = compiled.evaluate_signals(t, x, no, no, p)
     assert y.shape == (5, count)
-    expected = np.array([system.signals(t[k], x[k], p)[0] for k in range(min(count, 20))])
+    expected = np.array([system.signals(t[k], x[k], (), (), p)[0] for k in range(min(count, 20))])
     np.testing.assert_allclose(y[:, :20].T, expected, rtol=1e-14, atol=1e-15)
 
 
 def test_one_instant_and_many_give_the_same_bits() -> None:
     compiled = compile_system(pendulum())
     random = np.random.default_rng(5)
+    no = np.empty((37, 0))
     t, x, p = random.uniform(0, 1, 37), random.normal(size=(37, 2)), np.array([9.81, 0.3])
-    whole = compiled.evaluate_signals(t, x, p)
+    whole = compiled.evaluate_signals(t, x, no, no, p)
     for k in range(37):
         assert (
-            compiled.evaluate_signals(t[k : k + 1], x[k : k + 1], p)[:, 0].tobytes() == whole[:, k].tobytes()
+            compiled.evaluate_signals(t[k : k + 1], x[k : k + 1], no[:1], no[:1], p)[:, 0].tobytes()
+            == whole[:, k].tobytes()
         )
 
 
@@ -75,11 +78,14 @@ def test_derivative_start_and_breakpoints_follow_the_parameters() -> None:
     assert compiled.initial_states(p).tolist() == [0.5, 0.0]
     assert compiled.breakpoints(p).tolist() == [0.7]
     np.testing.assert_allclose(
-        compiled.derivative(0.0, np.array([0.4, 1.0]), p), [1.0, -2.5 * np.sin(0.4)], rtol=1e-15
+        compiled.derivative(0.0, np.array([0.4, 1.0]), np.empty(0), np.empty(0), p),
+        [1.0, -2.5 * np.sin(0.4)],
+        rtol=1e-15,
     )
 
 
 def same(one: CompiledSystem, other: CompiledSystem) -> bool:
+    no = np.empty((9, 0))
     t, x = np.linspace(0, 1, 9), np.linspace(-1, 1, 18).reshape(9, 2)
     p = one.parameter_values
     return (
@@ -88,7 +94,8 @@ def same(one: CompiledSystem, other: CompiledSystem) -> bool:
         == (other.states, other.parameters, other.signals_layout)
         and one.aliases == other.aliases
         and p.tobytes() == other.parameter_values.tobytes()
-        and one.evaluate_signals(t, x, p).tobytes() == other.evaluate_signals(t, x, p).tobytes()
+        and one.evaluate_signals(t, x, no, no, p).tobytes()
+        == other.evaluate_signals(t, x, no, no, p).tobytes()
     )
 
 
@@ -104,7 +111,9 @@ def never() -> HybridSystem:
 
 def test_a_known_key_is_recalled_without_tracing(own_cache: Path) -> None:
     first = recall_system("pendulum 2 m", pendulum)
-    first.evaluate_signals(np.zeros(1), np.zeros((1, 2)), first.parameter_values)
+    first.evaluate_signals(
+        np.zeros(1), np.zeros((1, 2)), np.empty((1, 0)), np.empty((1, 0)), first.parameter_values
+    )
     second = recall_system("pendulum 2 m", never)
     assert same(first, second)
     assert second.tape("derivative").digest == first.tape("derivative").digest

@@ -15,32 +15,33 @@ from armblocks.blocks import (
     TransferFunction,
 )
 from armblocks.diagram import DiagramBuilder, trace_diagram
+from armblocks.diagram.trace import diagram_model
 from armblocks.errors import AlgebraicLoopError
 
 
-def test_a_loop_without_a_state_is_printed_in_the_direction_of_its_signals() -> None:
+def loops_of(builder: DiagramBuilder) -> dict[str, tuple[str, ...]]:
+    """The loops of the flow, by the signal at which they are cut."""
+    model = diagram_model(builder.build())
+    return {loop[-1]: loop for loop in model.flow_order.loops.values()}
+
+
+def test_a_loop_without_a_state_is_known_in_the_direction_of_its_signals() -> None:
     builder = DiagramBuilder("d")
     total = builder.add("sum", Sum(signs="+-"), builder.add("one", Constant()))
     half = builder.add("half", Gain(gain=0.5), total)
     third = builder.add("third", Gain(gain=0.3), half)
     builder.connect(third, total["u2"])
     builder.add("after", Gain(), total)
-    with pytest.raises(AlgebraicLoopError) as caught:
-        builder.build()
-    loop = caught.value.loop
-    assert set(loop) == {"sum/y", "half/y", "third/y"}
+    (loop,) = loops_of(builder).values()
     place = loop.index("sum/y")
     assert loop[place:] + loop[:place] == ("sum/y", "half/y", "third/y")
-    assert "diagram 'd': algebraic loop: " in str(caught.value)
-    assert "every loop passes through a block with a state" in str(caught.value)
 
 
 def test_a_gain_of_zero_does_not_hide_a_loop() -> None:
     builder = DiagramBuilder("d")
     gain = builder.add("gain", Gain(gain=0.0))
     builder.connect(gain, gain)
-    with pytest.raises(AlgebraicLoopError, match="gain/y -> gain/y"):
-        builder.build()
+    assert loops_of(builder) == {"gain/y": ("gain/y",)}
 
 
 def test_an_integrator_breaks_a_loop_and_a_strictly_proper_filter_does() -> None:
@@ -58,8 +59,7 @@ def test_feedthrough_closes_a_loop(block: TransferFunction | StateSpace) -> None
     builder = DiagramBuilder("d")
     x = builder.add("x", block)
     builder.connect(builder.add("back", Gain(gain=-1.0), x), x)
-    with pytest.raises(AlgebraicLoopError):
-        builder.build()
+    assert {frozenset(loop) for loop in loops_of(builder).values()} == {frozenset({"x/y", "back/y"})}
 
 
 def test_a_derivative_of_itself_is_a_loop() -> None:
@@ -79,16 +79,20 @@ def test_a_derivative_in_an_algebraic_loop_is_a_loop() -> None:
 
 
 def test_a_state_whose_rate_needs_its_own_rate_is_a_loop() -> None:
-    # x' = d/dt x, and x' = d2/dt2 x, where the orders would rise for ever
-    for count in (1, 2):
-        builder = DiagramBuilder("d")
-        x = builder.add("x", Integrator())
-        last = x
-        for k in range(count):
-            last = builder.add(f"rate{k}", Derivative(), last)
-        builder.connect(builder.add("back", Gain(gain=0.5), last), x)
-        with pytest.raises(AlgebraicLoopError):
-            builder.build()
+    # x' = d2/dt2 x / 2, where the orders would rise for ever
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator())
+    second = builder.add("second", Derivative(), builder.add("first", Derivative(), x))
+    builder.connect(builder.add("back", Gain(gain=0.5), second), x)
+    with pytest.raises(AlgebraicLoopError, match=r"diagram 'd': algebraic loop: .*every loop passes through"):
+        builder.build()
+    # x' = t + x' / 2: the same order, so x' = 2 t
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator())
+    half = builder.add("half", Gain(gain=0.5), builder.add("rate", Derivative(), x))
+    builder.connect(builder.add("sum", Sum(), builder.add("clock", Clock()), half), x)
+    system = trace_diagram(builder.build())
+    assert system.derivative(3.0, [0.0], (), (), system.parameter_values)[0].tolist() == [6.0]
 
 
 def test_higher_derivatives_of_a_state_are_no_loop() -> None:
@@ -99,7 +103,7 @@ def test_higher_derivatives_of_a_state_are_no_loop() -> None:
     for k in range(4):
         last = builder.add(f"rate{k}", Derivative(), last)
     system = trace_diagram(builder.build())
-    (y,) = system.signals(0.0, [2.0], system.parameter_values)
+    (y,) = system.signals(0.0, [2.0], (), (), system.parameter_values)
     signals = system.signals_layout.unpack(y)
     assert [float(signals[f"rate{k}/y"]) for k in range(4)] == [-6.0, 18.0, -54.0, 162.0]
 

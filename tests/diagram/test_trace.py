@@ -46,7 +46,7 @@ from armblocks.errors import DiagramError
 
 
 def signals_at(system: HybridSystem, t: float, x: Sequence[float] = ()) -> dict[str, np.ndarray]:
-    (y,) = system.signals(t, x, system.parameter_values)
+    (y,) = system.signals(t, x, (), (), system.parameter_values)
     return system.signals_layout.unpack(y)
 
 
@@ -73,7 +73,7 @@ def test_paths_and_aliases() -> None:
 
 def test_states_and_parameters_meet_in_the_equations() -> None:
     system = trace_diagram(falling())
-    (rate,) = system.derivative(0.0, [1.0, 2.0], system.parameter_values)
+    (rate,) = system.derivative(0.0, [1.0, 2.0], (), (), system.parameter_values)
     assert rate.tolist() == [2.0, -9.81]
     assert system.initial_states(system.parameter_values)[0].tolist() == [10.0, 0.0]
     assert system.initial_states([-9.81, 7.0, 3.0])[0].tolist() == [7.0, 3.0]
@@ -139,8 +139,8 @@ def test_the_order_of_building_changes_no_signal() -> None:
         assert system.signals_layout == reference.signals_layout
         assert system.parameter_values.tolist() == reference.parameter_values.tolist()
         for function in ("signals", "derivative"):
-            (values,) = getattr(system, function)(0.7, x, system.parameter_values)
-            (expected,) = getattr(reference, function)(0.7, x, reference.parameter_values)
+            (values,) = getattr(system, function)(0.7, x, (), (), system.parameter_values)
+            (expected,) = getattr(reference, function)(0.7, x, (), (), reference.parameter_values)
             assert values.tolist() == expected.tolist()
 
 
@@ -203,7 +203,7 @@ def test_a_derivative_may_feed_a_state() -> None:
     rate = builder.add("rate", Derivative(), builder.add("sine", SineWave(frequency=2.0)))
     builder.add("x", Integrator(), rate)
     system = trace_diagram(builder.build())
-    (xd,) = system.derivative(0.3, [0.0], system.parameter_values)
+    (xd,) = system.derivative(0.3, [0.0], (), (), system.parameter_values)
     assert xd[0] == pytest.approx(2 * np.cos(0.6), rel=1e-15)
 
 

@@ -406,7 +406,7 @@ def test_slip_beside_no_right_key_is_refused() -> None:
 def test_algebraic_loop_keeps_its_kind() -> None:
     document = {
         "format": 1,
-        "blocks": {"a": {"type": "Gain"}, "b": {"type": "Gain"}},
+        "blocks": {"a": {"type": "ZeroOrderHold", "parameters": {"sample_time": 0.1}}, "b": {"type": "Gain"}},
         "connections": ["a/y -> b/u", "b/y -> a/u"],
     }
     with pytest.raises(AlgebraicLoopError, match="algebraic loop") as caught:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, signature
+from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, continuous_system, signature
 
 Equation = Callable[[SX, SX, SX], SX]
 NOTHING = Signature()
@@ -33,7 +33,7 @@ def system(
     p_only = signature(("p", flat(parameters.size)))
     count = len(breakpoints(SX.sym("p", parameters.size)))
     column = lambda parts: ca.vertcat(*parts) if len(parts) else SX(0, 1)  # noqa: E731
-    return HybridSystem(
+    return continuous_system(
         name=name,
         states=states,
         parameters=parameters,

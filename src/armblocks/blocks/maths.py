@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -149,12 +150,18 @@ class MatrixProduct(Block):
 
 
 _FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
+    "10^u": lambda u: casadi.exp(u * math.log(10.0)),
     "abs": casadi.fabs,
+    "cbrt": lambda u: casadi.sign(u) * casadi.fabs(u) ** (1.0 / 3.0),
     "ceil": casadi.ceil,
+    "cube": lambda u: u * u * u,
     "exp": casadi.exp,
+    "expm1": casadi.expm1,
     "floor": casadi.floor,
     "log": casadi.log,
     "log10": casadi.log10,
+    "log1p": casadi.log1p,
+    "log2": lambda u: casadi.log(u) / math.log(2.0),
     "negate": lambda u: -u,
     "reciprocal": lambda u: 1.0 / u,
     "sign": casadi.sign,
@@ -164,7 +171,20 @@ _FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
 
 _TRIGONOMETRY: Mapping[str, Callable[[SX], SX]] = {
     name: getattr(casadi, name)
-    for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
+    for name in (
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "asinh",
+        "acosh",
+        "atanh",
+    )
 }
 
 
@@ -276,30 +296,3 @@ class MinMax(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": reduce(fmin if self.function == "min" else fmax, u.values())}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Saturation(Block):
-    """The input held between two limits: y = min(max(u, lower), upper)."""
-
-    family: ClassVar[str] = "maths"
-    title: ClassVar[str] = "Saturation"
-
-    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
-    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is limited"),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        shapes = {"lower": shape_of(self.lower), "upper": shape_of(self.upper)}
-        return {"y": broadcast({**inputs, **shapes})}
-
-    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        return {"y": inputs["u"]}
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": fmin(fmax(u["u"], p["lower"]), p["upper"])}

@@ -13,6 +13,7 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks import dynamics
+from armblocks.blocks.robot_ports import apply_traced, q_port, qd_port, qdd_port, tau_port
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -23,10 +24,8 @@ from armblocks.diagram import (
     View,
     ViewKind,
     parameter,
-    rate_unit,
     shape_of,
 )
-from armblocks.equations import TracedFunction, flatten, unflatten
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 from armblocks.trajectories import Quintic
@@ -89,13 +88,13 @@ class Fkine(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot),)
+        return (q_port(self.robot),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("T", "pose of the tool in the world frame", shape=(4, 4)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"T": _apply(dynamics.trace_fkine(self.robot), u["q"])}
+        return {"T": apply_traced(dynamics.trace_fkine(self.robot), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,13 +107,13 @@ class Jacob0(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot),)
+        return (q_port(self.robot),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("J", "Jacobian in the world frame", shape=(6, self.robot.n)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"J": _apply(dynamics.trace_jacob0(self.robot), u["q"])}
+        return {"J": apply_traced(dynamics.trace_jacob0(self.robot), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,13 +126,13 @@ class Jacobe(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot),)
+        return (q_port(self.robot),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("J", "Jacobian in the tool frame", shape=(6, self.robot.n)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"J": _apply(dynamics.trace_jacobe(self.robot), u["q"])}
+        return {"J": apply_traced(dynamics.trace_jacobe(self.robot), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,13 +148,13 @@ class Rne(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot), _qd(self.robot), _qdd(self.robot))
+        return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (_tau(self.robot, "torque or force that the motion needs"),)
+        return (tau_port(self.robot, "torque or force that the motion needs"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"tau": _apply(dynamics.trace_rne(self.robot), u["q"], u["qd"], u["qdd"])}
+        return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], u["qdd"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,13 +167,13 @@ class Gravload(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot),)
+        return (q_port(self.robot),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (_tau(self.robot, "torque or force against gravity"),)
+        return (tau_port(self.robot, "torque or force against gravity"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"tau": _apply(dynamics.trace_gravload(self.robot), u["q"])}
+        return {"tau": apply_traced(dynamics.trace_gravload(self.robot), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,13 +186,13 @@ class Inertia(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot),)
+        return (q_port(self.robot),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("M", "joint-space inertia matrix", shape=(self.robot.n, self.robot.n)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"M": _apply(dynamics.trace_inertia(self.robot), u["q"])}
+        return {"M": apply_traced(dynamics.trace_inertia(self.robot), u["q"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,13 +205,13 @@ class Coriolis(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot), _qd(self.robot))
+        return (q_port(self.robot), qd_port(self.robot))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("C", "Coriolis matrix", shape=(self.robot.n, self.robot.n)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"C": _apply(dynamics.trace_coriolis(self.robot), u["q"], u["qd"])}
+        return {"C": apply_traced(dynamics.trace_coriolis(self.robot), u["q"], u["qd"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,10 +253,10 @@ class ForwardDynamics(Block):
                 )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_tau(self.robot, "torque or force at the joints"),)
+        return (tau_port(self.robot, "torque or force at the joints"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot), _qd(self.robot), _qdd(self.robot))
+        return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         return tuple(
@@ -265,10 +264,10 @@ class ForwardDynamics(Block):
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {**x, "qdd": _apply(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
+        return {**x, "qdd": apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"q": x["qd"], "qd": _apply(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
+        return {"q": x["qd"], "qd": apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"q": p["q0"], "qd": p["qd0"]}
@@ -284,43 +283,14 @@ class RobotPlot(Block):
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (_q(self.robot),)
+        return (q_port(self.robot),)
 
     def record_ports(self) -> tuple[Port, ...]:
         doc = "world poses of the base, every link in order, and the tool"
         return (Port("poses", doc, shape=(len(self.robot.links) + 2, 4, 4)),)
 
     def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"poses": _apply(dynamics.trace_link_poses(self.robot), u["q"])}
+        return {"poses": apply_traced(dynamics.trace_link_poses(self.robot), u["q"])}
 
     def views(self) -> tuple[View, ...]:
         return (View(kind=ViewKind.ROBOT, signals=("poses",), title=self.robot.name, subject=self.robot),)
-
-
-def _apply(traced: TracedFunction, *values: SX) -> SX:
-    """The equations of a robot over other symbols, natural shapes in and out."""
-    flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
-    (result,) = traced.casadi_function().call(flat, True, False)
-    return unflatten(result, traced.outputs.slots[0].shape)
-
-
-def _coordinate_unit(robot: Robot) -> str:
-    """rad or m, or ``""`` where the robot has joints of both kinds."""
-    units = set(robot.joint_units)
-    return units.pop() if len(units) == 1 else ""
-
-
-def _q(robot: Robot) -> Port:
-    return Port("q", "joint coordinates", _coordinate_unit(robot), (robot.n,))
-
-
-def _qd(robot: Robot) -> Port:
-    return Port("qd", "joint speeds", rate_unit(_coordinate_unit(robot)), (robot.n,))
-
-
-def _qdd(robot: Robot) -> Port:
-    return Port("qdd", "joint accelerations", rate_unit(rate_unit(_coordinate_unit(robot))), (robot.n,))
-
-
-def _tau(robot: Robot, doc: str) -> Port:
-    return Port("tau", doc, {"rad": "N m", "m": "N"}.get(_coordinate_unit(robot), ""), (robot.n,))

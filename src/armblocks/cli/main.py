@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from armblocks.cli import bench, listing, run, show
+from armblocks.cli import bench, blocks, listing, run, show
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
@@ -49,6 +49,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
+app.command("blocks")(blocks.describe_block)
 app.command("bench")(bench.bench)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
@@ -19,10 +20,12 @@ class Status(IntEnum):
     """A derivative or state became NaN or infinite, however short the step (fixed step: in this step)."""
     NON_FINITE_START = 4
     """The derivative at the start of a segment is NaN or infinite."""
+    ENDLESS_EVENTS = 5
+    """Events follow one another without end: at one instant, or at ever shorter distances."""
 
 
 class Real(IntEnum):
-    """Places in the array of doubles; after them come x (n), y (n) and K (rows of n)."""
+    """Places in the array of doubles; the vectors of :class:`Workspace` come after them."""
 
     TIME = 0
     STEP = 1
@@ -32,11 +35,17 @@ class Real(IntEnum):
     RTOL = 3
     ATOL = 4
     MAX_STEP = 5
-    END = 6
+    BOUND = 6
+    """The next step is not longer: steps begin short after an event and grow again."""
+    LAST_EVENT = 7
+    """When the last event was, of whatever guard."""
+    SPAN = 8
+    """Events are told apart beside ``max(time, 1e-6 SPAN)``: the time at which the run ends."""
+    END = 9
 
 
 class Count(IntEnum):
-    """Places in the array of integers."""
+    """Places in the array of integers; after them comes the number of the next tick of every clock."""
 
     SAMPLE = 0
     """The next sample instant to be written."""
@@ -44,30 +53,93 @@ class Count(IntEnum):
     SEGMENT = 2
     SEGMENTS = 3
     STARTED = 4
-    """Whether the current segment's first derivative is in place."""
+    """A :class:`Stage`."""
     GRID = 5
     """With a fixed step: the next step ends at ``GRID * STEP``."""
     ACCEPTED = 6
     REJECTED = 7
     EVALUATIONS = 8
-    END = 9
+    FRESH = 9
+    """Whether the next start also chooses the first step's length."""
+    INSTANTS = 10
+    """Instants with ticks so far."""
+    EVENTS = 11
+    """Events so far."""
+    CLOSE = 12
+    """Events in a row that are as good as at one instant."""
+    GUARD = 13
+    """The guard that fired last, counted from 1."""
+    SAVED = 14
+    """Whether the checkpoint is written."""
+    END = 15
 
 
-def state_place() -> int:
-    """Where the state of the last accepted step begins."""
-    return Real.END
+class Stage(IntEnum):
+    """What the loop does when it is entered."""
+
+    INSTANT = 0
+    """Ticks and events at the time reached, then the start."""
+    START = 1
+    """The first derivative."""
+    RUNNING = 2
+    """A step; its first derivative is in place."""
 
 
-def trial_place(states: int) -> int:
-    """Where the state at the end of the step being tried begins (and, before it, at each stage)."""
-    return Real.END + states
+@dataclass(frozen=True, kw_only=True)
+class LoopSizes:
+    """What of a system a loop is written for: lengths of its vectors, its clocks and guards.
+
+    ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards.
+    """
+
+    states: int
+    discrete: int = 0
+    algebraic: int = 0
+    clocks: tuple[tuple[float, float], ...] = ()
+    directions: tuple[int, ...] = ()
+
+    @property
+    def hybrid(self) -> bool:
+        """Whether there is more than a flow."""
+        return bool(self.discrete or self.algebraic or self.clocks or self.directions)
 
 
-def slope_place(states: int, row: int) -> int:
-    """Where row ``row`` of the stage derivatives K begins."""
-    return Real.END + (2 + row) * states
+class Workspace:
+    """Where each vector begins in the array of doubles.
 
+    ``x`` the state of the last accepted step, ``y`` that at the end of the step being tried (and, before it,
+    at each stage), ``slope(row)`` the stage derivatives; then what only hybrid systems have: ``z`` and ``w``
+    as accepted, ``new_x`` and ``new_z`` what a reset or update makes of them, ``trial_w`` the unknowns of the
+    implicit equations at the point evaluated last, ``guards``, their ``signs`` (0: not known yet), ``fired``,
+    when each fired last (``last``), how long after the time before (``gap``) and how often in a row this
+    became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian`` and
+    ``before``.
+    """
 
-def workspace_size(tableau: ButcherTableau, states: int) -> int:
-    """Doubles that an integration needs."""
-    return slope_place(states, tableau.rows)
+    def __init__(self, tableau: ButcherTableau, sizes: LoopSizes) -> None:
+        n, nz, nw, ng = sizes.states, sizes.discrete, sizes.algebraic, len(sizes.directions)
+        self.states = n
+        self.x = int(Real.END)
+        self.y = self.x + n
+        self._slopes = self.y + n
+        self.z = self._slopes + tableau.rows * n
+        self.w = self.z + nz
+        self.new_x = self.w + nw
+        self.new_z = self.new_x + n
+        self.trial_w = self.new_z + nz
+        self.guards = self.trial_w + nw
+        self.signs = self.guards + ng
+        self.fired = self.signs + ng
+        self.last = self.fired + ng
+        self.gap = self.last + ng
+        self.shrinking = self.gap + ng
+        self.ticking = self.shrinking + ng
+        self.residual = self.ticking + len(sizes.clocks)
+        self.jacobian = self.residual + nw
+        self.before = self.jacobian + nw * nw
+        self.size = self.before + nw
+        self.counts = int(Count.END) + len(sizes.clocks)
+
+    def slope(self, row: int) -> int:
+        """Where row ``row`` of the stage derivatives begins."""
+        return self._slopes + row * self.states

@@ -3,56 +3,87 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.integrator_workspace import (
-    Count,
-    Real,
-    Status,
-    slope_place,
-    state_place,
-    trial_place,
-    workspace_size,
-)
+from armblocks.compiler.hybrid_loop import HybridLoop
+from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
-from armblocks.compiler.runge_kutta import emit_integrator
+from armblocks.compiler.runge_kutta import POINTERS, Loop, define_loop
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
 
 Vector = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
-_ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 7, ctypes.c_int64)
+_ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * POINTERS, ctypes.c_int64)
+SAME_INSTANT = 1.0 + 2.0**-50
+"""Two times within this factor of one another are one instant, here as in the native loop."""
+
+NO_NUMBERS: Vector = np.empty(0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunPoint:
+    """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations.
+
+    ``begun``: the ticks at this time have happened already.
+    """
+
+    time: float
+    x: Vector
+    begun: bool = False
+    z: Vector = field(default_factory=lambda: NO_NUMBERS)
+    w: Vector = field(default_factory=lambda: NO_NUMBERS)
 
 
 class NativeIntegrator:
-    """``x' = f(t, x, p)`` of one tape, stepped by one method in machine code."""
+    """``x' = f(t, x, z, w, p)`` of one tape, with what happens at instants, stepped in machine code."""
 
-    def __init__(self, states: int, digest: str, tape: Callable[[], Tape], tableau: ButcherTableau) -> None:
-        """``digest`` is that of the derivative's tape, which ``tape()`` gives if the disk cache lacks it."""
+    def __init__(
+        self,
+        sizes: LoopSizes,
+        digests: Mapping[str, str],
+        tape: Callable[[str], Tape],
+        tableau: ButcherTableau,
+    ) -> None:
+        """``digests`` are those of the tapes, which ``tape(name)`` gives if the disk cache lacks the code.
+
+        ``derivative`` alone for a system that only flows, else also those of :func:`needed_tapes`.
+        """
         self.tableau = tableau
-        self.states = states
+        self.sizes = sizes
+        self.states = sizes.states
+        self.workspace = Workspace(tableau, sizes)
+        names = needed_tapes(sizes)
 
         def write() -> str:
             module = Module()
-            emit_function(module, tape(), "derivative")
-            emit_integrator(module, tableau, self.states, "advance", "derivative")
+            for name in names:
+                emit_function(module, tape(name), name)
+            if sizes.hybrid:
+                loop = HybridLoop(module, tableau, self.workspace, sizes)
+            else:
+                loop = Loop(module, tableau, self.workspace)
+            define_loop("advance", loop)
             return module.text
 
         # The code object must outlive every call into it.
-        self._code = load_code(("runge_kutta", tableau.content, digest), write)
+        self.key = ("runge_kutta", tableau.content, repr(sizes), *(digests[name] for name in names))
+        self._code = load_code(self.key, write)
         self._advance = _ADVANCE(self._code.address("advance"))
 
     def begin(
         self,
-        x0: Vector,
+        start: Vector | RunPoint,
         p: Vector,
         samples: Vector,
         breakpoints: Vector,
@@ -61,36 +92,65 @@ class NativeIntegrator:
         rtol: float = 1e-6,
         atol: float = 1e-9,
         max_step: float = float("inf"),
+        checkpoint: Checkpoint | None = None,
     ) -> Integration:
-        """A run from ``x0`` (n,) at ``samples[0]`` to ``samples[-1]``, ready for its first step.
+        """A run from ``start`` to ``samples[-1]``, ready for its first step.
 
-        ``samples`` (N,) s, rising strictly: the instants whose states are recorded. ``breakpoints`` (nb,) s,
-        in any order: a step ends exactly on each that lies inside, what comes before sees ``f`` at most at
-        the last double before it, and what comes after starts anew. ``step`` s: grid of a fixed-step method
-        (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. Nothing is
-        checked.
+        ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, rising strictly:
+        the instants that are recorded. ``breakpoints`` (nb,) s, in any order: a step ends exactly on each
+        that lies inside, what comes before sees ``f`` at most at the last double before it, and what comes
+        after starts anew. ``step`` s: grid of a fixed-step method (its instants are ``k step``); ``rtol``,
+        ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the run goes on from there, as
+        the run that left it would have. Nothing is checked.
         """
-        start, stop = float(samples[0]), float(samples[-1])
-        inside = np.unique(breakpoints[(breakpoints > start) & (breakpoints <= stop)])
+        if not isinstance(start, RunPoint):
+            start = RunPoint(time=float(samples[0]), x=start)
+        begins, stop = start.time, float(samples[-1])
+        if checkpoint is not None:
+            begins = float(checkpoint.reals[Real.TIME])
+        inside = np.unique(breakpoints[(breakpoints > begins) & (breakpoints <= stop)])
         ends = inside if inside.size and inside[-1] == stop else np.append(inside, stop)
         clamps = ends.copy()
         clamps[: inside.size] = np.nextafter(inside, -np.inf)
         run = Integration(self, p, samples, ends, clamps)
-        run.reals[Real.TIME] = start
-        run.reals[Real.STEP] = step
+        if checkpoint is not None:
+            run.reals[:] = checkpoint.reals
+            run.counts[Count.STARTED :] = checkpoint.counts[Count.STARTED :]
+            run.counts[[Count.ACCEPTED, Count.REJECTED, Count.EVALUATIONS, Count.INSTANTS, Count.EVENTS]] = 0
+        else:
+            run.place(start, step=step, first=not start.begun)
         run.reals[Real.RTOL] = rtol
         run.reals[Real.ATOL] = atol
         run.reals[Real.MAX_STEP] = max_step
-        run.state[:] = x0
-        if stop <= start:
-            run.states[0] = x0
+        run.reals[Real.SPAN] = stop
+        if stop <= begins and not self.sizes.hybrid:
+            run.states[0] = start.x
             run.counts[Count.SAMPLE] = 1
             run.status = Status.DONE
+        elif stop <= begins:
+            run.counts[Count.SEGMENT] = run.counts[Count.SEGMENTS]  # the instant itself, and no step
         return run
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
         """The native call. The interpreter's lock is released while it works."""
         return Status(self._advance(*addresses, max_steps))
+
+
+def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
+    """Names of the functions that a loop calls."""
+    names = ["derivative"]
+    names += ["residual", "residual_jacobian"] if sizes.algebraic else []
+    names += ["update"] if sizes.clocks else []
+    names += ["guards", "reset"] if sizes.directions else []
+    return tuple(names)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """The arrays of a run before the step that its end cut short."""
+
+    reals: Vector
+    counts: Integers
 
 
 class Integration:
@@ -99,24 +159,88 @@ class Integration:
     def __init__(
         self, integrator: NativeIntegrator, p: Vector, samples: Vector, ends: Vector, clamps: Vector
     ) -> None:
-        n = integrator.states
+        sizes, workspace = integrator.sizes, integrator.workspace
         self.integrator = integrator
-        self.reals = np.zeros(workspace_size(integrator.tableau, n))
-        self.counts = np.zeros(Count.END, dtype=np.int64)
-        self.states = np.empty((samples.size, n))
+        self.reals = np.zeros(workspace.size)
+        self.counts = np.zeros(workspace.counts, dtype=np.int64)
+        self.states = np.empty((samples.size, sizes.states))
         """States at the sample instants, ``(N, n)``: valid up to ``recorded``."""
+        self.discrete = np.empty((samples.size, sizes.discrete))
+        """Discrete variables there, ``(N, nz)``."""
+        self.algebraic = np.empty((samples.size, sizes.algebraic))
+        """Unknowns of the implicit equations there, ``(N, nw)``."""
         self.counts[Count.SAMPLES] = samples.size
         self.counts[Count.SEGMENTS] = ends.size
         self.status = Status.PAUSED
+        self._saved = Checkpoint(reals=np.full_like(self.reals, np.nan), counts=np.zeros_like(self.counts))
         self._kept = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
-        arrays = (self.reals, self.counts, *self._kept, self.states)
+        arrays = (self.reals, self.counts, *self._kept, self.states, self.discrete, self.algebraic)
+        arrays += (self._saved.reals, self._saved.counts)
         self._addresses = tuple(array.ctypes.data for array in arrays)
+
+    def place(self, start: RunPoint, *, step: float, first: bool) -> None:
+        """Put the run at a point; at the ``first`` the ticks there are still to happen."""
+        places, sizes = self.integrator.workspace, self.integrator.sizes
+        self.reals[Real.TIME] = start.time
+        self.reals[Real.STEP] = step
+        self.reals[Real.BOUND] = np.inf
+        self.reals[Real.LAST_EVENT] = -np.inf
+        self.reals[places.last : places.last + len(sizes.directions)] = -np.inf
+        self.reals[places.gap : places.gap + len(sizes.directions)] = np.inf
+        self.state[:] = start.x
+        self._vector(places.z, sizes.discrete)[:] = start.z
+        self._vector(places.w, sizes.algebraic)[:] = start.w
+        self.counts[Count.STARTED] = Stage.INSTANT if sizes.hybrid else Stage.START
+        self.counts[Count.FRESH] = 1
+        for clock, (period, offset) in enumerate(sizes.clocks):
+            number = 0 if first else max(0, int((start.time - offset) / period) - 1)
+            while not first and number * period + offset <= start.time * SAME_INSTANT:
+                number += 1
+            self.counts[Count.END + clock] = number
 
     def advance(self, max_steps: int) -> Status:
         """Take at most ``max_steps`` accepted steps."""
         if self.status is Status.PAUSED:
             self.status = self.integrator.advance(self._addresses, max_steps)
         return self.status
+
+    @property
+    def checkpoint(self) -> Checkpoint | None:
+        """From where a longer run would go on; ``None`` if there is no such place yet."""
+        if np.isnan(self._saved.reals[Real.TIME]):
+            return None
+        return Checkpoint(reals=self._saved.reals.copy(), counts=self._saved.counts.copy())
+
+    def now(self) -> Checkpoint:
+        """The arrays as they are, between two calls of :meth:`advance`."""
+        return Checkpoint(reals=self.reals.copy(), counts=self.counts.copy())
+
+    @property
+    def point(self) -> RunPoint:
+        """Where the run stands: copies."""
+        places, sizes = self.integrator.workspace, self.integrator.sizes
+        z, w = self._vector(places.z, sizes.discrete), self._vector(places.w, sizes.algebraic)
+        return RunPoint(time=self.time, x=self.state.copy(), z=z.copy(), w=w.copy())
+
+    @property
+    def trial_unknowns(self) -> Vector:
+        """Unknowns of the implicit equations at the point evaluated last, ``(nw,)``: NaN if not found."""
+        return self._vector(self.integrator.workspace.trial_w, self.integrator.sizes.algebraic)
+
+    @property
+    def instants(self) -> int:
+        """Instants with ticks so far."""
+        return int(self.counts[Count.INSTANTS])
+
+    @property
+    def events(self) -> int:
+        """Guards that fired so far."""
+        return int(self.counts[Count.EVENTS])
+
+    @property
+    def last_guard(self) -> int:
+        """The guard that fired last; -1 before any did."""
+        return int(self.counts[Count.GUARD]) - 1
 
     @property
     def time(self) -> float:
@@ -126,10 +250,10 @@ class Integration:
     @property
     def state(self) -> Vector:
         """State there, ``(n,)``: a view."""
-        return self._vector(state_place())
+        return self._vector(self.integrator.workspace.x, self.integrator.states)
 
-    def _vector(self, place: int) -> Vector:
-        return self.reals[place : place + self.integrator.states]
+    def _vector(self, place: int, size: int) -> Vector:
+        return self.reals[place : place + size]
 
     @property
     def last_step(self) -> float:
@@ -157,13 +281,13 @@ class Integration:
         return int(self.counts[Count.EVALUATIONS])
 
     def _stage_derivatives(self) -> Vector:
-        n = self.integrator.states
-        return self.reals[slope_place(n, 0) :].reshape(self.integrator.tableau.rows, n)
+        n, rows = self.integrator.states, self.integrator.tableau.rows
+        return self._vector(self.integrator.workspace.slope(0), rows * n).reshape(rows, n)
 
     def weighted_errors(self) -> Vector:
         """Error of every state in the step tried last, over what is allowed, ``(n,)`` (adaptive methods)."""
         weights = np.array(self.integrator.tableau.error)
-        after = self._vector(trial_place(self.integrator.states))
+        after = self._vector(self.integrator.workspace.y, self.integrator.states)
         rtol, atol = self.reals[Real.RTOL], self.reals[Real.ATOL]
         error = self.last_step * (weights @ self._stage_derivatives()[: weights.size])
         return np.abs(error) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))

@@ -13,14 +13,27 @@ rejection, the same choice of the first step. Step counts can therefore be laid 
 from __future__ import annotations
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, Row
-from armblocks.compiler.integrator_workspace import Count, Real, Status
+from armblocks.compiler.integrator_workspace import Count, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module, number_text
 from armblocks.compiler.runge_kutta_step import StepWriter
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
-_ARGUMENTS = ("%reals", "%counts", "%p", "%samples", "%ends", "%clamps", "%out")
+_ARGUMENTS = (
+    "%reals",
+    "%counts",
+    "%p",
+    "%samples",
+    "%ends",
+    "%clamps",
+    "%out",
+    "%out_z",
+    "%out_w",
+    "%saved_reals",
+    "%saved_counts",
+)
+POINTERS = len(_ARGUMENTS)
 _KEPT_REALS = (Real.TIME, Real.STEP, Real.TRIED)
 _KEPT_COUNTS = (
     Count.SAMPLE,
@@ -30,57 +43,72 @@ _KEPT_COUNTS = (
     Count.ACCEPTED,
     Count.REJECTED,
     Count.EVALUATIONS,
+    Count.FRESH,
+    Count.SAVED,
 )
 
 
-def emit_integrator(
-    module: Module, tableau: ButcherTableau, states: int, symbol: str, derivative: str
-) -> None:
-    """Add ``i64 symbol(reals, counts, p, samples, ends, clamps, out, max_steps)`` to a module.
+def define_loop(symbol: str, loop: Loop) -> None:
+    """Add ``i64 symbol(reals, counts, p, samples, ends, clamps, out, …, max_steps)`` to the loop's module.
 
-    ``derivative`` names a function ``void (ptr t, ptr x, ptr p, ptr xd)`` of the same module. ``samples``
-    are the instants to record and ``out`` their states, ``(N, n)``. ``ends`` are the ends of the segments
-    between breakpoints and ``clamps`` the latest time at which each segment may evaluate its derivative.
-    The integers and all other pointers are ``int64`` and ``float64``. The result is a ``Status``.
+    ``samples`` are the instants to record and ``out`` their states, ``(N, n)`` (``out_z``, ``out_w`` likewise
+    what a hybrid system has besides). ``ends`` are the ends of the segments between breakpoints and
+    ``clamps`` the latest time at which each segment may evaluate its derivative. Into ``saved_reals`` and
+    ``saved_counts`` goes the state from which a run that ends later would go on. The integers and all other
+    pointers are ``int64`` and ``float64``. The result is a ``Status``.
     """
 
     def write() -> str:
         pointers = ", ".join(f"ptr noalias {name}" for name in _ARGUMENTS)
-        loop = _Loop(Routine(module), tableau, states, derivative)
         loop.emit()
         return loop.w.text(f"define i64 @{symbol}({pointers}, i64 %max_steps)")
 
-    module.define(symbol, write)
+    loop.w.module.define(symbol, write)
 
 
-class _Loop:
-    """Writes the loop for one method and one number of states; the blocks follow one another as they run."""
+class Loop:
+    """Writes the loop of a system that only flows, for one method; the blocks stand in the order they run in.
 
-    def __init__(self, routine: Routine, tableau: ButcherTableau, states: int, derivative: str) -> None:
-        self.w = w = routine
+    The module has ``void derivative(ptr t, ptr x, ptr z, ptr w, ptr p, ptr xd)``.
+    """
+
+    kept_reals: tuple[Real, ...] = _KEPT_REALS
+    kept_counts: tuple[Count, ...] = _KEPT_COUNTS
+
+    def __init__(self, module: Module, tableau: ButcherTableau, workspace: Workspace) -> None:
+        self.w = w = Routine(module)
         self.tableau = tableau
-        self.n = states
-        self.kept = {p: w.variable("double", w.get(w.at("%reals", p))) for p in _KEPT_REALS}
-        self.counts = {p: w.variable("i64", w.get(w.at("%counts", p, "i64"), "i64")) for p in _KEPT_COUNTS}
+        self.places = workspace
+        self.n = workspace.states
+        self.kept = {p: w.variable("double", w.get(w.at("%reals", p))) for p in self.kept_reals}
+        self.counts = {
+            p: w.variable("i64", w.get(w.at("%counts", p, "i64"), "i64")) for p in self.kept_counts
+        }
         self.max_step = w.get(w.at("%reals", Real.MAX_STEP))
         self.samples = w.get(w.at("%counts", Count.SAMPLES, "i64"), "i64")
         self.segments = w.get(w.at("%counts", Count.SEGMENTS, "i64"), "i64")
         segment = w.get(self.counts[Count.SEGMENT], "i64")
         self.end = w.variable("double", w.get(w.at("%ends", segment)))
         self.clamp = w.variable("double", w.get(w.at("%clamps", segment)))
+        self.last_end = w.get(w.at("%ends", w.word_op("sub", self.segments, "1")))
         self.taken = w.variable("i64", "0")
         self.status = w.variable("i64", str(int(Status.DONE)))
         self.h = w.variable("double", number_text(0.0))
         self.new_time = w.variable("double", number_text(0.0))
         self.extra_done = w.variable("i64", "0")
-        self.step = StepWriter(w, tableau, states, derivative, self.clamp, self.counts[Count.EVALUATIONS])
+        self.step = StepWriter(
+            w, tableau, workspace, self.emit_flow, self.clamp, self.counts[Count.EVALUATIONS]
+        )
         self.on_start, self.on_step, self.on_leave = (w.fresh(stem) for stem in ("start", "step", "leave"))
+
+    def emit_flow(self, instant: str, x: str, xd: str) -> None:
+        """One evaluation of the derivative, between three addresses."""
+        self.w.do(f"call void @derivative(ptr {instant}, ptr {x}, ptr null, ptr null, ptr %p, ptr {xd})")
 
     def emit(self) -> None:
         """The whole body."""
         w = self.w
-        fresh = w.word_test("eq", w.get(self.counts[Count.STARTED], "i64"), "0")
-        w.branch(fresh, self.on_start, self.on_step)
+        self.emit_entry()
         w.place(self.on_start)
         self.emit_start()
         w.place(self.on_step)
@@ -91,11 +119,44 @@ class _Loop:
             self.emit_fixed_step()
         self.emit_accepted()
         w.place(self.on_leave)
+        self.emit_keep()
+        w.do(f"ret i64 {w.get(self.status, 'i64')}")
+
+    def emit_entry(self) -> None:
+        """Go on where the last call stopped."""
+        w = self.w
+        running = w.word_test("eq", w.get(self.counts[Count.STARTED], "i64"), str(int(Stage.RUNNING)))
+        w.branch(running, self.on_step, self.on_start)
+
+    def emit_keep(self) -> None:
+        """The variables back into the arrays."""
+        w = self.w
         for place, variable in self.kept.items():
             w.put(w.get(variable), w.at("%reals", place))
         for place, variable in self.counts.items():
             w.put(w.get(variable, "i64"), w.at("%counts", place, "i64"), "i64")
-        w.do(f"ret i64 {w.get(self.status, 'i64')}")
+
+    def emit_checkpoint(self, condition: str) -> None:
+        """Save the state, once, before the end of the run first bounds a step: a longer run would go on here.
+
+        The first step after a start is saved as the start, because the end bounds the choice of its length.
+        """
+        w = self.w
+        last, on = w.fresh("last"), w.fresh("on")
+        unsaved = w.word_test("eq", w.get(self.counts[Count.SAVED], "i64"), "0")
+        w.branch(w.both(condition, unsaved), last, on)
+        w.place(last)
+        self.emit_keep()
+        w.module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
+        for kind, size in (("reals", self.places.size), ("counts", self.places.counts)):
+            w.do(
+                f"call void @llvm.memcpy.p0.p0.i64(ptr %saved_{kind}, ptr %{kind}, i64 {8 * size}, i1 false)"
+            )
+        fresh = w.word_test("ne", w.get(self.counts[Count.FRESH], "i64"), "0")
+        stage = w.let(f"select i1 {fresh}, i64 {int(Stage.START)}, i64 {int(Stage.RUNNING)}")
+        w.put(stage, w.at("%saved_counts", Count.STARTED, "i64"), "i64")
+        w.put("1", self.counts[Count.SAVED], "i64")
+        w.place(on)
 
     def leave(self, status: Status) -> None:
         """Return, unconditionally."""
@@ -119,9 +180,16 @@ class _Loop:
         self.emit_samples(time, time, None)
         self.leave_unless(step.all_finite(step.K(0)), Status.NON_FINITE_START)
         if self.tableau.adaptive:
-            interval = w.subtract(w.get(self.end), time)
-            w.put(step.first_step(time, interval, self.max_step), self.kept[Real.STEP])
-        w.put("1", self.counts[Count.STARTED], "i64")
+            self.emit_first_step(time)
+        w.put(str(int(Stage.RUNNING)), self.counts[Count.STARTED], "i64")
+
+    def emit_first_step(self, time: str) -> None:
+        """The length of the step after a start."""
+        w = self.w
+        interval = w.subtract(w.get(self.end), time)
+        length, bounded = self.step.first_step(time, interval, self.max_step)
+        self.emit_checkpoint(w.both(bounded, w.compare("oge", w.get(self.end), self.last_end)))
+        w.put(length, self.kept[Real.STEP])
 
     def emit_trial(self, time: str, new_time: str) -> str:
         """Stages of a step to ``new_time``; gives its length."""
@@ -141,6 +209,8 @@ class _Loop:
         following = w.from_bits(w.word_op("add", w.bits(time), "1"))
         shortest = w.multiply(number_text(10.0), w.subtract(following, time))
         w.put(w.minimum(w.maximum(w.get(length), shortest), self.max_step), length)
+        new_time = w.minimum(w.add(time, w.get(length)), w.get(self.end))
+        self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
         growth = w.variable("double", number_text(GROW))
         attempt, rejected, too_small, accepted = (
             w.fresh(stem) for stem in ("attempt", "rejected", "small", "accepted")
@@ -168,7 +238,11 @@ class _Loop:
         self.leave_unless(finite, Status.NON_FINITE)
         self.leave(Status.STEP_TOO_SMALL)
         w.place(accepted)
-        w.put(w.multiply(h, w.minimum(ideal, w.get(growth))), length)
+        self.emit_next_length(w.multiply(h, w.minimum(ideal, w.get(growth))))
+
+    def emit_next_length(self, proposed: str) -> None:
+        """Settle the length of the step after an accepted one."""
+        self.w.put(proposed, self.kept[Real.STEP])
 
     def emit_fixed_step(self) -> None:
         """One step to the next grid instant, which is ``k STEP`` and never a sum, or to the segment's end."""
@@ -178,15 +252,28 @@ class _Loop:
         search, following, found = w.fresh("search"), w.fresh("following"), w.fresh("found")
         w.place(search)
         instant = w.multiply(w.let(f"sitofp i64 {w.get(grid, 'i64')} to double"), spacing)
-        w.branch(w.compare("ole", instant, time), following, found)
+        w.branch(w.compare("ole", instant, self.passed(time, spacing)), following, found)
         w.place(following)
         w.increase(grid)
         w.jump(search)
         w.place(found)
         # An instant a rounding error before the end is the end: no step of 1e-16 s.
         last = w.compare("oge", w.fma(spacing, number_text(1e-9), instant), end)
-        self.emit_trial(time, w.select(last, end, instant))
+        new_time = self.bounded(time, w.select(last, end, instant))
+        self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
+        self.emit_trial(time, new_time)
         self.leave_unless(step.all_finite(step.y, step.K(self.tableau.stages)), Status.NON_FINITE)
+
+    def passed(self, time: str, spacing: str) -> str:
+        """Grid instants up to this time are behind."""
+        return time
+
+    def bounded(self, time: str, new_time: str) -> str:
+        """The end of a fixed step, where something else than the grid may bound it."""
+        return new_time
+
+    def emit_record(self, instant: str, sample: str, row: str) -> None:
+        """What else than the state a sample instant records."""
 
     def emit_samples(self, time: str, until: str, h: str | None) -> None:
         """Record every sample instant not after ``until``: the state itself there, interpolated before.
@@ -216,6 +303,7 @@ class _Loop:
         state = step.x if h is None else step.y
         w.for_each(self.n, lambda index: w.put(step.read(state, index), w.at(row, index)))
         w.place(recorded)
+        self.emit_record(instant, sample, row)
         w.increase(self.counts[Count.SAMPLE])
         w.jump(turn)
         w.place(done)
@@ -242,12 +330,14 @@ class _Loop:
         step.copy(step.K(self.tableau.stages), step.K(0))
         w.put(new_time, self.kept[Real.TIME])
         w.increase(self.counts[Count.ACCEPTED])
+        w.put("0", self.counts[Count.FRESH], "i64")
         w.increase(self.taken)
         at_end = w.fresh("end")
         w.branch(w.compare("oge", new_time, w.get(self.end)), at_end, self.on_step)
         w.place(at_end)
         w.increase(self.counts[Count.SEGMENT])
-        w.put("0", self.counts[Count.STARTED], "i64")
+        w.put(str(int(Stage.START)), self.counts[Count.STARTED], "i64")
+        w.put("1", self.counts[Count.FRESH], "i64")
         segment = w.get(self.counts[Count.SEGMENT], "i64")
         self.leave_unless(w.word_test("slt", segment, self.segments), Status.DONE)
         w.put(w.get(w.at("%ends", segment)), self.end)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, Row
-from armblocks.compiler.integrator_workspace import Real, slope_place, state_place, trial_place
+from armblocks.compiler.integrator_workspace import Real, Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import number_text
 
@@ -18,24 +18,25 @@ from armblocks.compiler.ir_text import number_text
 class StepWriter:
     """Appends the arithmetic of ``tableau``'s steps to a routine that has ``%reals`` and ``%p``.
 
-    ``derivative`` names a function ``void (ptr t, ptr x, ptr p, ptr xd)`` of the same module. ``clamp`` and
-    ``evaluations`` are variables: the latest time to evaluate it at, and how often it was called.
+    ``derivative(t, x, xd)`` writes one evaluation of the derivative, between three addresses. ``clamp`` and
+    ``evaluations`` are variables: the latest time to evaluate it at, and how often that was done.
     """
 
     def __init__(
         self,
         routine: Routine,
         tableau: ButcherTableau,
-        states: int,
-        derivative: str,
+        workspace: Workspace,
+        derivative: Callable[[str, str, str], None],
         clamp: str,
         evaluations: str,
     ) -> None:
         self.w = routine
         self.tableau = tableau
-        self.n = states
-        self.x = state_place()
-        self.y = trial_place(states)
+        self.n = workspace.states
+        self.x = workspace.x
+        self.y = workspace.y
+        self.K = workspace.slope
         self._derivative = derivative
         self._clamp = clamp
         self._evaluations = evaluations
@@ -44,10 +45,6 @@ class StepWriter:
         self._atol = routine.get(routine.at("%reals", Real.ATOL))
 
     # Vectors in the workspace.
-
-    def K(self, row: int) -> int:
-        """Place of row ``row`` of the stage derivatives."""
-        return slope_place(self.n, row)
 
     def element(self, place: int, index: str) -> str:
         """Address of element ``index`` of the vector at ``place``."""
@@ -65,8 +62,7 @@ class StepWriter:
         """``K[row] = f(min(time, clamp), state)``: before a breakpoint the old value of a jump holds."""
         w = self.w
         w.put(w.minimum(time, w.get(self._clamp)), self._instant)
-        x, xd = w.at("%reals", state), w.at("%reals", self.K(row))
-        w.do(f"call void @{self._derivative}(ptr {self._instant}, ptr {x}, ptr %p, ptr {xd})")
+        self._derivative(self._instant, w.at("%reals", state), w.at("%reals", self.K(row)))
         w.increase(self._evaluations)
 
     def move(self, weights: Row, h: str) -> None:
@@ -118,8 +114,11 @@ class StepWriter:
         nothing = w.compare("oeq", denominator, number_text(0.0))
         return w.select(nothing, number_text(0.0), norm)
 
-    def first_step(self, time: str, interval: str, max_step: str) -> str:
-        """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it."""
+    def first_step(self, time: str, interval: str, max_step: str) -> tuple[str, str]:
+        """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it.
+
+        And whether the interval's length, the end of the run perhaps, has had a part in it.
+        """
         w = self.w
 
         def weighted(value: Callable[[str], str]) -> Callable[[str], str]:
@@ -130,6 +129,7 @@ class StepWriter:
         tiny = number_text(1e-5)
         small = w.either(w.compare("olt", d0, tiny), w.compare("olt", d1, tiny))
         h0 = w.select(small, number_text(1e-6), w.divide(w.multiply(number_text(0.01), d0), d1))
+        clipped = w.compare("oge", h0, interval)
         h0 = w.minimum(h0, interval)
         self.move((1.0,), h0)
         self.evaluate(w.add(time, h0), self.y, 1)
@@ -145,7 +145,7 @@ class StepWriter:
             w.inverse_root(bounded, self.tableau.error_order + 1),
         )
         h = w.minimum(h1, w.multiply(number_text(100.0), h0))
-        return w.minimum(w.minimum(h, interval), max_step)
+        return w.minimum(w.minimum(h, interval), max_step), clipped
 
     # Between steps.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from armblocks.compiler import cache
 from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
 from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.integrator_workspace import LoopSizes
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import NativeCode, load_code
@@ -28,8 +29,12 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-_FUNCTIONS = ("derivative", "signals", "initial_states", "breakpoints")
-_SIGNALS_LAYOUT = BatchLayout(inputs=(Layout.COLUMNS, Layout.ROWS, Layout.SHARED), outputs=(Layout.COLUMNS,))
+_STARTS = ("initial_states", "initial_discrete", "initial_algebraic")
+_POINTWISE = ("derivative", *_STARTS, "breakpoints")
+_FUNCTIONS = (*_POINTWISE, "signals", "residual", "residual_jacobian", "update", "guards", "reset")
+_SIGNALS_LAYOUT = BatchLayout(
+    inputs=(Layout.COLUMNS, Layout.ROWS, Layout.ROWS, Layout.ROWS, Layout.SHARED), outputs=(Layout.COLUMNS,)
+)
 
 
 def compile_system(system: HybridSystem) -> CompiledSystem:
@@ -78,57 +83,72 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
 class CompiledSystem:
     """Native code of a :class:`~armblocks.equations.HybridSystem`.
 
-    Flat vectors are laid out by the system's signatures: states ``x (nx,)``, parameters ``p (np,)``, signals
-    ``y (ny,)``; time in seconds. Arrays that are given are float64 and C-contiguous, and nothing is checked.
+    Flat vectors are laid out by the system's signatures: states ``x (nx,)``, discrete variables ``z (nz,)``,
+    unknowns of implicit equations ``w (nw,)``, parameters ``p (np,)``, signals ``y (ny,)``; time in seconds.
+    Arrays that are given are float64 and C-contiguous, and nothing is checked.
     """
 
     def __init__(self, description: Mapping[str, Any], tape: Callable[[str], Tape]) -> None:
         self.name = str(description["name"])
         self.states = _signature(description["states"])
+        self.discrete = _signature(description["discrete"])
+        self.algebraic = _signature(description["algebraic"])
         self.parameters = _signature(description["parameters"])
         self.signals_layout = _signature(description["signals"])
         self.parameter_values: Vector = np.array(description["parameter_values"], dtype=np.float64)
         self.parameter_values.flags.writeable = False
         self.aliases: Mapping[str, str] = dict(description["aliases"])
+        self.guard_names: tuple[str, ...] = tuple(description["guard_names"])
+        self.sizes = LoopSizes(
+            states=self.states.size,
+            discrete=self.discrete.size,
+            algebraic=self.algebraic.size,
+            clocks=tuple((float(period), float(offset)) for period, offset in description["clocks"]),
+            directions=tuple(int(direction) for direction in description["guard_directions"]),
+        )
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = {name: description["digests"][name] for name in _FUNCTIONS}
         self._make_tape = tape
         self._integrators: dict[int, NativeIntegrator] = {}
 
     def tape(self, function: str) -> Tape:
-        """``derivative``, ``signals``, ``initial_states`` or ``breakpoints`` as a flat program."""
+        """One of the system's functions, ``derivative``, ``signals`` …, as a flat program."""
         return self._make_tape(function)
 
     @cached_property
     def _code(self) -> NativeCode:
         def write() -> str:
             module = Module()
-            for name in ("derivative", "initial_states", "breakpoints"):
+            for name in (*_POINTWISE, *(("residual",) if self.sizes.algebraic else ())):
                 emit_function(module, self.tape(name), name, linkage="")
             emit_batch(module, self.tape("signals"), _SIGNALS_LAYOUT, host_target().lanes, "signals")
             return module.text
 
-        return load_code(("system", *self._digests.values()), write)
+        return load_code(
+            ("system", *(self._digests[name] for name in (*_POINTWISE, "signals", "residual"))), write
+        )
 
     def _entry(self, name: str, integers: int, pointers: int) -> Callable[..., None]:
         kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * integers, *[ctypes.c_void_p] * pointers)
         return kind(self._code.address(name))
 
     @cached_property
-    def _derivative(self) -> Callable[..., None]:
-        return self._entry("derivative", 0, 4)
-
-    @cached_property
-    def _initial_states(self) -> Callable[..., None]:
-        return self._entry("initial_states", 0, 2)
-
-    @cached_property
-    def _breakpoints(self) -> Callable[..., None]:
-        return self._entry("breakpoints", 0, 2)
+    def _point_functions(self) -> Mapping[str, Callable[..., None]]:
+        functions = {name: self._entry(name, 0, 2) for name in (*_STARTS, "breakpoints")}
+        functions["derivative"] = self._entry("derivative", 0, 6)
+        if self.sizes.algebraic:
+            functions["residual"] = self._entry("residual", 0, 6)
+        return functions
 
     @cached_property
     def _signals(self) -> Callable[..., None]:
-        return self._entry("signals", 3, 4)
+        return self._entry("signals", 3, 6)
+
+    def _of_parameters(self, name: str, size: int, p: Vector) -> Vector:
+        result = np.empty(size)
+        if size:
+            self._point_functions[name](p.ctypes.data, result.ctypes.data)
+        return result
 
     def prepare(self, tableau: ButcherTableau | None) -> None:
         """Compile, or load from disk, all that a run by this method needs (``None``: no integration)."""
@@ -138,31 +158,45 @@ class CompiledSystem:
 
     def initial_states(self, p: Vector) -> Vector:
         """``x(0)``, ``(nx,)``, for parameters ``p`` ``(np,)``."""
-        x = np.empty(self.states.size)
-        if x.size:
-            self._initial_states(p.ctypes.data, x.ctypes.data)
-        return x
+        return self._of_parameters("initial_states", self.states.size, p)
+
+    def initial_discrete(self, p: Vector) -> Vector:
+        """``z(0)``, ``(nz,)``, before the first ticks."""
+        return self._of_parameters("initial_discrete", self.discrete.size, p)
+
+    def initial_algebraic(self, p: Vector) -> Vector:
+        """The first guess of ``w``, ``(nw,)``."""
+        return self._of_parameters("initial_algebraic", self.algebraic.size, p)
 
     def breakpoints(self, p: Vector) -> Vector:
         """Known instants at which signals jump, ``(nb,)`` s, in no order."""
-        times = np.empty(self._breakpoint_count)
-        if times.size:
-            self._breakpoints(p.ctypes.data, times.ctypes.data)
-        return times
+        return self._of_parameters("breakpoints", self._breakpoint_count, p)
 
-    def derivative(self, t: float, x: Vector, p: Vector) -> Vector:
-        """``x'``, ``(nx,)``, at one instant."""
-        slope = np.empty(self.states.size)
-        if slope.size:
+    def _at_point(self, name: str, size: int, t: float, vectors: tuple[Vector, ...]) -> Vector:
+        result = np.empty(size)
+        if size:
             time = np.array([t], dtype=np.float64)
-            self._derivative(time.ctypes.data, x.ctypes.data, p.ctypes.data, slope.ctypes.data)
-        return slope
+            addresses = [vector.ctypes.data for vector in (time, *vectors, result)]
+            self._point_functions[name](*addresses)
+        return result
 
-    def evaluate_signals(self, t: Vector, x: Vector, p: Vector) -> Vector:
-        """Signals ``(ny, N)`` at many instants, several at a time: ``t (N,)``, ``x (N, nx)``, ``p (np,)``."""
+    def derivative(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
+        """``x'``, ``(nx,)``, at one instant."""
+        return self._at_point("derivative", self.states.size, t, (x, z, w, p))
+
+    def residual(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
+        """``r``, ``(nw,)``, at one instant: zero where ``w`` solves the implicit equations."""
+        return self._at_point("residual", self.algebraic.size, t, (x, z, w, p))
+
+    def evaluate_signals(self, t: Vector, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
+        """Signals ``(ny, N)`` at many instants, several at a time.
+
+        ``t (N,)``, ``x (N, nx)``, ``z (N, nz)``, ``w (N, nw)``, ``p (np,)``.
+        """
         y = np.empty((self.signals_layout.size, t.size))
         if y.size:
-            self._signals(0, t.size, t.size, t.ctypes.data, x.ctypes.data, p.ctypes.data, y.ctypes.data)
+            addresses = [array.ctypes.data for array in (t, x, z, w, p, y)]
+            self._signals(0, t.size, t.size, *addresses)
         return y
 
     def integrator(self, tableau: ButcherTableau) -> NativeIntegrator:
@@ -170,9 +204,7 @@ class CompiledSystem:
         found = self._integrators.get(id(tableau))
         if found is None:
             # The integrator keeps its tableau alive, so the identity stays its own.
-            found = NativeIntegrator(
-                self.states.size, self._digests["derivative"], lambda: self.tape("derivative"), tableau
-            )
+            found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
             self._integrators[id(tableau)] = found
         return found
 
@@ -196,6 +228,11 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
     return {
         "name": system.name,
         "states": slots(system.states),
+        "discrete": slots(system.discrete),
+        "algebraic": slots(system.algebraic),
+        "clocks": [[clock.period, clock.offset] for clock in system.clocks],
+        "guard_directions": list(system.guard_directions),
+        "guard_names": list(system.guard_names),
         "parameters": slots(system.parameters),
         "signals": slots(system.signals_layout),
         "parameter_values": np.asarray(system.parameter_values, dtype=np.float64).tolist(),

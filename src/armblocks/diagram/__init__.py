@@ -8,7 +8,8 @@ from armblocks.diagram.diagram import Connection, Diagram, Placement
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
-from armblocks.diagram.port import Port, PortRef, State, View, ViewKind
+from armblocks.diagram.port import Guard, Port, PortRef, State, View, ViewKind
+from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
@@ -24,6 +25,7 @@ __all__ = [
     "Diagram",
     "DiagramBuilder",
     "DiagramShapes",
+    "Guard",
     "Parameter",
     "ParameterKind",
     "Placement",
@@ -44,6 +46,7 @@ __all__ = [
     "integral_unit",
     "parameter",
     "rate_unit",
+    "sample_time_parameter",
     "shape_of",
     "trace_diagram",
     "with_parameters",

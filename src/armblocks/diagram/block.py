@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from casadi import SX
 
 from armblocks.diagram.parameter import Parameter, Value
-from armblocks.diagram.port import Port, State, View
+from armblocks.diagram.port import Guard, Port, State, View
 from armblocks.equations import Shape
 
 Shapes = Mapping[str, Shape]
@@ -27,9 +27,18 @@ class Block(ABC):
 
     A subclass sets ``family`` and ``title``, declares its parameters with
     :func:`~armblocks.diagram.parameter.parameter`, and overrides what it has: ports, states, equations.
-    In the equations ``t`` is the time (s), ``x`` the block's states, ``u`` its inputs, ``p`` its tunable
-    parameters, all symbolic; the other parameters are plain attributes. An equation must not read a tunable
-    parameter from ``self``, only from ``p``: the compiled system may be run with another value.
+    In the equations ``t`` is the time (s), ``x`` the block's states of all kinds, ``u`` its inputs, ``p`` its
+    tunable parameters, all symbolic; the other parameters are plain attributes. An equation must not read a
+    tunable parameter from ``self``, only from ``p``: the compiled system may be run with another value.
+
+    A *sampled* block (``sampled = True``, parameter ``sample_time``) works at the ticks of its clock only:
+    its outputs are worked out there from the discrete states as they were before, then held, and its
+    ``updates`` say what the discrete states become. Its equations find the period (s) as ``p["T"]``.
+
+    A block with *modes* switches between equations at *events*. A mode keeps its value while the time flows,
+    so that the flow is smooth; ``guards`` say where an event happens, ``resets`` what it changes, and
+    ``mode_values`` what a mode has to be by the values of the moment (at the start, and within a sampled
+    part of a diagram, which only looks at its ticks).
 
     The first line of a subclass's docstring says in one sentence what the block does, with its equation.
     """
@@ -47,6 +56,11 @@ class Block(ABC):
 
     A Derivative block behind ``q`` then gives ``qd`` itself, to the last bit: a joint that stands still has
     the speed 0, and not 1e-17, which Coulomb friction would see."""
+
+    sampled: ClassVar[bool] = False
+    """Whether the block works at the ticks of a clock only; it then has the parameter ``sample_time``."""
+    rated_inputs: ClassVar[tuple[str, ...]] = ()
+    """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
 
     def __post_init__(self) -> None:
         for rule in self.parameters():
@@ -99,6 +113,18 @@ class Block(ABC):
         """Continuous states, given the shapes of all inputs."""
         return ()
 
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        """States that only a tick (``updates``) or an event (``resets``) changes."""
+        return ()
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        """Which of its equations holds: changed by events, numbered as ``doc`` says."""
+        return ()
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        """Quantities at whose zeros an event happens."""
+        return ()
+
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of those outputs whose port does not state one, given the shapes of all inputs.
 
@@ -136,7 +162,31 @@ class Block(ABC):
         return {}
 
     def initial_states(self, p: Signals) -> Signals:
-        """Start value of every state (a scalar is spread over it)."""
+        """Start value of every continuous and discrete state (a scalar is spread over it)."""
+        return {}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        """Held outputs of a sampled block before its first tick, where they are not 0."""
+        return {}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """What every discrete state of a sampled block becomes at a tick."""
+        return {}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """Value of every guard."""
+        return {}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """What every mode has to be at this moment, by the values alone (``x`` has the modes as they are)."""
+        return {}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        """New values of those states and modes that an event may change.
+
+        ``e``, by guard: +1 or -1 where it fired upwards or downwards, 0 elsewhere. Where it is 0 everywhere,
+        the old values must come out; some other block has had an event.
+        """
         return {}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:

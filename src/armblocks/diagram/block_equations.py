@@ -19,7 +19,7 @@ from casadi import SX, Function, densify, jtimes, vertcat
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.parameter import shape_of
-from armblocks.diagram.port import State
+from armblocks.diagram.port import Guard, State
 from armblocks.equations import Shape, Slot, flatten, unflatten
 from armblocks.errors import DiagramError
 
@@ -30,6 +30,10 @@ class SlotKind(Enum):
     OUTPUT = "output"
     DERIVATIVE = "derivative"
     RECORD = "record"
+    UPDATE = "update"
+    GUARD = "guard value"
+    MODE = "mode value"
+    RESET = "reset"
 
 
 @dataclass(frozen=True)
@@ -48,15 +52,20 @@ class BlockSlot:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Slots of one block that depend on the same ``inputs`` and ``states`` (by name), and their equations.
+    """Slots of one block that depend on the same states, inputs and events (by name), and their equations.
 
     ``expression`` is the flat column of all slots over ``t``, the flat column ``p`` of the block's tunable
-    parameters, and ``z``: the flat states, then the flat inputs, that the group depends on.
+    parameters, and ``z``: the flat continuous states, discrete states and modes, inputs, and events, that the
+    group depends on. An input ``u'`` is the time derivative of the input ``u``. ``timed``: whether time
+    itself stands in it.
     """
 
     slots: tuple[BlockSlot, ...]
-    inputs: tuple[str, ...]
     states: tuple[str, ...]
+    discrete: tuple[str, ...]
+    inputs: tuple[str, ...]
+    events: tuple[str, ...]
+    timed: bool
     expression: SX
     t: SX
     p: SX
@@ -89,6 +98,10 @@ class BlockEquations:
     """All equations of one block: its states and the groups of what it works out."""
 
     states: tuple[State, ...]
+    discrete: tuple[State, ...]
+    """Discrete states, then modes."""
+    modes: tuple[State, ...]
+    guards: tuple[Guard, ...]
     groups: tuple[Group, ...]
 
     @cached_property
@@ -107,11 +120,19 @@ class _Structure:
     fixed: tuple[object, ...]
     tunable_shapes: tuple[Shape, ...]
     input_shapes: tuple[tuple[str, Shape], ...]
+    period: float
+    settled: bool
     block: Block = field(compare=False)
 
 
-def block_equations(block: Block, input_shapes: Shapes) -> BlockEquations:
-    """Trace a block whose inputs have these shapes; equal structures are traced once."""
+def block_equations(
+    block: Block, input_shapes: Shapes, *, period: float = 1.0, settled: bool = False
+) -> BlockEquations:
+    """Trace a block whose inputs have these shapes; equal structures are traced once.
+
+    ``period`` s: of a sampled block's clock. ``settled``: with modes that follow the values of the moment
+    instead of events.
+    """
     rules = block.parameters()
     return _trace(
         _Structure(
@@ -121,6 +142,8 @@ def block_equations(block: Block, input_shapes: Shapes) -> BlockEquations:
                 shape_of(block.parameter_value(rule.name)) for rule in rules if rule.tunable
             ),
             input_shapes=tuple(input_shapes.items()),
+            period=period if block.sampled else 0.0,
+            settled=settled and bool(block.modes(input_shapes)),
             block=block,
         )
     )
@@ -157,68 +180,91 @@ def spread(value: SX, shape: Shape) -> SX:
 def _trace(structure: _Structure) -> BlockEquations:
     block = structure.block
     shapes = dict(structure.input_shapes)
-    states = block.states(shapes)
+    states, discrete, modes = block.states(shapes), block.discrete_states(shapes), block.modes(shapes)
+    guards = block.guards(shapes)
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
-        "u": [Slot(name, shape) for name, shape in shapes.items()],
+        "z": [Slot(state.name, state.shape) for state in (*discrete, *modes)],
+        "u": [Slot(name, shape) for name, shape in shapes.items()]
+        + [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs],
+        "e": [Slot(guard.name, guard.shape) for guard in guards],
         "p": list(tunable_slots(block)),
     }
+    symbols = {letter: SX.sym(letter, sum(slot.size for slot in slots)) for letter, slots in ends.items()}
     t = SX.sym("t")
-    x, u, p = (SX.sym(letter, sum(slot.size for slot in slots)) for letter, slots in ends.items())
-    arguments = (t, natural(ends["x"], x), natural(ends["u"], u), natural(ends["p"], p))
+    x, z, u, e, p = (dict(natural(slots, symbols[letter])) for letter, slots in ends.items())
+    if block.sampled:
+        p["T"] = SX(structure.period)
+    x.update(z)
+    if structure.settled:
+        x.update(block.mode_values(t, x, u, p))
 
     output_shapes = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
     output_shapes.update(block.output_shapes(shapes))
-    sought = [
-        BlockSlot(SlotKind.OUTPUT, port.name, output_shapes[port.name])
-        for port in block.output_ports()
-        if port.name not in block.time_derivatives
-    ]
-    sought += [BlockSlot(SlotKind.DERIVATIVE, state.name, state.shape) for state in states]
-    sought += [BlockSlot(SlotKind.RECORD, port.name, port.shape or ()) for port in block.record_ports()]
+    state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
+    resets = block.resets(t, x, u, p, e) if guards else dict[str, SX]()
+    sought: dict[SlotKind, dict[str, Shape]] = {
+        SlotKind.OUTPUT: {
+            port.name: output_shapes[port.name]
+            for port in block.output_ports()
+            if port.name not in block.time_derivatives
+        },
+        SlotKind.DERIVATIVE: {state.name: state.shape for state in states},
+        SlotKind.RECORD: {port.name: port.shape or () for port in block.record_ports()},
+        SlotKind.UPDATE: {state.name: state.shape for state in discrete if block.sampled},
+        SlotKind.GUARD: {guard.name: guard.shape for guard in guards},
+        SlotKind.MODE: {mode.name: mode.shape for mode in modes},
+        SlotKind.RESET: {name: state_shapes[name] for name in resets if name in state_shapes},
+    }
     found = {
-        SlotKind.OUTPUT: block.outputs(*arguments),
-        SlotKind.DERIVATIVE: block.derivatives(*arguments),
-        SlotKind.RECORD: block.records(*arguments),
+        SlotKind.OUTPUT: block.outputs(t, x, u, p),
+        SlotKind.DERIVATIVE: block.derivatives(t, x, u, p),
+        SlotKind.RECORD: block.records(t, x, u, p),
+        SlotKind.UPDATE: block.updates(t, x, u, p),
+        SlotKind.GUARD: block.guard_values(t, x, u, p),
+        SlotKind.MODE: block.mode_values(t, x, u, p),
+        SlotKind.RESET: resets,
     }
     for kind, values in found.items():
-        _check_complete(block, kind, [slot.name for slot in sought if slot.kind is kind], values)
-    flat = [spread(SX(found[slot.kind][slot.name]), slot.shape) for slot in sought]
-    groups = _grouped(sought, flat, (t, x, u, p), ends["x"], ends["u"])
-    return BlockEquations(states=states, groups=groups)
+        _check_complete(block, kind, list(sought[kind]), values)
+    slots = [BlockSlot(kind, name, shape) for kind, named in sought.items() for name, shape in named.items()]
+    flat = [spread(SX(found[slot.kind][slot.name]), slot.shape) for slot in slots]
+    groups = _grouped(slots, flat, t, symbols, ends)
+    return BlockEquations(
+        states=states, discrete=(*discrete, *modes), modes=modes, guards=guards, groups=groups
+    )
 
 
 def _grouped(
-    slots: list[BlockSlot],
-    flat: list[SX],
-    symbols: tuple[SX, SX, SX, SX],
-    states: list[Slot],
-    inputs: list[Slot],
+    slots: list[BlockSlot], flat: list[SX], t: SX, symbols: dict[str, SX], ends: dict[str, list[Slot]]
 ) -> tuple[Group, ...]:
-    t, x, u, p = symbols
-    parts = _parts(x, states) + _parts(u, inputs)
-    names = [slot.name for slot in (*states, *inputs)]
-    dependence = Function("f", [t, p, *parts], flat) if slots else None
+    letters = [(letter, slot.name) for letter in "xzue" for slot in ends[letter]]
+    parts = [part for letter in "xzue" for part in _parts(symbols[letter], ends[letter])]
+    dependence = Function("f", [t, symbols["p"], *parts], flat) if slots else None
     members: dict[tuple[bool, ...], list[int]] = {}
+    timed: set[int] = set()
     for index in range(len(slots)):
-        pattern = tuple(
-            dependence is not None and dependence.jac_sparsity(index, 2 + place).nnz() > 0
-            for place in range(len(parts))
-        )
+        assert dependence is not None
+        if dependence.jac_sparsity(index, 0).nnz() > 0:
+            timed.add(index)
+        pattern = tuple(dependence.jac_sparsity(index, 2 + place).nnz() > 0 for place in range(len(parts)))
         members.setdefault(pattern, []).append(index)
     groups: list[Group] = []
     for pattern, indices in members.items():
-        on_states = [place for place in range(len(states)) if pattern[place]]
-        on_inputs = [place for place in range(len(states), len(parts)) if pattern[place]]
+        on = [place for place in range(len(parts)) if pattern[place]]
+        names = {letter: tuple(letters[k][1] for k in on if letters[k][0] == letter) for letter in "xzue"}
         groups.append(
             Group(
                 slots=tuple(slots[index] for index in indices),
-                inputs=tuple(names[place] for place in on_inputs),
-                states=tuple(names[place] for place in on_states),
+                states=names["x"],
+                discrete=names["z"],
+                inputs=names["u"],
+                events=names["e"],
+                timed=any(index in timed for index in indices),
                 expression=vertcat(*[flat[index] for index in indices]),
                 t=t,
-                p=p,
-                z=vertcat(*[parts[place] for place in (*on_states, *on_inputs)], SX(0, 1)),
+                p=symbols["p"],
+                z=vertcat(*[parts[place] for place in on], SX(0, 1)),
             )
         )
     return tuple(groups)

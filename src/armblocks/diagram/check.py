@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.ordering import Network, evaluation_order
 from armblocks.diagram.port import PortRef
-from armblocks.diagram.shapes import infer_shapes
-from armblocks.diagram.trace import diagram_equations
+from armblocks.diagram.trace import diagram_model
 from armblocks.errors import DiagramError
 
 MOST_LISTED = 20
@@ -14,10 +12,12 @@ MOST_LISTED = 20
 
 
 def check_diagram(diagram: Diagram) -> None:
-    """Raise ``DiagramError`` for unconnected inputs, mismatched widths or an algebraic loop."""
+    """Raise ``DiagramError`` for a diagram that cannot be traced.
+
+    That is: unconnected inputs, widths or sample times that do not fit, loops that no order solves.
+    """
     check_connected(diagram)
-    shapes = infer_shapes(diagram)
-    evaluation_order(Network(diagram, diagram_equations(diagram, shapes)))
+    diagram_model(diagram)
 
 
 def check_connected(diagram: Diagram) -> None:

@@ -11,6 +11,9 @@ from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.port import PortRef
 from armblocks.errors import AlgebraicLoopError
 
+HELD = -1
+"""The group of what a sampled block holds between its ticks: it is there without being worked out."""
+
 
 class Node(NamedTuple):
     """The ``order``-th time derivative of one group of one block; order 0 is the value itself."""
@@ -30,10 +33,14 @@ class Value(NamedTuple):
 
 @dataclass(frozen=True)
 class Network:
-    """A diagram with the equations of its blocks: who needs whom."""
+    """A diagram with the equations of its blocks: who needs whom.
+
+    While the time flows, sampled blocks hold their outputs; at a tick (``ticking``) they work them out.
+    """
 
     diagram: Diagram
     equations: Mapping[str, BlockEquations]
+    ticking: bool = False
 
     def route(self, ref: PortRef) -> tuple[PortRef, ...]:
         """From a port back through derivative ports to the port whose equations are differentiated."""
@@ -55,10 +62,14 @@ class Network:
         port = ref.port
         while order and port in rates:
             port, order = rates[port], order - 1
+        if self.diagram.blocks[ref.block].sampled and (order or not self.ticking):
+            return Value(Node(ref.block, HELD, order), SlotKind.OUTPUT, port)
         return self._slot(ref.block, SlotKind.OUTPUT, port, order)
 
     def input(self, block: str, port: str, order: int = 0) -> Value:
-        """Where the value that feeds an input port is found."""
+        """Where the value that feeds an input port is found; ``u'`` is the derivative of what feeds ``u``."""
+        if port.endswith("'"):
+            return self.input(block, port[:-1], order + 1)
         return self.output(self.diagram.drivers[PortRef(block, port)], order)
 
     def state_rate(self, block: str, state: str, order: int) -> Value:
@@ -67,18 +78,25 @@ class Network:
 
     def needs(self, node: Node) -> Iterator[tuple[Node, tuple[str, ...]]]:
         """The nodes that must be worked out before, each with the paths of the signals on the way to it."""
+        if node.group == HELD:
+            return
         group = self.equations[node.block].groups[node.group]
         for order in range(node.order + 1):
             for port in group.inputs:
-                ref = self.diagram.drivers[PortRef(node.block, port)]
-                yield self.output(ref, order).node, tuple(str(entry) for entry in self.route(ref))
+                ref = self.diagram.drivers[PortRef(node.block, port.removesuffix("'"))]
+                yield self.input(node.block, port, order).node, tuple(str(entry) for entry in self.route(ref))
             if order:
                 for state in group.states:
                     yield self.state_rate(node.block, state, order).node, (f"{node.block}/{state}'",)
 
     def roots(self) -> Iterator[Node]:
-        """Everything that a run asks for: all groups, and what the derivative ports need."""
+        """Everything that is asked for: all groups, and what the derivative ports need; at a tick, what the
+        sampled blocks work out."""
         for name, block in self.diagram.blocks.items():
+            if block.sampled and not self.ticking:
+                yield Node(name, HELD, 0)
+            if block.sampled is not self.ticking:
+                continue
             for index in range(len(self.equations[name].groups)):
                 yield Node(name, index, 0)
             for port in block.time_derivatives:
@@ -88,17 +106,31 @@ class Network:
         return Value(Node(block, self.equations[block].group_of[kind, name], order), kind, name)
 
 
-def evaluation_order(network: Network) -> list[Node]:
-    """All nodes, each after those it needs; the same for the same diagram, however it was built.
+@dataclass(frozen=True)
+class Evaluation:
+    """All nodes, each after those it needs, and the loops among them.
+
+    A loop is a node that is needed for itself, with the signals from it back to it, in the direction in which
+    they flow. Whoever needs that node before it is worked out gets an unknown in its place.
+    """
+
+    order: tuple[Node, ...]
+    loops: Mapping[Node, tuple[str, ...]]
+
+
+def evaluation_order(network: Network) -> Evaluation:
+    """In which order the nodes are worked out; the same for the same diagram, however it was built.
 
     Depth-first and without recursion, so that a chain may be as long as it likes.
 
-    Raises ``AlgebraicLoopError`` with the signals of the loop, in the direction in which they flow. Meeting
-    a group again in the same or in a higher order of differentiation is a loop (the orders would rise for
-    ever); in a lower order it is not.
+    Raises ``AlgebraicLoopError`` with the signals of a loop in which orders of differentiation would rise for
+    ever (a group needs itself in a higher order), and at a tick of one that leads through a sampled block:
+    nothing says what such a block should hold.
     """
     order: list[Node] = []
+    loops: dict[Node, tuple[str, ...]] = {}
     done: set[Node] = set()
+    where = f"diagram '{network.diagram.name}'"
     for root in network.roots():
         if root in done:
             continue
@@ -118,12 +150,25 @@ def evaluation_order(network: Network) -> list[Node]:
             if node in done:
                 continue
             orders = open_orders.setdefault((node.block, node.group), [])
-            if orders and node.order >= min(orders):
-                raise AlgebraicLoopError(_loop(path, step), where=f"diagram '{network.diagram.name}'")
+            if orders and node.order > min(orders):
+                raise AlgebraicLoopError(_loop(path, step), where=where)
+            if node.order in orders:
+                loop = _loop(path, step)
+                if network.ticking and any(
+                    network.diagram.blocks[entry.rsplit("/", 1)[0]].sampled for entry in loop
+                ):
+                    raise AlgebraicLoopError(
+                        loop,
+                        where=where,
+                        allowed="every loop through sampled blocks passes through one that delays",
+                        fix="put a Unit Delay into the loop",
+                    )
+                loops.setdefault(node, tuple(loop))
+                continue
             orders.append(node.order)
             path.append(step)
             pending.append(network.needs(node))
-    return order
+    return Evaluation(tuple(order), loops)
 
 
 def _loop(path: list[tuple[Node, tuple[str, ...]]], closing: tuple[Node, tuple[str, ...]]) -> list[str]:

@@ -24,12 +24,25 @@ class Port:
 
 @dataclass(frozen=True)
 class State:
-    """One continuous state of a block; the numerics hold its value, the block never does."""
+    """One state or mode of a block; the numerics hold its value, the block never does."""
 
     name: str
     shape: Shape
     doc: str
     unit: str = ""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """A quantity of a block at whose zero something happens; each entry of a vector is a guard by itself.
+
+    ``direction``: +1 where it fires on its way upwards, -1 downwards, 0 both.
+    """
+
+    name: str
+    shape: Shape
+    doc: str
+    direction: int = 0
 
 
 @dataclass(frozen=True, order=True)

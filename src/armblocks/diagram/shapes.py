@@ -55,6 +55,7 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
 
     Shapes spread from the ports that state theirs. A loop in which nobody does starts from what its
     integrators assume (a scalar start value), which is widened where the loop turns out to be wider.
+    A loop without any starts from a scalar.
 
     Raises ``DiagramError`` where the two ends of a connection, or the inputs of a block, do not agree.
     """
@@ -110,6 +111,19 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
             if PortRef(name, port) not in known:
                 learn(PortRef(name, port), shape)
     spread()
+    # What is left lies in loops that hold no state, or behind them: one scalar after the other is assumed.
+    # But where a block complains, it is heard first.
+    open_outputs = [
+        (name, PortRef(name, port.name))
+        for name, block in diagram.blocks.items()
+        for port in block.output_ports()
+        if PortRef(name, port.name) not in known
+    ]
+    if all(_input_shapes(name, diagram.blocks[name], drivers, known) is None for name, _ in open_outputs):
+        for _, ref in open_outputs:
+            if ref not in known:
+                learn(ref, ())
+                spread()
     return _checked(diagram, known)
 
 
@@ -146,8 +160,7 @@ def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     inputs: dict[str, Shapes] = {}
     outputs: dict[str, Shapes] = {}
     for name, block in diagram.blocks.items():
-        # Still unknown: behind a block that complains below, or in a loop without any integrator, which the
-        # ordering refuses; any shape does until then.
+        # Still unknown: behind a block that complains below; any shape does until then.
         taken: dict[str, Shape] = {}
         complete = True
         for port in block.input_ports():

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from casadi import SX, vertcat, vertsplit
+from casadi import SX, densify, depends_on, dot, if_else, jacobian, substitute, vertcat, vertsplit
+from numpy.typing import NDArray
 
-from armblocks.diagram.block import Signals
+from armblocks.diagram.block import Block, Signals
 from armblocks.diagram.block_equations import (
     BlockEquations,
     BlockSlot,
@@ -19,92 +22,152 @@ from armblocks.diagram.block_equations import (
     tunable_slots,
 )
 from armblocks.diagram.diagram import Diagram
-from armblocks.diagram.ordering import Network, Node, Value, evaluation_order
-from armblocks.diagram.port import PortRef
+from armblocks.diagram.implicit import check_solvable, solve_affine
+from armblocks.diagram.ordering import HELD, Evaluation, Network, Node, Value, evaluation_order
+from armblocks.diagram.port import Guard, PortRef
+from armblocks.diagram.sampling import Sampling, resolve_sampling
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
 from armblocks.diagram.units import infer_units
-from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, signature
+from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, flatten, signature
 from armblocks.errors import ArmblocksError, DiagramError
 
 
-def diagram_equations(diagram: Diagram, shapes: DiagramShapes) -> Mapping[str, BlockEquations]:
-    """The traced equations of every block, by block name.
+@dataclass(frozen=True)
+class Model:
+    """Everything about a diagram that does not need symbols: shapes, clocks, and in which order it is worked
+    out while the time flows and at a tick."""
 
-    Raises ``DiagramError`` naming the block whose parameters allow no equations (a robot without mass).
+    shapes: DiagramShapes
+    sampling: Sampling
+    flow: Network
+    flow_order: Evaluation
+    tick: Network
+    tick_order: Evaluation
+
+
+def diagram_model(diagram: Diagram) -> Model:
+    """Look at a diagram whose inputs are all connected.
+
+    Raises ``DiagramError`` for shapes and sample times that do not fit and for blocks whose parameters allow
+    no equations (a robot without mass), ``AlgebraicLoopError`` for loops that no order can solve.
     """
-    equations: dict[str, BlockEquations] = {}
-    for name, block in diagram.blocks.items():
-        try:
-            equations[name] = block_equations(block, shapes.inputs[name])
-        except DiagramError:
-            raise
-        except ArmblocksError as error:
-            where = ", ".join(filter(None, (f"block '{name}' ({block.title})", error.where)))
-            raise DiagramError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
-    return equations
+    shapes = infer_shapes(diagram)
+    free = {name: block for name, block in diagram.blocks.items() if not block.sampled}
+    equations = {name: _equations(name, block, shapes) for name, block in free.items()}
+    sampling = resolve_sampling(diagram, equations)
+    for name, clock in sampling.clock_of.items():
+        period = sampling.clocks[clock].period
+        equations[name] = _equations(name, diagram.blocks[name], shapes, period=period)
+    equations = {name: equations[name] for name in diagram.blocks}
+    flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
+    if sampling.clocks:
+        settled = {name: _equations(name, block, shapes, settled=True) for name, block in free.items()}
+        tick = Network(diagram, equations | settled, ticking=True)
+    return Model(
+        shapes=shapes,
+        sampling=sampling,
+        flow=flow,
+        flow_order=evaluation_order(flow),
+        tick=tick,
+        tick_order=evaluation_order(tick),
+    )
+
+
+def _equations(
+    name: str, block: Block, shapes: DiagramShapes, *, period: float = 1.0, settled: bool = False
+) -> BlockEquations:
+    try:
+        return block_equations(block, shapes.inputs[name], period=period, settled=settled)
+    except DiagramError:
+        raise
+    except ArmblocksError as error:
+        where = ", ".join(filter(None, (f"block '{name}' ({block.title})", error.where)))
+        raise DiagramError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
 
 
 def trace_diagram(diagram: Diagram) -> HybridSystem:
-    """All equations of a diagram over ``t, x, p``: see :class:`armblocks.equations.HybridSystem`.
+    """All equations of a diagram: see :class:`armblocks.equations.HybridSystem`.
 
-    One pass in evaluation order: each group of each block is worked out once, from values that are there
-    already. A Derivative block's output is the exact time derivative of what feeds it, built up group by
-    group by the chain rule (the derivative of a state being its equation); where its input jumps, the jump
-    is ignored.
+    Two passes in evaluation order, one for the flow and one for the ticks: each group of each block is worked
+    out once, from values that are there already. A Derivative block's output is the exact time derivative of
+    what feeds it, built up group by group by the chain rule (the derivative of a state being its equation);
+    where its input jumps, the jump is ignored. An algebraic loop is cut at one signal: linear ones are
+    solved here, the others leave an unknown and a residual.
 
-    Raises ``DiagramError`` or ``AlgebraicLoopError``; a diagram that a builder built raises nothing.
+    Raises ``DiagramError`` or ``AlgebraicLoopError``; of a diagram that a builder built, only for loops that
+    have no solution, or no single one.
     """
-    shapes = infer_shapes(diagram)
-    network = Network(diagram, diagram_equations(diagram, shapes))
-    order = evaluation_order(network)
-    tracing = _Tracing(network)
-    for node in order:
-        tracing.work_out(node)
-
-    signals = _signal_values(network, order, shapes)
+    model = diagram_model(diagram)
+    symbols = _Symbols(model)
+    flow = _Tracing(model.flow, symbols)
+    for node in model.flow_order.order:
+        flow.work_out(node)
+    signals = _signal_values(model.flow, model.flow_order.order, model.shapes)
     units = {str(ref): unit for ref, unit in infer_units(diagram).items()}
     layout = signature(*(Slot(path, shape, units.get(path, "")) for path, shape, _ in signals))
+    parameters = signature(*symbols.parameter_slots)
+    values = parameters.pack(_parameter_values(diagram))
+
+    loops = Implicit(model, symbols, flow, values)
     derivatives = [
-        tracing.value(network.state_rate(name, state.name, 1))
-        for name, equations in network.equations.items()
+        flow.value(model.flow.state_rate(name, state.name, 1))
+        for name, equations in model.flow.equations.items()
         for state in equations.states
     ]
-    parameters = signature(*tracing.parameter_slots)
-    ends = (tracing.t, tracing.x, tracing.p)
+    guards = _guards(model, flow)
+    ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
+    m, e = {"m": symbols.m}, {"e": symbols.e}
+
+    def function(name: str, ends: Mapping[str, SX], **results: Sequence[SX]) -> TracedFunction:
+        return _flat_function(name, ends, {key: loops.solved(parts) for key, parts in results.items()})
+
+    p = {"p": symbols.p}
+    residual = function("residual", ends, r=[loops.residual])
+    rates = densify(jacobian(residual.results[0], loops.w))
     return HybridSystem(
         name=diagram.name,
-        states=signature(*tracing.state_slots),
+        states=signature(*symbols.state_slots),
+        discrete=signature(*symbols.discrete_slots),
+        algebraic=loops.slots,
         parameters=parameters,
         signals_layout=layout,
-        parameter_values=parameters.pack(_parameter_values(diagram)),
-        derivative=_flat_function("derivative", ("t", "x", "p"), ends, "xd", derivatives),
-        signals=_flat_function(
-            "signals", ("t", "x", "p"), ends, "y", [tracing.value(value) for _, _, value in signals]
+        clocks=model.sampling.clocks,
+        parameter_values=values,
+        derivative=function("derivative", ends, xd=derivatives),
+        signals=function("signals", ends, y=[flow.value(value) for _, _, value in signals]),
+        residual=residual,
+        residual_jacobian=dataclasses.replace(
+            residual,
+            name="residual_jacobian",
+            outputs=signature(("J", rates.shape)),
+            results=(flatten(rates, rates.shape),),
         ),
-        initial_states=_flat_function(
-            "initial_states", ("p",), (tracing.p,), "x0", _initial_values(network, tracing)
-        ),
-        breakpoints=_flat_function(
+        update=function("update", ends | m, z=_updated(model, symbols, flow, loops)),
+        guards=function("guards", ends, g=[value for _, _, value in guards]),
+        guard_directions=tuple(guard.direction for _, guard, value in guards for _ in range(value.numel())),
+        guard_names=tuple(name for name, _, value in guards for _ in range(value.numel())),
+        reset=function("reset", ends | e, **_reset(model, symbols, flow)),
+        initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
+        initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),
+        initial_algebraic=function("initial_algebraic", p, w0=[SX.zeros(loops.w.numel())]),
+        breakpoints=function(
             "breakpoints",
-            ("p",),
-            (tracing.p,),
-            "times",
-            [
+            p,
+            times=[
                 SX(time)
                 for name, block in diagram.blocks.items()
-                for time in block.breakpoints(tracing.parameters_of(name))
+                for time in block.breakpoints(symbols.parameters_of(name))
             ],
         ),
         aliases=_aliases(diagram, layout),
     )
 
 
-class _Tracing:
-    """The symbols of a diagram and the values worked out so far; lives only while it is traced."""
+class _Symbols:
+    """The symbols of a diagram: time, states, discrete variables, parameters, ticks and events."""
 
-    def __init__(self, network: Network) -> None:
-        self.network = network
-        blocks = network.diagram.blocks
+    def __init__(self, model: Model) -> None:
+        equations, blocks = model.flow.equations, model.flow.diagram.blocks
         self.tunables = {name: tunable_slots(block) for name, block in blocks.items()}
         self.parameter_slots = [
             Slot(f"{name}.{slot.name}", slot.shape, slot.unit)
@@ -113,41 +176,209 @@ class _Tracing:
         ]
         self.state_slots = [
             Slot(f"{name}/{state.name}", state.shape, state.unit)
-            for name, equations in network.equations.items()
-            for state in equations.states
+            for name, found in equations.items()
+            for state in found.states
+        ]
+        self.discrete_slots: list[Slot] = []
+        for name, block in blocks.items():
+            for state in equations[name].discrete:
+                self.discrete_slots.append(Slot(f"{name}/{state.name}", state.shape, state.unit))
+            if block.sampled:
+                shapes = model.shapes.outputs[name]
+                self.discrete_slots += [Slot(f"{name}/{port}", shape) for port, shape in shapes.items()]
+        guard_slots = [
+            Slot(f"{name}/{guard.name}", guard.shape)
+            for name, found in equations.items()
+            for guard in found.guards
         ]
         self.t = SX.sym("t")
-        self.x, states = _symbols("x", [slot.size for slot in self.state_slots])
-        self.states = {slot.name: part for slot, part in zip(self.state_slots, states)}
+        self.x, self.states = _named_symbols("x", self.state_slots)
+        self.z, self.discrete = _named_symbols("z", self.discrete_slots)
+        self.e, self.events = _named_symbols("e", guard_slots)
+        self.m = SX.sym("m", len(model.sampling.clocks))
         sizes = [sum(slot.size for slot in slots) for slots in self.tunables.values()]
         self.p, parts = _symbols("p", sizes)
         self.parameters = dict(zip(self.tunables, parts))
-        self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
 
     def parameters_of(self, block: str) -> Signals:
         """The symbols of a block's tunable parameters, in their natural shapes."""
         return natural(self.tunables[block], self.parameters[block])
 
+
+class _Tracing:
+    """The values of one network worked out so far; lives only while it is traced."""
+
+    def __init__(
+        self, network: Network, symbols: _Symbols, clock_of: Mapping[str, int] | None = None
+    ) -> None:
+        self.network = network
+        self.symbols = symbols
+        self._clock_of = clock_of or {}
+        self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
+        self.unknowns: dict[Value, SX] = {}
+        """What stands for values that were needed before they were worked out: the cuts of the loops."""
+
     def work_out(self, node: Node) -> None:
         """Put the equations of one node over the values of the nodes that it needs."""
+        if node.group == HELD:
+            return
         group = self.network.equations[node.block].groups[node.group]
+        symbols = self.symbols
         columns: list[SX] = []
         for order in range(node.order + 1):
             states = [
                 self.value(self.network.state_rate(node.block, state, order))
                 if order
-                else self.states[f"{node.block}/{state}"]
+                else symbols.states[f"{node.block}/{state}"]
                 for state in group.states
             ]
+            # Discrete variables and events stand still while the time flows.
+            still = [symbols.discrete[f"{node.block}/{name}"] for name in group.discrete]
+            events = [symbols.events[f"{node.block}/{name}"] for name in group.events]
+            if order:
+                still, events = ([SX.zeros(part.numel()) for part in parts] for parts in (still, events))
             inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
-            columns.append(vertcat(*states, *inputs, SX(0, 1)))
-        (flat,) = group.rate(node.order).call([self.t, self.parameters[node.block], *columns], True, False)
+            columns.append(vertcat(*states, *still, *inputs, *events, SX(0, 1)))
+        arguments = [symbols.t, symbols.parameters[node.block], *columns]
+        (flat,) = group.rate(node.order).call(arguments, True, False)
         parts = _split(flat, [slot.size for slot in group.slots])
         self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
+        if node.block in self._clock_of:
+            ticks = symbols.m[self._clock_of[node.block]]
+            for slot in group.slots:
+                if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
+                    fresh = self._values[node][slot.kind, slot.name]
+                    held = symbols.discrete[f"{node.block}/{slot.name}"]
+                    self._values[node][slot.kind, slot.name] = if_else(ticks, fresh, held)
 
     def value(self, value: Value) -> SX:
-        """The flat column of a value that has been worked out."""
-        return self._values[value.node][value.kind, value.name]
+        """The flat column of a value: worked out, held, or unknown until its loop is closed."""
+        if value.node.group == HELD:
+            held = self.symbols.discrete[f"{value.node.block}/{value.name}"]
+            return SX.zeros(held.numel()) if value.node.order else held
+        if value.node in self._values:
+            return self._values[value.node][value.kind, value.name]
+        if value not in self.unknowns:
+            slots = self.network.equations[value.node.block].groups[value.node.group].slots
+            size = next(slot.size for slot in slots if (slot.kind, slot.name) == (value.kind, value.name))
+            self.unknowns[value] = SX.sym("w", size)
+        return self.unknowns[value]
+
+
+class Implicit:
+    """The unknowns of the loops of a traced network: solved, or left as ``w`` with their residual."""
+
+    def __init__(
+        self, model: Model, symbols: _Symbols, tracing: _Tracing, values: NDArray[np.float64]
+    ) -> None:
+        self.slots = Signature()
+        self.w = SX.sym("w", 0)
+        self.residual = SX(0, 1)
+        self._cuts, self._solution = SX(0, 1), SX(0, 1)
+        if not tracing.unknowns:
+            return
+        network, loops = model.flow, model.flow_order.loops
+        where = f"diagram '{network.diagram.name}'"
+        cuts = vertcat(*tracing.unknowns.values())
+        residual = vertcat(*[tracing.value(value) - cut for value, cut in tracing.unknowns.items()])
+        around = [loops[value.node] for value, cut in tracing.unknowns.items() for _ in range(cut.numel())]
+        check_solvable(cuts, residual, symbols.p, values, around, where)
+        solution, remaining = solve_affine(cuts, residual)
+        names = [
+            _unknown_name(value) + (f"[{k}]" if cut.numel() > 1 else "")
+            for value, cut in tracing.unknowns.items()
+            for k in range(cut.numel())
+        ]
+        self.slots = Signature(tuple(Slot(names[k]) for k in remaining))
+        self.w = SX.sym("w", len(remaining))
+        if remaining:
+            self.residual = substitute(
+                substitute(residual[remaining], cuts, solution), cuts[remaining], self.w
+            )
+            solution = substitute(solution, cuts[remaining], self.w)
+        self._cuts, self._solution = cuts, solution
+
+    def solved(self, parts: Sequence[SX]) -> SX:
+        """One column with the solutions in place of the cuts."""
+        column = vertcat(*parts, SX(0, 1))
+        return substitute(column, self._cuts, self._solution) if self._cuts.numel() else column
+
+
+def _unknown_name(value: Value) -> str:
+    primes = value.node.order + (value.kind is SlotKind.DERIVATIVE)
+    return f"{value.node.block}/{value.name}" + "'" * primes
+
+
+def _updated(model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit) -> list[SX]:
+    """All discrete variables after a tick.
+
+    Raises ``DiagramError`` where a loop that is not linear hangs on what is sampled at the same instant.
+    """
+    tick = _Tracing(model.tick, symbols, model.sampling.clock_of)
+    for node in model.tick_order.order:
+        tick.work_out(node)
+    equations, discrete = model.tick.equations, dict(symbols.discrete)
+    for name in model.sampling.clock_of:
+        for index, group in enumerate(equations[name].groups):
+            for slot in group.slots:
+                if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
+                    value = tick.value(Value(Node(name, index, 0), slot.kind, slot.name))
+                    discrete[f"{name}/{slot.name}"] = value
+    updated = vertcat(*discrete.values(), SX(0, 1))
+    if not tick.unknowns:
+        return [updated]
+    cuts = vertcat(*tick.unknowns.values())
+    residual = vertcat(*[tick.value(value) - cut for value, cut in tick.unknowns.items()])
+    solution, remaining = solve_affine(cuts, residual)
+    if remaining and depends_on(residual[remaining], symbols.m):
+        value = next(iter(tick.unknowns))
+        raise DiagramError(
+            f"the loop {' -> '.join(model.tick_order.loops[value.node])} is not linear, follows what is "
+            "sampled, and is sampled itself at the same instant",
+            where=f"diagram '{model.tick.diagram.name}'",
+            allowed="loops that are linear, or that no sampled block looks at in the tick that moves them",
+            fix="put a Unit Delay between the loop and one of the sampled blocks",
+        )
+    if remaining:
+        # The same equations as those of the flow, perhaps cut elsewhere: their values are known from there.
+        known = loops.solved([flow.value(_same(model.flow, value)) for value in tick.unknowns])
+        solution = substitute(solution, cuts[remaining], known[remaining])
+    return [substitute(updated, cuts, solution)]
+
+
+def _same(network: Network, value: Value) -> Value:
+    """The same quantity in another network, whose groups may be cut differently."""
+    group = network.equations[value.node.block].group_of[value.kind, value.name]
+    return value._replace(node=value.node._replace(group=group))
+
+
+def _guards(model: Model, flow: _Tracing) -> list[tuple[str, Guard, SX]]:
+    return [
+        (name, guard, flow.value(_value(model.flow, name, SlotKind.GUARD, guard.name)))
+        for name, equations in model.flow.equations.items()
+        for guard in equations.guards
+    ]
+
+
+def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
+    return Value(Node(block, network.equations[block].group_of[kind, name], 0), kind, name)
+
+
+def _reset(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, list[SX]]:
+    """States and discrete variables after events; without any event the modes settle."""
+    states, discrete = dict(symbols.states), dict(symbols.discrete)
+    quiet = dot(symbols.e, symbols.e) == 0.0 if symbols.e.numel() else SX(1.0)
+    for name, equations in model.flow.equations.items():
+        for kind, slot in equations.group_of:
+            path = f"{name}/{slot}"
+            if kind is SlotKind.RESET:
+                after = flow.value(_value(model.flow, name, kind, slot))
+                (states if path in states else discrete)[path] = after
+        for mode in equations.modes:
+            path = f"{name}/{mode.name}"
+            settled = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
+            discrete[path] = if_else(quiet, settled, discrete[path])
+    return {"x": list(states.values()), "z": list(discrete.values())}
 
 
 def _symbols(letter: str, sizes: Sequence[int]) -> tuple[SX, list[SX]]:
@@ -162,17 +393,17 @@ def _split(column: SX, sizes: Sequence[int]) -> list[SX]:
     return vertsplit(column, [0, *np.cumsum(sizes).tolist()]) if sizes else []
 
 
-def _flat_function(
-    name: str, inputs: tuple[str, ...], symbols: tuple[SX, ...], output: str, values: Sequence[SX]
-) -> TracedFunction:
-    flat = vertcat(*values, SX(0, 1))
-    ends = Signature(
-        tuple(
-            Slot(letter, () if letter == "t" else (symbol.numel(),))
-            for letter, symbol in zip(inputs, symbols)
-        )
-    )
-    return TracedFunction(name, ends, signature(Slot(output, (flat.numel(),))), symbols, (flat,))
+def _named_symbols(letter: str, slots: Sequence[Slot]) -> tuple[SX, dict[str, SX]]:
+    whole, parts = _symbols(letter, [slot.size for slot in slots])
+    return whole, {slot.name: part for slot, part in zip(slots, parts)}
+
+
+def _flat_function(name: str, inputs: Mapping[str, SX], outputs: Mapping[str, SX]) -> TracedFunction:
+    def ends(columns: Mapping[str, SX]) -> Signature:
+        shapes = {letter: () if letter == "t" else (column.numel(),) for letter, column in columns.items()}
+        return Signature(tuple(Slot(letter, shape) for letter, shape in shapes.items()))
+
+    return TracedFunction(name, ends(inputs), ends(outputs), tuple(inputs.values()), tuple(outputs.values()))
 
 
 def _signal_values(
@@ -186,10 +417,22 @@ def _signal_values(
             derived.setdefault(network.output(ref).node, []).append(ref)
 
     def recorded(node: Node, slot: BlockSlot) -> bool:
-        return node.order == 0 and slot.kind is not SlotKind.DERIVATIVE
+        return node.order == 0 and slot.kind in (SlotKind.OUTPUT, SlotKind.RECORD)
 
     signals: list[tuple[str, tuple[int, ...], Value]] = []
     for node in order:
+        if node.group == HELD:
+            if node.order == 0:
+                held = shapes.outputs[node.block]
+                signals.extend(
+                    (f"{node.block}/{port}", shape, Value(node, SlotKind.OUTPUT, port))
+                    for port, shape in held.items()
+                )
+            signals.extend(
+                (str(ref), shapes.outputs[ref.block][ref.port], network.output(ref))
+                for ref in derived.get(node, [])
+            )
+            continue
         for slot in network.equations[node.block].groups[node.group].slots:
             if recorded(node, slot):
                 path = f"{node.block}/{slot.name}"
@@ -210,11 +453,24 @@ def _parameter_values(diagram: Diagram) -> dict[str, Any]:
     }
 
 
-def _initial_values(network: Network, tracing: _Tracing) -> list[SX]:
+def _initial_values(model: Model, symbols: _Symbols) -> list[SX]:
     values: list[SX] = []
-    for name, equations in network.equations.items():
-        given = network.diagram.blocks[name].initial_states(tracing.parameters_of(name))
+    for name, equations in model.flow.equations.items():
+        given = model.flow.diagram.blocks[name].initial_states(symbols.parameters_of(name))
         values.extend(spread(SX(given[state.name]), state.shape) for state in equations.states)
+    return values
+
+
+def _initial_discrete(model: Model, symbols: _Symbols) -> list[SX]:
+    values: list[SX] = []
+    for name, equations in model.flow.equations.items():
+        block, p = model.flow.diagram.blocks[name], symbols.parameters_of(name)
+        given = {**block.initial_states(p)}
+        values.extend(spread(SX(given.get(state.name, 0.0)), state.shape) for state in equations.discrete)
+        if block.sampled:
+            held = block.initial_outputs(p)
+            shapes = model.shapes.outputs[name]
+            values.extend(spread(SX(held.get(port, 0.0)), shape) for port, shape in shapes.items())
     return values
 
 

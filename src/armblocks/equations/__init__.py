@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from armblocks.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from armblocks.equations.hybrid_system import HybridSystem
+    from armblocks.equations.continuous import continuous_system
+    from armblocks.equations.hybrid_system import HybridSystem, SampleClock
     from armblocks.equations.options import SimulationOptions
     from armblocks.equations.signatures import Shape, Signature, Slot, signature
     from armblocks.equations.symbols import flatten, matrix_shape, unflatten
@@ -15,11 +16,13 @@ else:
         __name__,
         {
             "HybridSystem": "armblocks.equations.hybrid_system",
+            "SampleClock": "armblocks.equations.hybrid_system",
             "Shape": "armblocks.equations.signatures",
             "Signature": "armblocks.equations.signatures",
             "SimulationOptions": "armblocks.equations.options",
             "Slot": "armblocks.equations.signatures",
             "TracedFunction": "armblocks.equations.traced_function",
+            "continuous_system": "armblocks.equations.continuous",
             "flatten": "armblocks.equations.symbols",
             "matrix_shape": "armblocks.equations.symbols",
             "signature": "armblocks.equations.signatures",
@@ -29,11 +32,13 @@ else:
 
 __all__ = [
     "HybridSystem",
+    "SampleClock",
     "Shape",
     "Signature",
     "SimulationOptions",
     "Slot",
     "TracedFunction",
+    "continuous_system",
     "flatten",
     "matrix_shape",
     "signature",

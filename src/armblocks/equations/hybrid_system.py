@@ -10,35 +10,82 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.equations.signatures import Signature
+from armblocks.errors import InputError
 
 if TYPE_CHECKING:
     from armblocks.equations.traced_function import TracedFunction
 
 
+@dataclass(frozen=True)
+class SampleClock:
+    """Ticks at ``offset + k period`` (s), ``k = 0, 1, …``: computed, never accumulated."""
+
+    period: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.period < np.inf and 0.0 <= self.offset < self.period):
+            raise InputError(
+                f"a clock has the period {self.period:g} s and the offset {self.offset:g} s",
+                allowed="a finite period > 0 and 0 <= offset < period",
+                fix="change the sample time",
+            )
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HybridSystem:
-    """``x' = derivative(t, x, p)``, ``y = signals(t, x, p)``, ``x(0) = initial_states(p)``.
+    """Continuous flow, sampled parts, events and implicit equations of one diagram.
 
-    The flat vectors ``x`` (states), ``p`` (tunable parameters) and ``y`` (signals) are laid out by the three
-    signatures. Slot names are paths: a signal is ``block/port``, a state ``block/state``, a parameter
-    ``block.parameter``; signals stand in evaluation order, so the first non-finite one is the culprit.
+    ``x' = derivative(t, x, z, w, p)``, ``y = signals(t, x, z, w, p)``, ``x(0) = initial_states(p)``, where
+    ``w`` solves ``0 = residual(t, x, z, w, p)``. ``z`` jumps at instants and is constant in between.
 
-    All four functions have flat ends:
-    ``derivative`` and ``signals``: inputs ``t ()``, ``x (nx,)``, ``p (np,)``; one output ``xd (nx,)`` or
-    ``y (ny,)``.
-    ``initial_states``: input ``p``; output ``x0 (nx,)``.
+    The flat vectors ``x`` (states), ``z`` (discrete), ``w`` (algebraic), ``p`` (tunable parameters) and ``y``
+    (signals) are laid out by the signatures. Slot names are paths: a signal is ``block/port``, a state
+    ``block/state``, a parameter ``block.parameter``; signals stand in evaluation order, so the first
+    non-finite one is the culprit.
+
+    All functions have flat ends. ``derivative``, ``signals``, ``residual``, ``residual_jacobian`` and
+    ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``; one output ``xd (nx,)``,
+    ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``.
+    ``update``: one input more, ``m (nclocks,)``; output ``z (nz,)``: what z becomes at an instant at which
+    the clocks with ``m[k] = 1`` tick. ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired
+    upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it settles modes
+    (a limiter that starts beyond its limit) and changes nothing else: a run calls it so once, at the start
+    after the ticks, and takes the signs of the guards then. A breakpoint is an instant like a tick: guards
+    are compared across it.
+    ``initial_states``, ``initial_discrete``, ``initial_algebraic``: input ``p``; output ``x0``, ``z0``,
+    ``w0``. At the start all clocks without an offset tick, before the first derivative.
     ``breakpoints``: input ``p``; output ``times (nb,)``: known instants at which signals jump (a step
-    source). A signal is right-continuous there: at the instant itself it has its new value.
+    source). A signal is right-continuous: at such an instant, a tick or an event it has its new value.
     """
 
     name: str
     states: Signature
+    discrete: Signature
+    """Held outputs, discrete states and modes: slots ``block/state``."""
+    algebraic: Signature
+    """Unknowns of implicit equations: slots ``block/port``."""
     parameters: Signature
     signals_layout: Signature
+    clocks: tuple[SampleClock, ...]
+    """The distinct sample times, fastest first."""
     parameter_values: NDArray[np.float64]
     derivative: TracedFunction
     signals: TracedFunction
+    residual: TracedFunction
+    residual_jacobian: TracedFunction
+    """Derivative of ``residual`` by ``w``."""
+    update: TracedFunction
+    guards: TracedFunction
+    """An event happens where one of its entries crosses zero."""
+    guard_directions: tuple[int, ...]
+    """+1 upwards, -1 downwards, 0 both."""
+    guard_names: tuple[str, ...]
+    """The block of each guard, for messages."""
+    reset: TracedFunction
     initial_states: TracedFunction
+    initial_discrete: TracedFunction
+    initial_algebraic: TracedFunction
     breakpoints: TracedFunction
     aliases: Mapping[str, str]
     """Other names of signals: the block's bare name where it has one output, and an input port

@@ -18,7 +18,7 @@ from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import UnknownNameError
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
-from armblocks.simulation import SimulationResult
+from armblocks.simulation import RunState, SimulationResult
 from armblocks.simulation import simulate as run_system
 from armblocks.simulation.simulate import Progress
 
@@ -46,6 +46,7 @@ class CompiledDiagram:
         *,
         parameters: Mapping[str, object] | None = None,
         progress: Progress | None = None,
+        initial_state: RunState | None = None,
     ) -> SimulationResult:
         """Run once; see :func:`simulate`."""
         values = None
@@ -53,9 +54,15 @@ class CompiledDiagram:
             changed = with_parameters(self.diagram, parameters)
             values = self._retuned(changed, parameters)
             if values is None:
-                return CompiledDiagram(changed).simulate(options, progress=progress)
+                return CompiledDiagram(changed).simulate(
+                    options, progress=progress, initial_state=initial_state
+                )
         result = run_system(
-            self.compiled, options or self.diagram.settings, parameters=values, progress=progress
+            self.compiled,
+            options or self.diagram.settings,
+            parameters=values,
+            progress=progress,
+            initial_state=initial_state,
         )
         if self._watch is None:
             self._watch = LimitWatch(self.diagram, result)
@@ -95,6 +102,7 @@ def simulate(
     *,
     parameters: Mapping[str, object] | None = None,
     progress: Progress | None = None,
+    initial_state: RunState | str | PathLike[str] | None = None,
     **settings: Any,
 ) -> SimulationResult:
     """Run a diagram and return its recorded signals.
@@ -103,17 +111,21 @@ def simulate(
     the names of :class:`SimulationOptions`: ``stop_time``, ``solver``, ``step``, ``sample_time``,
     ``max_step``, ``rtol``, ``atol``. ``parameters`` gives other values to parameters of blocks,
     ``{"jtraj.tmax": 5.0}``; tunable ones need no new compilation. ``progress(time, fraction,
-    real_time_factor)`` is called now and then during a long run.
+    real_time_factor)`` is called now and then during a long run. ``initial_state``: another run's
+    ``final_state``, or the file that its ``save`` wrote; the run goes on from there to ``stop_time``, bit for
+    bit as if the other had not ended where nothing else is changed.
 
     Raises InputError for a setting out of range, UnknownNameError for an unknown one, SimulationError (with
     the ``partial`` result) where the run cannot go on.
     """
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    if initial_state is not None and not isinstance(initial_state, RunState):
+        initial_state = RunState.load(initial_state)
     if not settings:
-        return model.simulate(parameters=parameters, progress=progress)
+        return model.simulate(parameters=parameters, progress=progress, initial_state=initial_state)
     known = [field.name for field in dataclasses.fields(SimulationOptions)]
     for name in settings:
         if name not in known:
             raise UnknownNameError("setting", name, known, where="simulate")
     options = dataclasses.replace(model.diagram.settings, **settings)
-    return model.simulate(options, parameters=parameters, progress=progress)
+    return model.simulate(options, parameters=parameters, progress=progress, initial_state=initial_state)

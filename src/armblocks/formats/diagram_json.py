@@ -171,7 +171,9 @@ def _located(node: Node) -> Generator[None]:
     try:
         yield
     except AlgebraicLoopError as error:
-        raise AlgebraicLoopError(error.loop, where=_joined(node, error)) from error
+        raise AlgebraicLoopError(
+            error.loop, where=_joined(node, error), why=error.why, allowed=error.allowed, fix=error.fix
+        ) from error
     except UnknownNameError as error:
         raise UnknownNameError(error.kind, error.name, error.known, where=_joined(node, error)) from error
     except DiagramError as error:

@@ -26,14 +26,17 @@ def element_name(layout: Signature, place: int) -> str:
 
 
 def first_bad_signal(
-    system: CompiledSystem, instants: Array, signals: Array
+    system: CompiledSystem, instants: Array, signals: Array, algebraic: Array
 ) -> tuple[SimulationError, int] | None:
     """The error for the first signal that is NaN or infinite, and how many instants before it are good.
 
-    ``signals`` ``(ny, N)``. First in time, then in evaluation order. Finite signals cost one pass over
-    memory: a sum that is finite proves them so. (Not a dot product: BLAS would start threads for it, which
-    wait for each other for milliseconds where the processors are busy.)
+    ``signals`` ``(ny, N)``, ``algebraic`` ``(N, nw)``. First in time, then in evaluation order. Finite
+    signals cost one pass over memory: a sum that is finite proves them so. (Not a dot product: BLAS would
+    start threads for it, which wait for each other for milliseconds where the processors are busy.)
     """
+    if algebraic.size and not np.isfinite(algebraic).all():
+        unsolved = int(np.argmin(np.isfinite(algebraic).all(axis=1)))
+        return _unsolved(system, float(instants[unsolved])), unsolved
     with np.errstate(over="ignore", invalid="ignore"):
         if math.isfinite(np.add.reduce(signals.reshape(-1))):
             return None
@@ -61,18 +64,50 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
     """Why the native loop gave up."""
     if run.status is Status.STEP_TOO_SMALL:
         return _step_too_small(system, run)
+    if run.status is Status.ENDLESS_EVENTS:
+        return _endless_events(system, run)
     time, state = run.first_non_finite_stage()
-    signals = system.evaluate_signals(np.array([time]), state[np.newaxis], p)[:, 0]
+    point = run.point
+    if not np.isfinite(run.trial_unknowns).all():
+        return _unsolved(system, time)
+    z, w = point.z[np.newaxis], run.trial_unknowns[np.newaxis].copy()
+    signals = system.evaluate_signals(np.array([time]), state[np.newaxis], z, w, p)[:, 0]
     bad = np.flatnonzero(~np.isfinite(signals))
     if bad.size:
         return _signal_error(system, int(bad[0]), float(signals[bad[0]]), time)
-    place = int(np.argmin(np.isfinite(system.derivative(time, state, p))))
+    slope = system.derivative(time, state, point.z, run.trial_unknowns, p)
+    place = int(np.argmin(np.isfinite(slope)))
     name = element_name(system.states, place)
     return SimulationError(
         f"the derivative of state '{name}' is not finite at {time:.9g} s, where it is {state[place]:.6g}",
         where=system.name,
         allowed="finite numbers",
         fix="the solution may blow up there, or the step may be too long: look at what drives the state",
+    )
+
+
+def _unsolved(system: CompiledSystem, time: float) -> SimulationError:
+    blocks = sorted({slot.name.rpartition("/")[0] or slot.name for slot in system.algebraic})
+    names = ", ".join(f"'{name}'" for name in blocks)
+    return SimulationError(
+        f"the implicit equations of the loop through {names} have no solution that can be found "
+        f"at {time:.9g} s",
+        where=system.name,
+        allowed="loops with one solution near the one before: the Jacobian must not be singular",
+        fix="look whether the loop has a solution, or infinitely many; a delay or an integrator breaks it",
+    )
+
+
+def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError:
+    guard = run.last_guard
+    block = system.guard_names[guard]
+    return SimulationError(
+        f"block '{block}' causes events without end at {run.time:.15g} s, after {run.events} events in all: "
+        "they follow one another at ever shorter distances, or at one instant (Zeno behaviour or chattering)",
+        where=system.name,
+        allowed="at most 1000 events as good as at one instant, and distances that do not shrink to nothing",
+        fix=f"give '{block}' a hysteresis, a dead band or a state of rest (a ball that stops bouncing below "
+        "some speed), or stop the run before that time",
     )
 
 
@@ -102,14 +137,17 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     tried = run.accepted + run.rejected
     if tried < MANY_STEPS or run.time <= 0.0:
         return ""
-    x, t = run.state.copy(), run.time
-    slope = system.derivative(t, x, p)
+    point = run.point
+    x, t, rest = point.x, point.time, (point.z, point.w, p)
+    if x.size == 0:
+        return ""
+    slope = system.derivative(t, x, *rest)
     size = 1e-7 * max(1.0, float(np.linalg.norm(x)))
     direction = np.ones_like(x) + 0.1 * np.arange(x.size)
     rate = 0.0
     for _ in range(30):
         direction *= size / np.linalg.norm(direction)
-        change = system.derivative(t, x + direction, p) - slope
+        change = system.derivative(t, x + direction, *rest) - slope
         rate = float(np.linalg.norm(change)) / size
         if not np.isfinite(rate) or rate == 0.0:
             return ""

@@ -14,7 +14,7 @@ from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.simulation.tableaux import DEFAULT, RK4, find_tableau
+from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, find_tableau
 
 Array = NDArray[np.float64]
 
@@ -28,18 +28,29 @@ SMALLEST_RTOL = 1e-13
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """One run, settled. ``tableau`` is ``None`` where there are no states and so nothing to integrate."""
+    """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time."""
 
     tableau: ButcherTableau | None
+    solver: str
     reason: str
     instants: Array
     step: float
     max_step: float
 
 
-def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
-    """Settle every open choice of ``options``. Raises ``InputError`` for values that cannot be run."""
+def make_plan(system: CompiledSystem, options: SimulationOptions, start: float = 0.0) -> Plan:
+    """Settle every open choice of ``options`` for a run that begins at ``start``.
+
+    Raises ``InputError`` for values that cannot be run.
+    """
     stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
+    if start > 0.0 and stop <= start:
+        raise InputError(
+            f"stop_time is {stop:g} s, and the run goes on from {start:g} s",
+            where=system.name,
+            allowed=f"a time after {start:g} s: stop_time counts from 0, not from the saved state",
+            fix=f"for 1 s more, stop_time={start + 1.0:g}",
+        )
     step = options.step
     if step is not None:
         step = _number("step", step, "a time in s above 0, at most the stop time", above=0.0)
@@ -64,10 +75,12 @@ def make_plan(system: CompiledSystem, options: SimulationOptions) -> Plan:
     max_step = math.inf
     if options.max_step is not None:
         max_step = _number("max_step", options.max_step, "a time in s above 0", above=0.0)
+    solver = "none" if tableau is None or system.states.size == 0 else tableau.name
     return Plan(
         tableau=tableau,
+        solver=solver,
         reason=reason,
-        instants=sample_instants(stop, sample_time),
+        instants=sample_instants(stop, sample_time, start),
         step=step if step is not None else sample_time,
         max_step=max_step,
     )
@@ -87,6 +100,9 @@ def _number(
 def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[ButcherTableau | None, str]:
     automatic = options.solver.casefold() == "auto"
     named = None if automatic else find_tableau(options.solver)
+    if system.states.size == 0 and system.sizes.hybrid:
+        # Steps of no states: what they do is to go from instant to instant, and to look at guards.
+        return EULER, "none needed: the system has no continuous states, only instants are worked out"
     if system.states.size == 0:
         return None, "none needed: the system has no states, every instant is evaluated directly"
     if named is None and options.step is not None:
@@ -125,8 +141,8 @@ def _sample_time(
     return sample_time
 
 
-def sample_instants(stop: float, sample_time: float) -> Array:
-    """``k sample_time`` for ``k = 0, 1, …`` below ``stop``, and ``stop`` itself, ``(N,)`` s.
+def sample_instants(stop: float, sample_time: float, start: float = 0.0) -> Array:
+    """``start``, ``k sample_time`` for ``k = 0, 1, …`` between, and ``stop`` itself, ``(N,)`` s.
 
     Each is one product, never a sum, so no error grows. An instant within a billionth of a sample time of the
     stop time is the stop time.
@@ -134,6 +150,9 @@ def sample_instants(stop: float, sample_time: float) -> Array:
     last = math.ceil(stop / sample_time - 1e-9)
     instants: Array = np.arange(last + 1, dtype=np.float64) * sample_time
     instants[-1] = stop
+    if start > 0.0:
+        after = instants[instants > start + 1e-9 * sample_time]
+        instants = np.concatenate([[start], after if after.size else [stop]])
     return instants
 
 

@@ -17,6 +17,8 @@ from armblocks.errors import UnknownNameError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from armblocks.simulation.run_state import RunState
+
 Array = NDArray[np.float64]
 
 
@@ -33,11 +35,11 @@ class RunReport:
     """How a run went.
 
     ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
-    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative.
-    ``preparation_time`` s for the native code to be compiled or loaded, next to nothing when it is there;
-    ``wall_time`` s of the run itself; ``real_time_factor`` simulated seconds per second of it. ``complete``:
-    whether the stop time was reached; ``message``: what a person should know (why it stopped, stiffness),
-    else empty.
+    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``ticks``:
+    instants at which a clock ticked; ``events``: guards that fired. ``preparation_time`` s for the native
+    code to be compiled or loaded, next to nothing when it is there; ``wall_time`` s of the run itself;
+    ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop time was reached;
+    ``message``: what a person should know (why it stopped, stiffness), else empty.
     """
 
     solver: str
@@ -45,6 +47,8 @@ class RunReport:
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
+    ticks: int = 0
+    events: int = 0
     preparation_time: float = 0.0
     wall_time: float = 0.0
     real_time_factor: float = 0.0
@@ -57,7 +61,8 @@ class SimulationResult:
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
-    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used.
+    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used;
+    ``final_state`` what a run needs to go on from here, ``None`` where it failed.
     """
 
     name: str
@@ -70,6 +75,7 @@ class SimulationResult:
     parameter_values: Array
     aliases: Mapping[str, str]
     run: RunReport
+    final_state: RunState | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import Integration
+from armblocks.compiler.native_integrator import Integration, RunPoint
 from armblocks.compiler.system import CompiledSystem
-from armblocks.equations import SimulationOptions
+from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import SimulationError
 from armblocks.simulation.diagnosis import first_bad_signal, integration_failure, stiffness_hint
 from armblocks.simulation.plan import Plan, make_plan, parameter_vector
 from armblocks.simulation.result import RunReport, SimulationResult
+from armblocks.simulation.run_state import RunState, check_state, settings_text, slot_names
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, float, float], None]
@@ -31,8 +32,13 @@ def simulate(
     options: SimulationOptions,
     parameters: Mapping[str, ArrayLike] | ArrayLike | None = None,
     progress: Progress | None = None,
+    initial_state: RunState | None = None,
 ) -> SimulationResult:
     """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
+
+    With an ``initial_state``, another run's ``final_state``, it goes on from there to ``stop_time``: bit for
+    bit as if that run had not ended, if solver, settings and parameters are the same, else started anew from
+    its values; ``run.reason`` says which.
 
     ``parameters`` changes tunable ones: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
     ``progress(time, fraction, real_time_factor)`` is called at most some 16 times a second and at the end.
@@ -49,11 +55,26 @@ def simulate(
     ``partial`` is the result up to the last good instant.
     """
     p = parameter_vector(compiled, parameters)
-    plan = make_plan(compiled, options)
+    if initial_state is not None:
+        check_state(compiled, initial_state)
+    plan = make_plan(compiled, options, 0.0 if initial_state is None else initial_state.time)
     started = perf_counter()
     compiled.prepare(plan.tableau)
     begun = perf_counter()
-    return _Run(compiled, options, plan, p, begun, begun - started, progress).result()
+    return _Run(compiled, options, plan, p, begun, begun - started, progress, initial_state).result()
+
+
+def _check_initial(compiled: CompiledSystem, layout: Signature, values: Array) -> None:
+    """Raise ``SimulationError`` naming the first variable that does not start at finite numbers."""
+    for slot in layout:
+        given = values[layout.ranges[slot.name]]
+        if not np.isfinite(given).all():
+            raise SimulationError(
+                f"the initial value of state '{slot.name}' is {given.tolist()}",
+                where=compiled.name,
+                allowed="finite numbers",
+                fix="change the block's initial value",
+            )
 
 
 class _Run:
@@ -68,6 +89,7 @@ class _Run:
         begun: float,
         preparation_time: float,
         progress: Progress | None,
+        initial_state: RunState | None,
     ) -> None:
         self.compiled = compiled
         self.options = options
@@ -76,6 +98,9 @@ class _Run:
         self.begun = begun
         self.preparation_time = preparation_time
         self.progress = progress
+        self.initial_state = initial_state
+        self.reason = plan.reason
+        self.settings = ""
         self.integration: Integration | None = None
         self.message = ""
         self.complete = True
@@ -84,24 +109,25 @@ class _Run:
     def result(self) -> SimulationResult:
         instants = self.plan.instants
         failure: SimulationError | None = None
-        if self.plan.tableau is None:
-            states = np.empty((instants.size, 0))
-        else:
+        states, discrete, algebraic = (np.empty((instants.size, 0)) for _ in range(3))
+        if self.plan.tableau is not None:
             integration = self.integrate()
-            states = integration.states[: integration.recorded]
-            instants = instants[: integration.recorded]
+            recorded = integration.recorded
+            instants = instants[:recorded]
+            states, discrete = integration.states[:recorded], integration.discrete[:recorded]
+            algebraic = integration.algebraic[:recorded]
             if integration.status not in (Status.DONE, Status.PAUSED):
                 failure = integration_failure(self.compiled, integration, self.p)
             self.note_stiffness(integration)
-        signals = self.compiled.evaluate_signals(instants, states, self.p)
-        bad = first_bad_signal(self.compiled, instants, signals)
+        signals = self.compiled.evaluate_signals(instants, states, discrete, algebraic, self.p)
+        bad = first_bad_signal(self.compiled, instants, signals, algebraic)
         if bad is not None:
             failure, good = bad
             instants, states, signals = instants[:good], states[:good], signals[:, :good]
         if failure is not None:
             self.complete = False
             self.message = " ".join(part for part in (failure.what + ".", self.message) if part)
-            failure.partial = self.make_result(instants, states, signals)
+            failure.partial = self.make_result(instants, states, signals, failed=True)
             raise failure
         if self.progress is not None and self.complete:
             self.show(float(instants[-1]))
@@ -111,19 +137,28 @@ class _Run:
         """Take all steps, in chunks, until the end, a failure or Ctrl-C."""
         compiled, options, plan = self.compiled, self.options, self.plan
         assert plan.tableau is not None
-        x0 = compiled.initial_states(self.p)
-        if not np.isfinite(x0).all():
-            bad = next(
-                s.name for s in compiled.states if not np.isfinite(x0[compiled.states.ranges[s.name]]).all()
+        native = compiled.integrator(plan.tableau)
+        step = 0.0 if plan.tableau.adaptive else plan.step
+        numbers = (step, options.rtol, options.atol, plan.max_step)
+        self.settings = settings_text(native.key, numbers, self.p)
+        checkpoint = None
+        if self.initial_state is not None:
+            start = self.resume_from(self.initial_state)
+            if self.initial_state.settings == self.settings:
+                checkpoint = self.initial_state.checkpoint
+            how = "exactly as the run before" if checkpoint is not None else "started anew"
+            self.reason = f"{plan.reason}; goes on from {start.time:g} s, {how}"
+        else:
+            start = RunPoint(
+                time=0.0,
+                x=compiled.initial_states(self.p),
+                z=compiled.initial_discrete(self.p),
+                w=compiled.initial_algebraic(self.p),
             )
-            raise SimulationError(
-                f"the initial value of state '{bad}' is {x0[compiled.states.ranges[bad]].tolist()}",
-                where=compiled.name,
-                allowed="finite numbers",
-                fix="change the block's initial value",
-            )
-        integration = compiled.integrator(plan.tableau).begin(
-            x0,
+            for layout, values in ((compiled.states, start.x), (compiled.discrete, start.z)):
+                _check_initial(compiled, layout, values)
+        integration = native.begin(
+            start,
             self.p,
             plan.instants,
             compiled.breakpoints(self.p),
@@ -131,6 +166,7 @@ class _Run:
             rtol=options.rtol,
             atol=options.atol,
             max_step=plan.max_step,
+            checkpoint=checkpoint,
         )
         self.integration = integration
         steps = 1000
@@ -148,6 +184,33 @@ class _Run:
             self.message = f"stopped by Ctrl-C at {integration.time:g} s of {options.stop_time:g} s"
         return integration
 
+    @staticmethod
+    def resume_from(state: RunState) -> RunPoint:
+        """The values of a saved state."""
+        return RunPoint(time=state.time, x=state.states, z=state.discrete, w=state.algebraic, begun=True)
+
+    def final_state(self) -> RunState:
+        """What a run needs to go on from where this one stands."""
+        compiled, integration = self.compiled, self.integration
+        checkpoint = None
+        if integration is None:
+            point = RunPoint(time=float(self.plan.instants[-1]), x=np.empty(0))
+        else:
+            point = integration.point
+            checkpoint = integration.checkpoint
+            if checkpoint is None and integration.status is Status.PAUSED:
+                checkpoint = integration.now()  # stopped between two steps: the next one goes on from here
+        return RunState(
+            name=compiled.name,
+            time=point.time,
+            states=point.x,
+            discrete=point.z,
+            algebraic=point.w,
+            names=slot_names(compiled),
+            settings=self.settings,
+            checkpoint=checkpoint,
+        )
+
     def show(self, time: float) -> None:
         """Tell the progress."""
         self.shown = perf_counter()
@@ -160,16 +223,20 @@ class _Run:
         if hint:
             self.message = f"{self.message}. {hint}" if self.message else hint
 
-    def make_result(self, instants: Array, states: Array, signals: Array) -> SimulationResult:
+    def make_result(
+        self, instants: Array, states: Array, signals: Array, *, failed: bool = False
+    ) -> SimulationResult:
         compiled, plan, integration = self.compiled, self.plan, self.integration
         wall_time = perf_counter() - self.begun
         reached = float(instants[-1]) if instants.size else 0.0
         report = RunReport(
-            solver="none" if plan.tableau is None else plan.tableau.name,
-            reason=plan.reason,
+            solver=plan.solver,
+            reason=self.reason,
             steps=0 if integration is None else integration.accepted,
             rejected=0 if integration is None else integration.rejected,
             evaluations=0 if integration is None else integration.evaluations,
+            ticks=0 if integration is None else integration.instants,
+            events=0 if integration is None else integration.events,
             preparation_time=self.preparation_time,
             wall_time=wall_time,
             real_time_factor=reached / wall_time,
@@ -187,4 +254,5 @@ class _Run:
             parameter_values=self.p,
             aliases=compiled.aliases,
             run=report,
+            final_state=None if failed else self.final_state(),
         )

@@ -1,0 +1,387 @@
+"""Elementwise arithmetic: every element of the output follows from the elements of the inputs beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, atan2, ceil, cos, fabs, floor, fmod, hypot, if_else, logic_and, sign, sin, sqrt
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import common_unit
+from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+
+
+def _round(u: SX) -> SX:
+    """To the nearest integer, halves away from zero, exact for every double."""
+    whole = floor(fabs(u))
+    return sign(u) * (whole + (fabs(u) - whole >= 0.5))
+
+
+def _modulo(u: SX, v: SX) -> SX:
+    """The remainder with the sign of the divisor; u itself where the divisor is zero."""
+    rest = fmod(u, v)
+    other_sign = logic_and(rest != 0.0, (rest < 0.0) != (v < 0.0))
+    return if_else(v == 0.0, u, if_else(other_sign, rest + v, rest))
+
+
+_ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
+    "floor": floor,
+    "ceil": ceil,
+    "round": _round,
+    "fix": lambda u: sign(u) * floor(fabs(u)),
+}
+_ROOTS: Mapping[str, Callable[[SX], SX]] = {
+    "sqrt": sqrt,
+    "signedSqrt": lambda u: sign(u) * sqrt(fabs(u)),
+    "rSqrt": lambda u: 1.0 / sqrt(u),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Abs(Block):
+    """The absolute value of every element: y = abs(u)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Abs"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its absolute value"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": fabs(u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bias(Block):
+    """A constant added to every element: y = u + bias."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Bias"
+
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the shifted signal"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "bias": shape_of(self.bias)})}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] + p["bias"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnaryMinus(Block):
+    """The negative of every element: y = -u."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Unary Minus"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its negative"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": -u["u"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sign(Block):
+    """The sign of every element: y = 1 where u > 0, -1 where u < 0, 0 where u = 0."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Sign"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its sign"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": sign(u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sqrt(Block):
+    """A square root of every element: y = sqrt(u), sign(u) sqrt(abs(u)) or 1 / sqrt(u).
+
+    Of a negative number ``sqrt`` and ``rSqrt`` are not a number.
+    """
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Sqrt"
+
+    function: str = parameter("sqrt", choices=tuple(_ROOTS), doc="root, signed root or reciprocal root")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the square"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the root"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _ROOTS[self.function](u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rounding(Block):
+    """Every element to an integer: down, up, to the nearest (halves away from zero) or towards zero."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Rounding Function"
+
+    function: str = parameter("floor", choices=tuple(_ROUNDINGS), doc="which way")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "integers"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _ROUNDINGS[self.function](u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modulo(Block):
+    """What a division leaves: mod(u, v) has the sign of v and mod(u, 0) = u; rem(u, v) has the sign of u.
+
+    Both are exact. ``rem(u, 0)`` is not a number. In Simulink these are choices of the Math Function block.
+    """
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Modulo"
+
+    function: str = parameter("mod", choices=("mod", "rem"), doc="whose sign the result has")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the dividend"), Port("v", "the divisor"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the remainder"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": (_modulo if self.function == "mod" else fmod)(u["u"], u["v"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypot(Block):
+    """The hypotenuse, element by element: y = sqrt(u^2 + v^2), without overflow on the way."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Hypot"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "one leg"), Port("v", "the other leg"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the hypotenuse"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": hypot(u["u"], u["v"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Divide(Block):
+    """One input by the other, element by element: y = dividend / divisor."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Divide"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("dividend", "what is divided"), Port("divisor", "by what"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the quotient"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["dividend"] / u["divisor"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polynomial(Block):
+    """A polynomial of every element, the highest power first: y = c1 u^n + … + cn u + c(n+1).
+
+    Worked out by Horner's rule.
+    """
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Polynomial"
+
+    coefficients: ArrayLike = parameter((1.0, 0.0), dimensions=(1,), doc="c1 … c(n+1), highest power first")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the argument"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value of the polynomial"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        c = p["coefficients"]
+        value = c[0] * SX.ones(*u["u"].shape)
+        for k in range(1, c.numel()):
+            value = value * u["u"] + c[k]
+        return {"y": value}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DegreesToRadians(Block):
+    """An angle in degrees told in radians: y = u pi / 180."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Degrees to Radians"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "angle in degrees", "deg"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the same angle in radians", "rad"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] * (math.pi / 180.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadiansToDegrees(Block):
+    """An angle in radians told in degrees: y = u 180 / pi."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Radians to Degrees"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "angle in radians", "rad"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the same angle in degrees", "deg"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] * (180.0 / math.pi)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CartesianToPolar(Block):
+    """Magnitude and angle of the point (x, y): r = sqrt(x^2 + y^2), angle = atan2(y, x)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Cartesian to Polar"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("x", "coordinate along x"), Port("y", "coordinate along y"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("r", "distance from the origin"), Port("angle", "angle, -pi to pi", "rad"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"r": broadcast(inputs), "angle": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"r": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"r": hypot(u["x"], u["y"]), "angle": atan2(u["y"], u["x"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolarToCartesian(Block):
+    """The point at a magnitude and an angle: x = r cos(angle), y = r sin(angle)."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Polar to Cartesian"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("r", "distance from the origin"), Port("angle", "angle from the x axis", "rad"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("x", "coordinate along x"), Port("y", "coordinate along y"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"x": broadcast(inputs), "y": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"x": inputs["r"], "y": inputs["r"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["r"] * cos(u["angle"]), "y": u["r"] * sin(u["angle"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleDifference(Block):
+    """The difference of two angles the short way round: y = mod(a - b + pi, 2 pi) - pi, from -pi up to pi."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "angdiff"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("a", "one angle", "rad"), Port("b", "the angle that is taken away", "rad"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "a - b, at least -pi and below pi", "rad"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _modulo(u["a"] - u["b"] + math.pi, SX(2.0 * math.pi)) - math.pi}

@@ -1,0 +1,194 @@
+"""Blocks that hold and delay: the input as it was at this or an earlier tick.
+
+In their equations k counts the ticks and T is the period of the clock.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    broadcast,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+
+INPUT = Port("u", "what is sampled")
+OUTPUT = Port("y", "what is held")
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnitDelay(Block):
+    """The input one tick before: y(k) = u(k-1), y(0) = initial."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Unit Delay"
+    sampled: ClassVar[bool] = True
+
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (OUTPUT,)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delay(Block):
+    """The input some ticks before: y(k) = u(k - length), y = initial for k < length."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Delay"
+    sampled: ClassVar[bool] = True
+
+    length: int = parameter(2, minimum=1, doc="by how many ticks")
+    initial: float = parameter(0.0, doc="every element of the first outputs")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (OUTPUT,)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        if len(inputs["u"]) > 1:
+            raise InputError(f"'u' has shape {inputs['u']}", allowed="a scalar or a vector")
+        return {"y": inputs["u"]}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": ()}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (self.length, math.prod(inputs["u"])), "the last inputs, the oldest first"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"][0, :].T}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": vertcat(x["x"][1:, :], u["u"].T)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TappedDelay(Block):
+    """The last inputs in one vector: y(k) = [u(k - length), …, u(k - 1)]."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Tapped Delay"
+    sampled: ClassVar[bool] = True
+
+    length: int = parameter(4, minimum=1, doc="how many inputs are kept")
+    initial: float = parameter(0.0, doc="every element at the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is sampled", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the last inputs, the oldest first", shape=(self.length,)),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (self.length,), "the last inputs, the oldest first"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": vertcat(x["x"][1:], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZeroOrderHold(Block):
+    """The input as it was at the last tick: y(t) = u(k T) until the next one."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Zero-Order Hold"
+    sampled: ClassVar[bool] = True
+
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (OUTPUT,)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateTransition(Block):
+    """Hands a signal from one sample time to another: y(t) = u(k T) at the ticks of the receiving clock.
+
+    Where both clocks tick at the same instant, the value of that instant is handed over.
+    """
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Rate Transition"
+    sampled: ClassVar[bool] = True
+
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (OUTPUT,)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"]}

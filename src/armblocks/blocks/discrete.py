@@ -1,0 +1,315 @@
+"""Sampled sums, differences, controllers and counters: they work at the ticks of their clock.
+
+In their equations k counts the ticks and T is the period of the clock.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin, if_else, logic_and
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    broadcast,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+from armblocks.equations import Shape
+
+INPUT = Port("u", "what is sampled")
+
+_METHODS = ("forward_euler", "backward_euler", "trapezoidal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteIntegrator(Block):
+    """The integral as a sum: x(k+1) = x(k) + gain T u(k), held between two limits, x(0) = initial.
+
+    The output is that of Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler:
+    y(k) = x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2.
+    """
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Discrete-Time Integrator"
+    sampled: ClassVar[bool] = True
+
+    method: str = parameter("forward_euler", choices=_METHODS, doc="the rule of integration")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick")
+    lower: float = parameter(-math.inf, finite=False, doc="the least value")
+    upper: float = parameter(math.inf, finite=False, doc="the greatest value")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the rate"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the sum"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        own = {"gain": shape_of(self.gain), "initial": shape_of(self.initial)}
+        return {"y": broadcast({**inputs, **own})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": broadcast({"gain": shape_of(self.gain), "initial": shape_of(self.initial)})}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the sum"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.method == "forward_euler":
+            return {"y": x["x"]}
+        share = 1.0 if self.method == "backward_euler" else 0.5
+        return {"y": self._limited(x["x"] + share * p["gain"] * p["T"] * u["u"], p)}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": self._limited(x["x"] + p["gain"] * p["T"] * u["u"], p)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+    def _limited(self, value: SX, p: Signals) -> SX:
+        return fmin(fmax(value, p["lower"]), p["upper"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference(Block):
+    """What the input gained since the tick before: y(k) = u(k) - u(k-1)."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Difference"
+    sampled: ClassVar[bool] = True
+
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the difference"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] - x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteDerivative(Block):
+    """The rate of change between two ticks: y(k) = gain (u(k) - u(k-1)) / T."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Discrete Derivative"
+    sampled: ClassVar[bool] = True
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the rate of change"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        own = {"gain": shape_of(self.gain), "initial": shape_of(self.initial)}
+        return {"y": broadcast({**inputs, **own})}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["gain"] * (u["u"] - x["x"]) / p["T"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscretePID(Block):
+    """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
+
+    That is Simulink's Discrete PID Controller (parallel) with forward Euler rules. Where the output is
+    limited, ``clamping`` stops the integral while it would drive the output further out, and
+    ``back_calculation`` adds T Kb (y - unlimited y) to it.
+    """
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Discrete PID Controller"
+    sampled: ClassVar[bool] = True
+
+    P: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="proportional gain")
+    I: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="integral gain", unit="1/s")  # noqa: E741
+    D: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="derivative gain", unit="s")
+    N: ArrayLike = parameter(
+        100.0, kind=ParameterKind.ARRAY, doc="bandwidth of the derivative's filter", unit="rad/s", above=0.0
+    )
+    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
+    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+    anti_windup: str = parameter(
+        "none", choices=("none", "clamping", "back_calculation"), doc="what keeps the integral in bounds"
+    )
+    Kb: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="back-calculation gain", unit="1/s")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the error"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the control action"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": self._shape(inputs)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self._shape(inputs)
+        return (
+            State("integral", shape, "the integral action"),
+            State("filter", shape, "the filtered D u"),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._limited(self._unlimited(x, u, p), p)}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        rate = p["I"] * u["u"]
+        free = self._unlimited(x, u, p)
+        excess = free - self._limited(free, p)
+        if self.anti_windup == "clamping":
+            outwards = logic_and(excess != 0.0, excess * rate > 0.0)
+            rate = if_else(outwards, SX(0.0), rate)
+        elif self.anti_windup == "back_calculation":
+            rate = rate - p["Kb"] * excess
+        return {
+            "integral": x["integral"] + p["T"] * rate,
+            "filter": x["filter"] + p["T"] * p["N"] * (p["D"] * u["u"] - x["filter"]),
+        }
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"integral": SX(0.0), "filter": SX(0.0)}
+
+    def _unlimited(self, x: Signals, u: Signals, p: Signals) -> SX:
+        return p["P"] * u["u"] + x["integral"] + p["N"] * (p["D"] * u["u"] - x["filter"])
+
+    def _limited(self, value: SX, p: Signals) -> SX:
+        return fmin(fmax(value, p["lower"]), p["upper"])
+
+    def _shape(self, inputs: Shapes) -> Shape:
+        names = ("P", "I", "D", "N", "lower", "upper", "Kb")
+        return broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateLimiter(Block):
+    """The input, no faster than allowed: y(k) is u(k) held to y(k-1) + falling T … y(k-1) + rising T."""
+
+    family: ClassVar[str] = "discontinuities"
+    title: ClassVar[str] = "Rate Limiter"
+    sampled: ClassVar[bool] = True
+
+    rising: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the fastest rise", unit="1/s"
+    )
+    falling: ArrayLike = parameter(
+        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="the fastest fall, not positive", unit="1/s"
+    )
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the limited signal"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        names = ("rising", "falling", "initial")
+        return {"y": broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the output at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        least, most = x["x"] + p["falling"] * p["T"], x["x"] + p["rising"] * p["T"]
+        return {"y": fmin(fmax(u["u"], least), most)}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": self.outputs(t, x, u, p)["y"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CounterLimited(Block):
+    """Counts the ticks and starts again: y(k) = k mod (upper + 1)."""
+
+    family: ClassVar[str] = "sources"
+    title: ClassVar[str] = "Counter Limited"
+    sampled: ClassVar[bool] = True
+
+    upper: int = parameter(7, minimum=0, doc="the greatest count")
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the count", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (), "the count"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": if_else(x["x"] >= self.upper, 0.0, x["x"] + 1.0)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DigitalClock(Block):
+    """The time at the last tick: y = k T + offset."""
+
+    family: ClassVar[str] = "sources"
+    title: ClassVar[str] = "Digital Clock"
+    sampled: ClassVar[bool] = True
+
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "time of the last tick", "s", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": t}

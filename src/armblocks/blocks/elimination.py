@@ -1,0 +1,51 @@
+"""Linear equations over symbols: Gaussian elimination whose pivots are chosen when the numbers are known.
+
+Every exchange of rows is a choice in the traced equations, so that the result is as accurate as a numerical
+library's for every value of the signals. About n^3 operations for an (n, n) matrix: for the sizes of arms and
+controllers, not for hundreds of unknowns.
+"""
+
+from __future__ import annotations
+
+from casadi import SX, fabs, horzcat, if_else, vertcat
+
+
+def solve(A: SX, B: SX) -> SX:
+    """X (n, k) with A X = B, for A (n, n) and B (n, k); not finite where A is singular."""
+    n = A.shape[0]
+    rows, _ = _triangular(horzcat(A, B))
+    found: list[SX] = [SX(0, 0)] * n
+    for i in reversed(range(n)):
+        right = rows[i][:, n:]
+        for j in range(i + 1, n):
+            right = right - rows[i][j] * found[j]
+        found[i] = right / rows[i][i]
+    return vertcat(*found)
+
+
+def determinant(A: SX) -> SX:
+    """The determinant of A (n, n), from its triangular form: exactly 0 where a whole column cancels."""
+    n = A.shape[0]
+    rows, sign = _triangular(A)
+    product = sign
+    for i in range(n):
+        product = product * rows[i][i]
+    # Where a pivot is zero the rows below were divided by it; the determinant is zero whatever they hold.
+    for i in range(n - 1):
+        product = if_else(rows[i][i] == 0.0, 0.0, product)
+    return product
+
+
+def _triangular(A: SX) -> tuple[list[SX], SX]:
+    """Rows of the upper triangular form, and the sign of the exchange of rows that leads there."""
+    n = A.shape[0]
+    rows = [A[i, :] for i in range(n)]
+    sign = SX(1.0)
+    for k in range(n):
+        for i in range(k + 1, n):
+            greater = fabs(rows[i][k]) > fabs(rows[k][k])
+            rows[k], rows[i] = if_else(greater, rows[i], rows[k]), if_else(greater, rows[k], rows[i])
+            sign = if_else(greater, -sign, sign)
+        for i in range(k + 1, n):
+            rows[i] = rows[i] - (rows[i][k] / rows[k][k]) * rows[k]
+    return rows, sign

@@ -1,0 +1,118 @@
+"""Interpolation in tables, traced: every method as weights of the table's entries.
+
+At a position u between the break points the value is the sum of ``weights[k] * table[k]``. The weights depend
+on u and the break points alone, so one contraction serves tables of any count of axes and any method, and the
+entries may stay tunable. At a break point one weight is exactly 1 and the others are exactly 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_not
+from numpy.typing import NDArray
+
+from armblocks.equations import Shape, flatten
+
+METHODS = ("linear", "nearest", "flat", "cubic")
+"""Straight lines; the nearest entry (halfway: the one above); the entry at or below; the cubic spline."""
+EXTRAPOLATIONS = ("clip", "linear")
+"""Beyond the ends: the value of the end, or the straight line that touches there."""
+
+Point = float | SX
+
+
+def weights(u: SX, points: Sequence[float], method: str = "linear", extrapolation: str = "clip") -> list[SX]:
+    """The weight of each of n >= 2 rising break points at position ``u``, a scalar."""
+    if method == "flat":
+        return cells(u, points[1:])
+    if method == "nearest":
+        return cells(u, [(left + right) / 2.0 for left, right in pairwise(points)])
+    inside = fmin(fmax(u, points[0]), points[-1])
+    if method == "linear":
+        return linear_weights(inside if extrapolation == "clip" else u, points)
+    found = _cubic_weights(inside, points)
+    if extrapolation == "linear":
+        slopes = spline_slopes(points)
+        for k in range(len(points)):
+            rate = if_else(u < points[0], float(slopes[0, k]), float(slopes[-1, k]))
+            found[k] = found[k] + rate * (u - inside)
+    return found
+
+
+def linear_weights(u: SX, points: Sequence[Point]) -> list[SX]:
+    """Hat functions; the first and the last interval go on beyond the ends. Break points may be symbols."""
+    found = [SX(0.0) for _ in points]
+    for k, inside in enumerate(cells(u, points[1:-1])):
+        fraction = (u - points[k]) / (points[k + 1] - points[k])
+        found[k] = found[k] + if_else(inside, 1.0 - fraction, 0.0)
+        found[k + 1] = found[k + 1] + if_else(inside, fraction, 0.0)
+    return found
+
+
+def cells(u: SX, borders: Sequence[Point]) -> list[SX]:
+    """1 for the cell that u is in, else 0: one cell more than borders; a border belongs to the cell above."""
+    below = [u < border for border in borders]
+    inner = [logic_and(logic_not(left), right) for left, right in pairwise(below)]
+    return [below[0], *inner, logic_not(below[-1])] if below else [SX(1.0)]
+
+
+def contract(table: SX, shape: Shape, weights_by_axis: Sequence[Sequence[SX]]) -> SX:
+    """The table's value for the weights along each of its axes."""
+    flat = flatten(table, shape)
+    entries = [flat[k] for k in range(flat.numel())]
+    for axis in reversed(weights_by_axis):
+        n = len(axis)
+        entries = [
+            sum((axis[k] * entries[start + k] for k in range(n)), SX(0.0))
+            for start in range(0, len(entries), n)
+        ]
+    return entries[0]
+
+
+def spline_slopes(points: Sequence[float]) -> NDArray[np.float64]:
+    """The (n, n) matrix that gives a cubic spline's slopes at the break points from its values there.
+
+    Not-a-knot at both ends, as MATLAB's ``spline``; three points give the parabola, two the line.
+    de Boor, A Practical Guide to Splines, 2001, chapter IV.
+    """
+    x = np.asarray(points, dtype=np.float64)
+    n, h = len(x), np.diff(x)
+    chord = (np.eye(n)[1:] - np.eye(n)[:-1]) / h[:, None]
+    if n == 2:
+        return np.vstack([chord, chord])
+    left, right = np.zeros((n, n)), np.zeros((n, n))
+    for i in range(1, n - 1):
+        left[i, i - 1 : i + 2] = h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1]
+        right[i] = 3.0 * (h[i] * chord[i - 1] + h[i - 1] * chord[i])
+    if n == 3:
+        left[0, :2] = left[2, 1:] = 1.0
+        right[0], right[2] = 2.0 * chord[0], 2.0 * chord[1]
+        return np.linalg.solve(left, right).astype(np.float64)
+    first, last = x[2] - x[0], x[-1] - x[-3]
+    left[0, :2] = h[1], first
+    right[0] = ((h[0] + 2.0 * first) * h[1] * chord[0] + h[0] ** 2 * chord[1]) / first
+    left[-1, -2:] = last, h[-2]
+    right[-1] = ((h[-1] + 2.0 * last) * h[-2] * chord[-1] + h[-1] ** 2 * chord[-2]) / last
+    return np.linalg.solve(left, right).astype(np.float64)
+
+
+def _cubic_weights(u: SX, points: Sequence[float]) -> list[SX]:
+    """Hermite's cubic on each interval, between values and slopes at its ends."""
+    values = [SX(0.0) for _ in points]
+    slopes = [SX(0.0) for _ in points]
+    for k, inside in enumerate(cells(u, points[1:-1])):
+        h = points[k + 1] - points[k]
+        s = (u - points[k]) / h
+        r = 1.0 - s
+        values[k] = values[k] + if_else(inside, r * r * (1.0 + 2.0 * s), 0.0)
+        values[k + 1] = values[k + 1] + if_else(inside, s * s * (1.0 + 2.0 * r), 0.0)
+        slopes[k] = slopes[k] + if_else(inside, h * s * r * r, 0.0)
+        slopes[k + 1] = slopes[k + 1] - if_else(inside, h * s * s * r, 0.0)
+    matrix = spline_slopes(points)
+    return [
+        values[k] + sum((slopes[i] * float(matrix[i, k]) for i in range(len(points))), SX(0.0))
+        for k in range(len(points))
+    ]

@@ -1,0 +1,230 @@
+"""Logic: signals that are 1 where something holds and 0 where it does not.
+
+Every input that is not zero counts as true. These blocks look at the values of the instant; what has to be
+caught between two steps needs a crossing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import ClassVar
+
+from casadi import SX, logic_and, logic_not, logic_or
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.blocks.selection import choose
+from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.errors import InputError
+
+_RELATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
+    "==": lambda left, right: left == right,
+    "~=": lambda left, right: left != right,
+    "<": lambda left, right: left < right,
+    "<=": lambda left, right: left <= right,
+    ">": lambda left, right: right < left,
+    ">=": lambda left, right: right <= left,
+}
+_GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
+    "AND": (logic_and, False),
+    "OR": (logic_or, False),
+    "NAND": (logic_and, True),
+    "NOR": (logic_or, True),
+    "XOR": (lambda left, right: left != right, False),
+    "NXOR": (lambda left, right: left != right, True),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelationalOperator(Block):
+    """Two signals compared, element by element: y = 1 where u1 (relation) u2 holds, else 0."""
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Relational Operator"
+
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u1", "the left side"), Port("u2", "the right side"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _RELATIONS[self.relation](u["u1"], u["u2"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogicalOperator(Block):
+    """A gate, element by element: y = u1 AND u2 AND … and the like; NOT has one input.
+
+    XOR is true where an odd count of inputs is; NAND, NOR and NXOR are the opposites.
+    """
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Logical Operator"
+
+    operator: str = parameter("AND", choices=(*_GATES, "NOT"), doc="the gate")
+    inputs: int = parameter(2, minimum=1, doc="how many inputs; NOT always has one")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", 1 if self.operator == "NOT" else self.inputs, "condition")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        conditions = [value != 0.0 for value in u.values()]
+        if self.operator == "NOT":
+            return {"y": logic_not(conditions[0])}
+        gate, opposite = _GATES[self.operator]
+        found = reduce(gate, conditions)
+        return {"y": logic_not(found) if opposite else found}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareToConstant(Block):
+    """A signal compared with a number, element by element: y = 1 where u (relation) constant, else 0."""
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Compare To Constant"
+
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the left side"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "constant": shape_of(self.constant)})}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _RELATIONS[self.relation](u["u"], p["constant"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareToZero(Block):
+    """A signal compared with zero, element by element: y = 1 where u (relation) 0 holds, else 0."""
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Compare To Zero"
+
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the left side"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _RELATIONS[self.relation](u["u"], SX(0.0))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntervalTest(Block):
+    """Whether a signal lies in an interval: y = 1 where lower <= u <= upper, else 0.
+
+    Each end belongs to the interval unless ``lower_closed`` or ``upper_closed`` is false.
+    """
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Interval Test"
+
+    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the lower end")
+    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the upper end")
+    lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
+    upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is tested"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "lower": shape_of(self.lower), "upper": shape_of(self.upper)})}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _inside(u["u"], p["lower"], p["upper"], self.lower_closed, self.upper_closed)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntervalTestDynamic(Block):
+    """Whether a signal lies in an interval that moves: y = 1 where lower <= u <= upper, else 0."""
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Interval Test Dynamic"
+
+    lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
+    upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("upper", "the upper end"), Port("u", "what is tested"), Port("lower", "the lower end"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _inside(u["u"], u["lower"], u["upper"], self.lower_closed, self.upper_closed)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CombinatorialLogic(Block):
+    """A truth table: y = the row of the table that the conditions point at, the first the highest digit.
+
+    For conditions (u1, …, um) the row is 1 + u1 2^(m-1) + … + um, of 2^m rows. A table of one column gives
+    a scalar. The default is AND of two.
+    """
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Combinatorial Logic"
+
+    table: ArrayLike = parameter(
+        ((0.0,), (0.0,), (0.0,), (1.0,)), dimensions=(2,), doc="one row for each combination of conditions"
+    )
+
+    def check(self) -> None:
+        rows = shape_of(self.table)[0]
+        if rows & (rows - 1) or rows < 2:
+            raise InputError(
+                f"the table has {rows} rows",
+                where="CombinatorialLogic",
+                allowed="2, 4, 8, … rows: one for each combination of conditions",
+                fix="add the missing rows",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the conditions (m,)", shape=(shape_of(self.table)[0].bit_length() - 1,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        columns = shape_of(self.table)[1]
+        return (Port("y", "the row of the table", shape=(columns,) if columns > 1 else ()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        row = SX(0.0)
+        for k in range(u["u"].numel()):
+            row = 2.0 * row + (u["u"][k] != 0.0)
+        return {"y": choose(row, [p["table"][k, :].T for k in range(p["table"].shape[0])])}
+
+
+def _inside(u: SX, lower: SX, upper: SX, lower_closed: bool, upper_closed: bool) -> SX:
+    above = lower <= u if lower_closed else lower < u
+    return logic_and(above, u <= upper if upper_closed else u < upper)

@@ -1,0 +1,200 @@
+"""Blocks that combine poses: one after the other, back, apart, and small steps between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+from typing import ClassVar
+
+from casadi import SX, cross, mtimes, skew, vertcat
+
+from armblocks.blocks.orientations import pose
+from armblocks.diagram import Block, Port, Signals, parameter
+
+_FRAMES = ("body", "world")
+
+
+def inverse(T: SX) -> SX:
+    """The pose of frame a in frame b from that of b in a."""
+    R = T[:3, :3]
+    return pose(R.T, -mtimes(R.T, T[:3, 3]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseProduct(Block):
+    """Poses one after the other: T = T1 T2 …, that is T_ac = T_ab T_bc."""
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "Pose Product"
+
+    inputs: int = parameter(2, minimum=1, doc="how many poses")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return tuple(Port(f"T{k}", f"pose {k}", shape=(4, 4)) for k in range(1, self.inputs + 1))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "their product", shape=(4, 4)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": reduce(mtimes, u.values())}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseInverse(Block):
+    """The pose seen from the other frame: T^-1 = [R' -R'p; 0 0 0 1]."""
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "Pose Inverse"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "pose of frame b in frame a", shape=(4, 4)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("Ti", "pose of frame a in frame b", shape=(4, 4)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"Ti": inverse(u["T"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rp2T(Block):
+    """A pose from a rotation and a position: T = [R p; 0 0 0 1]."""
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "rt2tr"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("R", "the rotation", shape=(3, 3)), Port("p", "the position", "m", (3,)))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "the pose", shape=(4, 4)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(u["R"], u["p"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class T2Rp(Block):
+    """Rotation and position of a pose: T = [R p; 0 0 0 1]."""
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "tr2rt"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "the pose", shape=(4, 4)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("R", "the rotation", shape=(3, 3)), Port("p", "the position", "m", (3,)))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"R": u["T"][:3, :3], "p": u["T"][:3, 3]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransformPoint(Block):
+    """A point of frame b told in frame a: p_a = R_ab p_b + p_ab."""
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "Transform Point"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("p", "point in b", "m", (3,)))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the point in a", "m", (3,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": mtimes(u["T"][:3, :3], u["p"]) + u["T"][:3, 3]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransformTwist(Block):
+    """A velocity (v; w) of frame b's origin and axes told in frame a's: v_a = R v + p x R w, w_a = R w.
+
+    This is the adjoint of the pose; its inverse pose goes back.
+    """
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "Transform Twist"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("V", "(v; w) in b", shape=(6,)))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "(v; w) in a", shape=(6,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        R = u["T"][:3, :3]
+        w = mtimes(R, u["V"][3:])
+        return {"y": vertcat(mtimes(R, u["V"][:3]) + cross(u["T"][:3, 3], w), w)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Skew(Block):
+    """The matrix of a vector product: S v = u x v for every v."""
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "skew"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the vector", shape=(3,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("S", "its skew-symmetric matrix", shape=(3, 3)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"S": skew(u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tr2Delta(Block):
+    """The small step from one pose to another, (d; r): body is (p; vex(R - I)) of T1^-1 T2, as in release 10.
+
+    ``world`` is that of the toolbox up to release 9: d = p2 - p1 and r = 1/2 (n1 x n2 + o1 x o2 + a1 x a2) of
+    the axes of both, in the axes of the frame in which the poses are told. Both are steps for small turns
+    only. vex is half the difference of the opposite entries.
+    """
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "tr2delta"
+
+    frame: str = parameter("body", choices=_FRAMES, doc="body (release 10) or world (up to release 9)")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("T1", "pose at the beginning", shape=(4, 4)),
+            Port("T2", "pose at the end", shape=(4, 4)),
+        )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("dx", "step (dx, dy, dz, rx, ry, rz)", shape=(6,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        T1, T2 = u["T1"], u["T2"]
+        if self.frame == "body":
+            step = mtimes(inverse(T1), T2)
+            turn = vertcat(step[2, 1] - step[1, 2], step[0, 2] - step[2, 0], step[1, 0] - step[0, 1])
+            return {"dx": vertcat(step[:3, 3], 0.5 * turn)}
+        crosses = [cross(T1[:3, k], T2[:3, k]) for k in range(3)]
+        return {"dx": vertcat(T2[:3, 3] - T1[:3, 3], 0.5 * (crosses[0] + crosses[1] + crosses[2]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delta2Tr(Block):
+    """The pose of a small step: T = [I + skew(r), d; 0 0 0 1], as in the toolbox.
+
+    Its rotation is one to the first order of the step only. A step in body axes leads from T1 to T1 T, one in
+    world axes from R1 to (I + skew(r)) R1 and from p1 to p1 + d.
+    """
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "delta2tr"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("dx", "step (dx, dy, dz, rx, ry, rz)", shape=(6,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "the pose of the step", shape=(4, 4)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(SX.eye(3) + skew(u["dx"][3:]), u["dx"][:3])}

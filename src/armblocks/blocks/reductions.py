@@ -1,0 +1,179 @@
+"""Blocks that make one number, or a running one, out of the elements of a signal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import ClassVar
+
+from casadi import SX, dot, fabs, fmax, if_else, sqrt, vertcat
+
+from armblocks.diagram import Block, Port, Shapes, Signals, parameter
+from armblocks.errors import InputError
+
+
+def _elements(value: SX) -> list[SX]:
+    """Column by column, as MATLAB counts them."""
+    return [value[k] for k in range(value.numel())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumOfElements(Block):
+    """The sum of all elements: y = u1 + u2 + …"""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Sum of Elements"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the sum", shape=()),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": reduce(lambda left, right: left + right, _elements(u["u"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProductOfElements(Block):
+    """The product of all elements: y = u1 u2 …"""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Product of Elements"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the product", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": reduce(lambda left, right: left * right, _elements(u["u"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extremum(Block):
+    """The least or the greatest element and where it stands: y = u(index), index from 1.
+
+    Of several equal ones the first is told. A matrix is counted column by column.
+    """
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "MinMax of Elements"
+
+    function: str = parameter("min", choices=("min", "max"), doc="which one")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("y", "the least or the greatest element", shape=()),
+            Port("index", "its place, counted from 1", shape=()),
+        )
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        best, index = u["u"][0], SX(1.0)
+        for k, value in enumerate(_elements(u["u"])[1:], 2):
+            better = value < best if self.function == "min" else value > best
+            best, index = if_else(better, value, best), if_else(better, float(k), index)
+        return {"y": best, "index": index}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CumulativeSum(Block):
+    """Running sums along a vector: y(k) = u1 + … + uk; down every column of a matrix."""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Cumulative Sum"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "vector or matrix"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the running sums"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        rows = [u["u"][0, :]]
+        for k in range(1, u["u"].shape[0]):
+            rows.append(rows[-1] + u["u"][k, :])
+        return {"y": vertcat(*rows)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DotProduct(Block):
+    """The sum of the products of the elements: y = u1 v1 + u2 v2 + …"""
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Dot Product"
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "one vector"), Port("v", "the other vector"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the dot product"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        if inputs["u"] != inputs["v"]:
+            raise InputError(
+                f"the factors have shapes {inputs['u']} and {inputs['v']}",
+                allowed="two signals of the same shape",
+                fix="change the width of one of the signals",
+            )
+        return {"y": ()}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": dot(u["u"], u["v"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Norm(Block):
+    """The size of a vector or matrix: 2: sqrt(sum u^2), 1: sum abs(u), inf: max abs(u), fro: sqrt(sum u^2).
+
+    Of a matrix 1 is the greatest sum down a column and inf the greatest sum along a row; 2 would be its
+    greatest singular value, which is not offered. At zero the rate of 2 and fro is not a number.
+    """
+
+    family: ClassVar[str] = "maths"
+    title: ClassVar[str] = "Norm"
+
+    norm: str = parameter("2", choices=("2", "1", "inf", "fro"), doc="which norm")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "vector or matrix"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its norm"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        if self.norm == "2" and len(inputs["u"]) > 1:
+            raise InputError(
+                f"the 2-norm of a matrix of shape {inputs['u']} is asked for",
+                allowed="1, inf and fro of a matrix",
+                fix="choose another norm",
+            )
+        return {"y": ()}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        value = u["u"]
+        if self.norm in ("2", "fro"):
+            return {"y": sqrt(dot(value, value))}
+        sizes = fabs(value if self.norm == "1" else value.T)
+        sums = [sum(_elements(sizes[:, k]), SX(0.0)) for k in range(sizes.shape[1])]
+        return {"y": reduce(fmax, sums)}

@@ -1,0 +1,42 @@
+"""What the robot blocks of several files share: ports with the units of the joints, and traced equations."""
+
+from __future__ import annotations
+
+from casadi import SX
+
+from armblocks.diagram import Port, rate_unit
+from armblocks.equations import TracedFunction, flatten, unflatten
+from armblocks.robot import Robot
+
+
+def apply_traced(traced: TracedFunction, *values: SX) -> SX:
+    """The equations of a robot over other symbols, natural shapes in and out."""
+    flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
+    (result,) = traced.casadi_function().call(flat, True, False)
+    return unflatten(result, traced.outputs.slots[0].shape)
+
+
+def coordinate_unit(robot: Robot) -> str:
+    """rad or m, or ``""`` where the robot has joints of both kinds."""
+    units = set(robot.joint_units)
+    return units.pop() if len(units) == 1 else ""
+
+
+def q_port(robot: Robot, name: str = "q") -> Port:
+    """Joint coordinates (n,)."""
+    return Port(name, "joint coordinates", coordinate_unit(robot), (robot.n,))
+
+
+def qd_port(robot: Robot, name: str = "qd") -> Port:
+    """Joint speeds (n,)."""
+    return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,))
+
+
+def qdd_port(robot: Robot, name: str = "qdd") -> Port:
+    """Joint accelerations (n,)."""
+    return Port(name, "joint accelerations", rate_unit(rate_unit(coordinate_unit(robot))), (robot.n,))
+
+
+def tau_port(robot: Robot, doc: str) -> Port:
+    """Joint forces (n,)."""
+    return Port("tau", doc, {"rad": "N m", "m": "N"}.get(coordinate_unit(robot), ""), (robot.n,))

@@ -1,0 +1,356 @@
+"""The step loop of a system with clocks, events or implicit equations, around the same Runge-Kutta steps.
+
+At an instant (a tick, an event, a breakpoint, the start) things happen in this order, all in native code:
+
+1. the flow is integrated up to it with the old values; the step ends exactly there;
+2. all clocks that tick now are marked and ``update`` gives ``z``;
+3. guards whose sign the jump has changed fire, and so do those whose zero was located here; ``reset`` gives
+   ``x`` and ``z``; this is repeated until none fires;
+4. the instant is recorded: signals are right-continuous;
+5. the integration starts anew. The first step after an event is at most a hundredth of the time since the
+   event before it, and later ones grow tenfold at most: no step leaps over a bounce that is getting shorter.
+
+Tick ``k`` of a clock is at ``offset + k period``, one product and one sum, never accumulated. Instants that
+are not more than four units in the last place apart are one instant: so 3 times 0.1 s and 0.3 s coincide
+although their doubles differ, and a breakpoint or a recorded instant coincides with a tick likewise.
+
+A guard fires where its sign is the opposite of the one it had after the last step, tick or event, in a step
+that its direction allows. A zero takes no side: a guard that is zero keeps its last sign, and one that is
+zero right after it fired, or at the start, counts with the sign it takes first.
+"""
+
+from __future__ import annotations
+
+from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.hybrid_functions import emit_functions
+from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
+from armblocks.compiler.ir_text import Module, number_text
+from armblocks.compiler.runge_kutta import Loop
+
+SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
+"""Two times within these factors of one another are the same instant."""
+
+
+class HybridLoop(Loop):
+    """Writes the loop. The module has all functions of the system, each ``void f(ptr t, ptr x, …)``."""
+
+    kept_reals = (*Loop.kept_reals, Real.BOUND)
+    kept_counts = (*Loop.kept_counts, Count.INSTANTS)
+
+    def __init__(
+        self, module: Module, tableau: ButcherTableau, workspace: Workspace, sizes: LoopSizes
+    ) -> None:
+        super().__init__(module, tableau, workspace)
+        self.sizes = sizes
+        self.guards = len(sizes.directions)
+        emit_functions(module, workspace, sizes)
+        w = self.w
+        self.instant = w.variable("double", number_text(0.0))
+        self.event = w.variable("i64", "0")
+        self.piece_end = self.end
+        self.segment_end = w.variable("double", number_text(0.0))
+        self.on_instant = w.fresh("instant")
+
+    # Evaluations.
+
+    def at(self, place: int) -> str:
+        """Address of a vector of the workspace."""
+        return self.w.at("%reals", place)
+
+    def emit_solve(self, instant: str, x: str) -> None:
+        """The unknowns of the implicit equations at a point, into ``trial_w``."""
+        if self.sizes.algebraic:
+            self.w.do(f"call void @solve(ptr {instant}, ptr {x}, ptr %reals, ptr %p)")
+
+    def emit_flow(self, instant: str, x: str, xd: str) -> None:
+        """One evaluation of the derivative, between three addresses."""
+        self.emit_solve(instant, x)
+        z, w = self.at(self.places.z), self.at(self.places.trial_w)
+        self.w.do(f"call void @derivative(ptr {instant}, ptr {x}, ptr {z}, ptr {w}, ptr %p, ptr {xd})")
+
+    def watch(self, time: str, x: int) -> str:
+        """Evaluate all guards and mark those that fire; how many do."""
+        w = self.w
+        w.put(time, self.instant)
+        self.emit_solve(self.instant, self.at(x))
+        return w.let(f"call i64 @watch(ptr {self.instant}, ptr {self.at(x)}, ptr %reals, ptr %p)")
+
+    def copy(self, source: int, target: int, count: int) -> None:
+        """One vector of the workspace to another place."""
+        w, step = self.w, self.step
+        w.for_each(count, lambda i: w.put(step.read(source, i), step.element(target, i)))
+
+    def accept_unknowns(self) -> None:
+        """``w`` becomes what was found last."""
+        self.copy(self.places.trial_w, self.places.w, self.sizes.algebraic)
+
+    # The loop.
+
+    def emit_entry(self) -> None:
+        """Go on where the last call stopped; the ends of the current piece are worked out again."""
+        w = self.w
+        self.emit_piece()
+        started = w.get(self.counts[Count.STARTED], "i64")
+        running, other = w.word_test("eq", started, str(int(Stage.RUNNING))), w.fresh("other")
+        w.branch(running, self.on_step, other)
+        w.place(other)
+        w.branch(
+            w.word_test("eq", started, str(int(Stage.START))),
+            self.on_start,
+            self.on_instant,
+        )
+        w.place(self.on_instant)
+        self.emit_instant()
+
+    def tick_time(self, clock: int) -> str:
+        """When a clock ticks next."""
+        w = self.w
+        period, offset = self.sizes.clocks[clock]
+        number = w.get(w.at("%counts", Count.END + clock, "i64"), "i64")
+        product = w.multiply(w.let(f"sitofp i64 {number} to double"), number_text(period))
+        return product if offset == 0.0 else w.add(product, number_text(offset))
+
+    def emit_piece(self) -> None:
+        """How far the steps may go: to the next tick or the segment's end, whichever is earlier."""
+        w = self.w
+        last = w.word_op("sub", self.segments, "1")
+        segment = w.get(self.counts[Count.SEGMENT], "i64")
+        segment = w.let(f"select i1 {w.word_test('slt', segment, last)}, i64 {segment}, i64 {last}")
+        end = w.get(w.at("%ends", segment))
+        w.put(end, self.segment_end)
+        w.put(w.get(w.at("%clamps", segment)), self.clamp)
+        # A tick a few rounding errors before the end is at the end.
+        shortest = w.multiply(end, number_text(SAME_BELOW))
+        earliest = end
+        for clock in range(len(self.sizes.clocks)):
+            time = self.tick_time(clock)
+            earlier = w.both(w.compare("olt", time, shortest), w.compare("olt", time, earliest))
+            earliest = w.select(earlier, time, earliest)
+        w.put(earliest, self.piece_end)
+
+    def emit_instant(self) -> None:
+        """Ticks, events and records at the time reached; goes on below at the start of the next piece."""
+        w = self.w
+        time = w.get(self.kept[Real.TIME])
+        until = w.multiply(time, number_text(SAME_ABOVE))
+        self.emit_ticks(time, until)
+        if self.guards:
+            self.emit_settling(time)
+            self.emit_events(time)
+        else:
+            w.put(time, self.instant)
+            self.emit_solve(self.instant, self.at(self.places.x))
+        self.accept_unknowns()
+        self.emit_samples(time, until, None)
+        finished = w.word_test("slt", w.get(self.counts[Count.SEGMENT], "i64"), self.segments)
+        self.leave_unless(finished, Status.DONE)
+        self.emit_piece()
+        w.put(str(int(Stage.START)), self.counts[Count.STARTED], "i64")
+        w.jump(self.on_start)
+
+    def emit_ticks(self, time: str, until: str) -> None:
+        """Mark the clocks that tick and update ``z``."""
+        if not self.sizes.clocks:
+            return
+        w = self.w
+        any_ticks: str | None = None
+        for clock in range(len(self.sizes.clocks)):
+            ticks = w.compare("ole", self.tick_time(clock), until)
+            place = w.at("%counts", Count.END + clock, "i64")
+            w.put(w.word_op("add", w.get(place, "i64"), w.let(f"zext i1 {ticks} to i64")), place, "i64")
+            marked = w.select(ticks, number_text(1.0), number_text(0.0))
+            w.put(marked, self.at(self.places.ticking + clock))
+            any_ticks = ticks if any_ticks is None else w.either(any_ticks, ticks)
+        assert any_ticks is not None
+        tick, on = w.fresh("tick"), w.fresh("ticked")
+        w.branch(any_ticks, tick, on)
+        w.place(tick)
+        w.increase(self.counts[Count.INSTANTS])
+        w.put(time, self.instant)
+        places = self.places
+        self.emit_solve(self.instant, self.at(places.x))
+        arguments = (places.x, places.z, places.trial_w)
+        x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
+        m, new = (f"ptr {self.at(place)}" for place in (places.ticking, places.new_z))
+        w.do(f"call void @update(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {m}, {new})")
+        self.copy(places.new_z, places.z, self.sizes.discrete)
+        w.place(on)
+
+    def emit_settling(self, time: str) -> None:
+        """At the start, a reset without events: modes take the value that the signals ask for."""
+        w, places = self.w, self.places
+        settle, on = w.fresh("settle"), w.fresh("on")
+        w.branch(w.compare("oeq", time, number_text(0.0)), settle, on)
+        w.place(settle)
+        w.put(time, self.instant)
+        self.emit_solve(self.instant, self.at(places.x))
+        zero = number_text(0.0)
+        w.for_each(self.guards, lambda i: w.put(zero, self.step.element(places.fired, i)))
+        arguments = (places.x, places.z, places.trial_w, places.fired, places.new_x, places.new_z)
+        x, z, unknowns, e, new_x, new_z = (f"ptr {self.at(place)}" for place in arguments)
+        w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
+        self.copy(places.new_z, places.z, self.sizes.discrete)
+        w.jump(on)
+        w.place(on)
+
+    def emit_events(self, time: str) -> None:
+        """Fire guards until none fires any more."""
+        w, places = self.w, self.places
+        turn, fire, settled, on = (w.fresh(stem) for stem in ("guards", "fire", "settled", "on"))
+        w.place(turn)
+        fired = self.watch(time, places.x)
+        w.do("call void @take_signs(ptr %reals, i1 false)")
+        w.branch(w.word_test("eq", fired, "0"), settled, fire)
+        w.place(fire)
+        w.put("1", self.counts[Count.FRESH], "i64")
+        bound = w.let(f"call double @note_events(double {time}, ptr %reals, ptr %counts)")
+        w.put(bound, self.kept[Real.BOUND])
+        # A negative bound is how the count of events says that there is no end to them.
+        self.leave_unless(w.compare("oge", bound, number_text(0.0)), Status.ENDLESS_EVENTS)
+        arguments = (places.x, places.z, places.trial_w)
+        x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
+        e, new_x, new_z = (f"ptr {self.at(place)}" for place in (places.fired, places.new_x, places.new_z))
+        w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
+        self.copy(places.new_x, places.x, self.n)
+        self.copy(places.new_z, places.z, self.sizes.discrete)
+        # Guards that fired take the sign that the reset gives them; the others keep theirs, to be compared.
+        self.emit_solve(self.instant, self.at(places.x))
+        arguments = (places.x, places.z, places.trial_w)
+        x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
+        g = f"ptr {self.at(places.guards)}"
+        w.do(f"call void @guards(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {g})")
+        w.do("call void @take_signs(ptr %reals, i1 true)")
+        w.jump(turn)
+        w.place(settled)
+        w.place(on)
+
+    def emit_first_step(self, time: str) -> None:
+        """The length of the step after a start; after a tick, the length that was to come next."""
+        w = self.w
+        choose, chosen = w.fresh("choose"), w.fresh("chosen")
+        fresh = w.word_test("ne", w.get(self.counts[Count.FRESH], "i64"), "0")
+        w.branch(fresh, choose, chosen)
+        w.place(choose)
+        interval = w.subtract(w.get(self.end), time)
+        length, bounded = self.step.first_step(time, interval, self.max_step)
+        self.emit_checkpoint(w.both(bounded, w.compare("oge", w.get(self.end), self.last_end)))
+        w.put(w.minimum(length, w.get(self.kept[Real.BOUND])), self.kept[Real.STEP])
+        w.place(chosen)
+
+    def emit_next_length(self, proposed: str) -> None:
+        """A step that was cut short by a tick says nothing against the length that was to be tried."""
+        w = self.w
+        length = w.get(self.kept[Real.STEP])
+        cut = w.compare("oge", w.get(self.new_time), w.get(self.end))
+        w.put(w.select(cut, w.maximum(proposed, length), proposed), self.kept[Real.STEP])
+
+    def passed(self, time: str, spacing: str) -> str:
+        """Grid instants up to this time are behind: one a rounding error after a tick is the tick."""
+        return self.w.fma(spacing, number_text(1e-9), time)
+
+    def bounded(self, time: str, new_time: str) -> str:
+        """The end of a fixed step, sooner right after an event."""
+        w = self.w
+        following = w.from_bits(w.word_op("add", w.bits(time), "10"))
+        return w.minimum(w.maximum(w.add(time, w.get(self.kept[Real.BOUND])), following), new_time)
+
+    def emit_record(self, instant: str, sample: str, row: str) -> None:
+        """What else than the state a sample instant records: ``z``, and ``w`` for the state just written."""
+        w, step, places = self.w, self.step, self.places
+        for name, place, count in (
+            ("%out_z", places.z, self.sizes.discrete),
+            ("%out_w", places.trial_w, self.sizes.algebraic),
+        ):
+            if not count:
+                continue
+            if name == "%out_w":
+                w.put(instant, self.instant)
+                self.emit_solve(self.instant, row)
+            target = w.at(name, w.word_op("mul", sample, str(count)))
+            w.for_each(count, lambda i: w.put(step.read(place, i), w.at(target, i)))  # noqa: B023
+
+    def emit_accepted(self) -> None:
+        """Events within the step, its samples, then the new point becomes the old one."""
+        w, step = self.w, self.step
+        w.put("0", self.extra_done, "i64")
+        w.put("0", self.event, "i64")
+        plain, instant = w.fresh("plain"), w.fresh("instant")
+        time, h = w.get(self.kept[Real.TIME]), w.get(self.h)
+        if self.guards:
+            self.emit_search(time, h)
+        new_time = w.get(self.new_time)
+        self.emit_samples(time, w.multiply(new_time, number_text(SAME_BELOW)), h)
+        step.copy(step.y, step.x)
+        w.put(new_time, self.kept[Real.TIME])
+        w.increase(self.counts[Count.ACCEPTED])
+        w.put("0", self.counts[Count.FRESH], "i64")
+        w.put(w.multiply(w.get(self.kept[Real.BOUND]), number_text(10.0)), self.kept[Real.BOUND])
+        w.increase(self.taken)
+        happens = w.either(
+            w.word_test("ne", w.get(self.event, "i64"), "0"), w.compare("oge", new_time, w.get(self.end))
+        )
+        w.branch(happens, instant, plain)
+        w.place(plain)
+        step.copy(step.K(self.tableau.stages), step.K(0))
+        if self.sizes.algebraic:
+            # The samples may have changed it; a zero of the same equations is found again at once.
+            w.put(w.minimum(new_time, w.get(self.clamp)), self.instant)
+            self.emit_solve(self.instant, self.at(self.places.x))
+            self.accept_unknowns()
+        self.emit_samples(new_time, w.multiply(new_time, number_text(SAME_ABOVE)), None)
+        w.jump(self.on_step)
+        w.place(instant)
+        over, same = w.fresh("over"), w.fresh("same")
+        w.branch(w.compare("oge", new_time, w.get(self.segment_end)), over, same)
+        w.place(over)
+        w.increase(self.counts[Count.SEGMENT])
+        w.put("1", self.counts[Count.FRESH], "i64")
+        w.place(same)
+        w.put(str(int(Stage.INSTANT)), self.counts[Count.STARTED], "i64")
+        w.jump(self.on_instant)
+
+    def emit_search(self, time: str, h: str) -> None:
+        """If a guard fires at the end of the step, go back to the first instant at which one does.
+
+        Bisection on the values between the steps. What is bracketed is "some guard has fired", so that the
+        first of several is found; the step then ends on the far side of the zero, where it has fired.
+        """
+        w, places = self.w, self.places
+        found, turn, evaluate, before, after, located, on = (
+            w.fresh(stem) for stem in ("found", "turn", "evaluate", "before", "after", "located", "on")
+        )
+        quiet = w.fresh("quiet")
+        end = w.get(self.new_time)
+        fired = self.watch(w.minimum(end, w.get(self.clamp)), places.y)
+        w.branch(w.word_test("eq", fired, "0"), quiet, found)
+        w.place(found)
+        w.put("1", self.event, "i64")
+        self.emit_extra_stages_once(time, h)
+        low, high = w.variable("double", time), w.variable("double", end)
+        w.place(turn)
+        a, b = w.get(low), w.get(high)
+        width = w.subtract(b, a)
+        middle = w.fma(number_text(0.5), width, a)
+        inside = w.both(w.compare("ogt", middle, a), w.compare("olt", middle, b))
+        wide = w.compare("ogt", width, w.multiply(b, number_text(2.0**-50)))
+        w.branch(w.both(inside, wide), evaluate, located)
+        w.place(evaluate)
+        self.step.interpolate(middle, time, h, self.at(places.new_x))
+        w.branch(w.word_test("eq", self.watch(middle, places.new_x), "0"), before, after)
+        w.place(before)
+        w.put(middle, low)
+        w.jump(turn)
+        w.place(after)
+        w.put(middle, high)
+        w.jump(turn)
+        w.place(located)
+        b = w.get(high)
+        moved = w.fresh("moved")
+        w.branch(w.compare("olt", b, end), moved, on)
+        w.place(moved)
+        self.step.interpolate(b, time, h, self.at(places.y))
+        w.put(b, self.new_time)
+        w.jump(on)
+        w.place(quiet)
+        w.do("call void @take_signs(ptr %reals, i1 false)")
+        w.place(on)

@@ -1,0 +1,133 @@
+"""Implicit equations: those that are linear in their unknowns are solved here, in symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from casadi import SX, Function, densify, depends_on, jacobian, solve, substitute, symvar
+from numpy.typing import NDArray
+
+from armblocks.errors import AlgebraicLoopError
+
+
+def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
+    """The unknowns ``w (n,)`` of ``residual(w) = 0`` as far as elimination gets.
+
+    Returns all of them over the ones that remain, and the places of those. Unknowns that depend on each other
+    in circles are solved together, each circle by itself, in the order in which they need each other; a
+    circle whose residual is not linear in its unknowns remains.
+    """
+    solution, remaining = SX(w), list[int]()
+    slopes = jacobian(residual, w)
+    needs = _needs(slopes)
+    for circle in _circles(needs):
+        unknowns, slope = w[circle], slopes[circle, circle]
+        if depends_on(slope, unknowns):
+            remaining.extend(circle)
+            continue
+        constant = substitute(residual[circle], unknowns, SX.zeros(len(circle)))
+        solved = -_divided(densify(constant), slope)
+        # What was solved before is put in last, into a small expression, so that work grows with the count.
+        before = sorted({place for row in circle for place in needs[row]} - set(circle))
+        solution[circle] = substitute(solved, w[before], solution[before]) if before else solved
+    return solution, sorted(remaining)
+
+
+def _divided(right: SX, matrix: SX) -> SX:
+    """``matrix^-1 right``. Up to 2 x 2 by Cramer's rule, which needs no pivots; QR beyond."""
+    if matrix.numel() == 1:
+        return right / densify(matrix)
+    if matrix.numel() == 4:
+        a, b, c, d = (densify(matrix)[i, j] for i in range(2) for j in range(2))
+        first = d * right[0] - b * right[1]
+        result = SX.zeros(2)
+        result[0], result[1] = first, a * right[1] - c * right[0]
+        return result / (a * d - b * c)
+    return solve(matrix, right)
+
+
+def _needs(slope: SX) -> list[list[int]]:
+    """The unknowns in each residual, by the sparsity of its derivative."""
+    needs: list[list[int]] = [[] for _ in range(slope.shape[0])]
+    sparsity = slope.sparsity()
+    for row, column in zip(sparsity.row(), sparsity.get_col()):
+        needs[row].append(column)
+    return needs
+
+
+def _circles(needs: list[list[int]]) -> list[list[int]]:
+    """The strongly connected components of who needs whom, those needed first (Tarjan, iterative)."""
+    count = len(needs)
+    number: dict[int, int] = {}
+    lowest: dict[int, int] = {}
+    stack: list[int] = []
+    closed: set[int] = set()
+    circles: list[list[int]] = []
+    for root in range(count):
+        if root in number:
+            continue
+        path = [(root, iter(needs[root]))]
+        number[root] = lowest[root] = len(number)
+        stack.append(root)
+        while path:
+            node, rest = path[-1]
+            following = next(rest, None)
+            if following is None:
+                path.pop()
+                if path:
+                    lowest[path[-1][0]] = min(lowest[path[-1][0]], lowest[node])
+                if lowest[node] == number[node]:
+                    place = stack.index(node)
+                    circles.append(sorted(stack[place:]))
+                    closed.update(stack[place:])
+                    del stack[place:]
+            elif following not in number:
+                number[following] = lowest[following] = len(number)
+                stack.append(following)
+                path.append((following, iter(needs[following])))
+            elif following not in closed:
+                lowest[node] = min(lowest[node], number[following])
+    return circles
+
+
+def check_solvable(
+    w: SX, residual: SX, p: SX, values: NDArray[np.float64], loops: Sequence[tuple[str, ...]], where: str
+) -> None:
+    """Raise ``AlgebraicLoopError`` for equations that are singular with the parameters as they are.
+
+    ``loops[i]``: the signals around the loop of unknown ``i``. Only what follows from the parameters alone is
+    found here; what depends on states or the time is noticed when it happens.
+    """
+    slopes = jacobian(residual, w)
+    for circle in _circles(_needs(slopes)):
+        unknowns, own, slope = w[circle], residual[circle], slopes[circle, circle]
+        if not _over(slope, p):
+            continue
+        matrix = _number(slope, p, values)
+        scale = np.abs(matrix).max(initial=0.0)
+        if not np.isfinite(scale) or np.linalg.matrix_rank(matrix) == len(circle):
+            continue
+        others = [entry for entry in symvar(own) if not depends_on(unknowns, entry)]
+        why = "with no solution or infinitely many"
+        if all(depends_on(p, entry) for entry in others):
+            right = _number(substitute(own, unknowns, SX.zeros(len(circle))), p, values).ravel()
+            widened = np.linalg.matrix_rank(np.column_stack([matrix, right]))
+            solvable = widened == np.linalg.matrix_rank(matrix)
+            why = "with infinitely many solutions" if solvable else "with no solution"
+        raise AlgebraicLoopError(
+            loops[circle[0]],
+            where=where,
+            why=why,
+            allowed="loops whose gain is not 1",
+            fix="change a gain, or break the loop with an Integrator or a Unit Delay",
+        )
+
+
+def _over(expression: SX, p: SX) -> bool:
+    return all(depends_on(p, entry) for entry in symvar(expression))
+
+
+def _number(expression: SX, p: SX, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    (number,) = Function("f", [p], [densify(expression)]).call([values])
+    return np.asarray(number)

@@ -1,0 +1,175 @@
+"""Sample times: what a sampled block says of its own, and how the unsaid ones follow from the wires."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.block_equations import BlockEquations
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.parameter import ParameterKind, parameter
+from armblocks.equations import SampleClock
+from armblocks.errors import DiagramError, InputError
+
+INHERITED = -1.0
+"""The sample time of a block that takes that of its inputs, as in Simulink."""
+
+Source = SampleClock | None
+"""Where a signal changes: at the ticks of a clock, or (``None``) all the time."""
+
+
+def sample_time_parameter(default: float = INHERITED) -> Any:
+    """Declare the parameter ``sample_time`` of a sampled block: ``-1``, ``T`` or ``(T, offset)``."""
+    return parameter(
+        default,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        tunable=False,
+        unit="s",
+        doc="the period, or (period, offset); -1 takes that of the inputs",
+    )
+
+
+def own_clock(block: Block) -> SampleClock | None:
+    """The clock that a sampled block states; ``None`` where it takes that of its inputs.
+
+    Raises ``InputError`` for a sample time that is none.
+    """
+    given = np.atleast_1d(np.asarray(block.parameter_value("sample_time"), dtype=np.float64))
+    if given.tolist() == [INHERITED]:
+        return None
+    period, offset = (float(given[0]), float(given[1]) if given.size > 1 else 0.0)
+    if given.size > 2 or period <= 0.0 or not 0.0 <= offset < period:
+        raise InputError(
+            f"the sample time is {given.tolist()}",
+            where=f"{block.type_name()}.sample_time",
+            allowed="-1 (that of the inputs), a period > 0, or (period, offset) with 0 <= offset < period",
+            fix="give the period in seconds",
+        )
+    return SampleClock(period, offset)
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """The clocks of a diagram, fastest first, and which one each sampled block obeys."""
+
+    clocks: tuple[SampleClock, ...]
+    clock_of: Mapping[str, int]
+
+
+def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> Sampling:
+    """Find the clock of every sampled block; ``equations`` are those of all other blocks.
+
+    A block with sample time -1 takes the clock of what reaches its inputs, through blocks that only
+    calculate; the fastest, if the others are multiples of it. If nothing but constants reaches it, it takes
+    the clock of the sampled blocks that it feeds.
+
+    Raises ``DiagramError`` where no clock follows, or two that do not fit.
+    """
+    sampled = [name for name, block in diagram.blocks.items() if block.sampled]
+    if not sampled:
+        return Sampling((), {})
+    stated: dict[str, SampleClock | None] = {}
+    for name in sampled:
+        try:
+            stated[name] = own_clock(diagram.blocks[name])
+        except InputError as error:
+            raise DiagramError(
+                error.what, where=f"block '{name}', {error.where}", allowed=error.allowed, fix=error.fix
+            ) from None
+    begins: dict[str, Source] = {name: clock for name, clock in stated.items() if clock is not None}
+    begins.update({name: None for name, found in equations.items() if _flows(diagram.blocks[name], found)})
+    forward = {name: list[str]() for name in diagram.blocks}
+    backward = {name: list[str]() for name in diagram.blocks}
+    for wire in diagram.connections:
+        forward[wire.source.block].append(wire.target.block)
+        backward[wire.target.block].append(wire.source.block)
+    upstream = _reach(begins, forward)
+    downstream: Mapping[str, Collection[tuple[str, Source]]] | None = None
+    found: dict[str, SampleClock] = {}
+    for name, clock in stated.items():
+        if clock is not None:
+            found[name] = clock
+            continue
+        reaching = {source for entry in backward[name] for source in upstream[entry]}
+        if not reaching:
+            if downstream is None:
+                clocked = {entry: own for entry, own in stated.items() if own is not None}
+                downstream = _reach(dict(clocked), backward)
+            reaching = {source for entry in forward[name] for source in downstream[entry]}
+        found[name] = _fastest(name, diagram.blocks[name], reaching)
+    clocks = tuple(sorted(set(found.values()), key=lambda clock: (clock.period, clock.offset)))
+    return Sampling(clocks, {name: clocks.index(clock) for name, clock in found.items()})
+
+
+def _flows(block: Block, equations: BlockEquations) -> bool:
+    """Whether the outputs of a block move by themselves: with the time or with a continuous state."""
+    return bool(equations.states) or any(group.timed for group in equations.groups)
+
+
+def _reach(
+    begins: Mapping[str, Source], following: Mapping[str, Iterable[str]]
+) -> Mapping[str, set[tuple[str, Source]]]:
+    """Which of the blocks that begin something reach each block, not passing through another such one."""
+    reach: dict[str, set[tuple[str, Source]]] = {name: set() for name in following}
+    queue: deque[str] = deque()
+    for name, source in begins.items():
+        reach[name].add((name, source))
+        queue.append(name)
+    while queue:
+        name = queue.popleft()
+        for entry in following[name]:
+            if entry in begins:
+                continue
+            before = len(reach[entry])
+            # One example of a block per clock is enough for a message, and keeps the sets small.
+            known = {source for _, source in reach[entry]}
+            reach[entry].update(pair for pair in reach[name] if pair[1] not in known)
+            if len(reach[entry]) > before:
+                queue.append(entry)
+    return reach
+
+
+def _fastest(name: str, block: Block, reaching: Collection[tuple[str, Source]]) -> SampleClock:
+    where = f"block '{name}' ({block.title})"
+    fix = "give the block a sample_time of its own"
+    moving = sorted(entry for entry, source in reaching if source is None)
+    if moving:
+        raise DiagramError(
+            f"the sample time -1 is that of the inputs, but '{moving[0]}' changes all the time",
+            where=where,
+            allowed="-1 behind sampled blocks only",
+            fix=fix,
+        )
+    clocks = sorted(((clock, entry) for entry, clock in reaching if clock), key=lambda pair: pair[0].period)
+    if not clocks:
+        raise DiagramError(
+            "the sample time -1 is that of the inputs, but none of them is sampled",
+            where=where,
+            allowed="-1 behind or before a block with a sample time",
+            fix=fix,
+        )
+    fastest, by = clocks[0]
+    for clock, other in clocks[1:]:
+        steps = _exact(clock.period) / _exact(fastest.period)
+        shift = (_exact(clock.offset) - _exact(fastest.offset)) / _exact(fastest.period)
+        if steps.denominator != 1 or shift.denominator != 1:
+            raise DiagramError(
+                f"'{by}' ticks every {fastest.period:g} s (offset {fastest.offset:g} s) and '{other}' every "
+                f"{clock.period:g} s (offset {clock.offset:g} s)",
+                where=where,
+                allowed="inputs whose ticks are all ticks of the fastest one",
+                fix=fix + ", or put a Rate Transition before one of the inputs",
+            )
+    return fastest
+
+
+def _exact(seconds: float) -> Fraction:
+    """The decimal number that a person wrote: 0.3 is three times 0.1, which the doubles are not."""
+    return Fraction(repr(seconds))

@@ -1,0 +1,144 @@
+"""Where a run stands: what another run needs to go on, in memory or as a file.
+
+A run that ends at a time has to cut its last step short there; a longer run would not. So besides the values
+at its end a state holds the native loop's own arrays from before that last step, and a run that goes on with
+the same solver, settings and parameters repeats it at its natural length: what it records is bit for bit what
+the uninterrupted run would have recorded. With other settings or parameters, or other values put into the
+state, a run starts anew from the values at ``time``.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.compiler.native_integrator import Checkpoint
+from armblocks.compiler.system import CompiledSystem
+from armblocks.equations import Signature
+from armblocks.errors import FormatError, InputError
+from armblocks.files import read_bounded, write_atomically
+
+Array = NDArray[np.float64]
+
+FORMAT = "armblocks run state 1"
+LARGEST_FILE = 1 << 30
+_PARTS = ("states", "discrete", "algebraic")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunState:
+    """State of a run of system ``name`` at ``time`` (s), after the ticks and events of that instant.
+
+    ``states (nx,)``, ``discrete (nz,)`` and ``algebraic (nw,)`` are flat, ``names`` the slots of each.
+    ``settings`` says with which method and numbers ``checkpoint`` can be gone on with; both are the engine's.
+    """
+
+    name: str
+    time: float
+    states: Array
+    discrete: Array
+    algebraic: Array
+    names: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+    settings: str = ""
+    checkpoint: Checkpoint | None = None
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a file of NumPy's ``.npz`` format, all of it or nothing. Raises ``FormatError``."""
+        description = {
+            "format": FORMAT,
+            "name": self.name,
+            "names": self.names,
+            "settings": self.settings,
+        }
+        arrays: dict[str, NDArray[Any]] = {
+            "description": np.array(json.dumps(description)),
+            "time": np.array(self.time),
+            "states": self.states,
+            "discrete": self.discrete,
+            "algebraic": self.algebraic,
+        }
+        if self.checkpoint is not None:
+            arrays |= {"reals": self.checkpoint.reals, "counts": self.checkpoint.counts}
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays)
+        write_atomically(Path(path), buffer.getvalue())
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> RunState:
+        """Inverse of :meth:`save`, to the bit. Raises ``FormatError`` for any other file."""
+        data = read_bounded(Path(path), LARGEST_FILE)
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as stored:
+                arrays: dict[str, NDArray[Any]] = {name: stored[name] for name in stored.files}
+            description = json.loads(str(arrays["description"]))
+            if description["format"] != FORMAT:
+                raise ValueError("another format")
+            states, discrete, algebraic = (
+                np.ascontiguousarray(arrays[part], dtype=np.float64).reshape(-1) for part in _PARTS
+            )
+            checkpoint = None
+            if "reals" in arrays:
+                checkpoint = Checkpoint(
+                    reals=np.ascontiguousarray(arrays["reals"], dtype=np.float64).reshape(-1),
+                    counts=np.ascontiguousarray(arrays["counts"], dtype=np.int64).reshape(-1),
+                )
+            first, second, third = (tuple(map(str, part)) for part in description["names"])
+            return cls(
+                name=str(description["name"]),
+                time=float(arrays["time"]),
+                states=states,
+                discrete=discrete,
+                algebraic=algebraic,
+                names=(first, second, third),
+                settings=str(description["settings"]),
+                checkpoint=checkpoint,
+            )
+        except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile, EOFError) as error:
+            raise FormatError(
+                "this file holds no state of a run",
+                where=str(path),
+                allowed="what RunState.save wrote",
+                fix="save the state again: result.final_state.save(path)",
+            ) from error
+
+
+def slot_names(system: CompiledSystem) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Names of the states, discrete variables and unknowns of implicit equations."""
+    return system.states.names, system.discrete.names, system.algebraic.names
+
+
+def check_state(system: CompiledSystem, state: RunState) -> None:
+    """Raise ``InputError`` where a state does not fit a system: other variables, sizes, or not numbers."""
+    layouts: tuple[Signature, ...] = (system.states, system.discrete, system.algebraic)
+    for layout, names, values in zip(layouts, state.names, (state.states, state.discrete, state.algebraic)):
+        other = sorted(set(layout.names) ^ set(names))
+        if other or layout.names != names or values.shape != (layout.size,):
+            named = f"'{other[0]}' is only in one of them" if other else "their variables differ"
+            raise InputError(
+                f"the state of '{state.name}' at {state.time:g} s does not fit: {named}",
+                where=system.name,
+                allowed="a state of the same diagram",
+                fix="run the diagram anew, or load the diagram that the state belongs to",
+            )
+        if not np.isfinite(values).all():
+            raise InputError(
+                f"the state of '{state.name}' at {state.time:g} s is not all finite numbers",
+                where=system.name,
+                fix="use the state of a run that did not fail",
+            )
+
+
+def settings_text(key: tuple[str, ...], numbers: tuple[float, ...], p: Array) -> str:
+    """What must be the same for two runs to take the same steps, as text."""
+    import hashlib
+
+    content = repr((key, [float(number).hex() for number in numbers], p.tobytes()))
+    return hashlib.sha256(content.encode()).hexdigest()

@@ -1,0 +1,101 @@
+"""Paths: ends, limits, and that speeds are the rates of what they belong to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from block_evaluation import evaluate
+from scipy.spatial.transform import Rotation, Slerp
+
+from armblocks.blocks import CirclePath, CTraj, JTraj, MultiSegment, Trapezoidal
+from armblocks.diagram import Block
+from armblocks.errors import InputError
+
+RANDOM = np.random.default_rng(24)
+
+
+def rate(block: Block, port: str, t: float) -> np.ndarray:
+    """Central difference; exact for the parabolas of these paths."""
+    h = 1e-4
+    return (evaluate(block, t=t + h)[port] - evaluate(block, t=t - h)[port]) / (2 * h)
+
+
+@pytest.mark.parametrize("cruise", [1.01, 1.5, 2.0])
+def test_a_trapezoidal_profile(cruise: float) -> None:
+    q0, qf, tmax = np.array([0.0, 1.0]), np.array([2.0, -3.0]), 4.0
+    block = Trapezoidal(q0=q0, qf=qf, tmax=tmax, cruise=cruise)
+    ramp = tmax * (1 - 1 / cruise)
+    for t in (-1.0, 0.0):
+        assert evaluate(block, t=t)["q"].tolist() == q0.tolist()
+    for t in (4.0, 5.0):
+        assert evaluate(block, t=t)["q"] == pytest.approx(qf, rel=1e-15)
+        assert evaluate(block, t=t)["qd"].tolist() == [0, 0]
+        assert evaluate(block, t=t)["qdd"].tolist() == [0, 0]
+    for t in (0.3 * ramp, 2.0, tmax - 0.6 * ramp):
+        found = evaluate(block, t=t)
+        if abs(t - ramp) > 1e-3 and abs(t - tmax + ramp) > 1e-3:
+            assert found["qd"] == pytest.approx(rate(block, "q", t), rel=1e-8)
+            assert found["qdd"] == pytest.approx(rate(block, "qd", t), rel=1e-7, abs=1e-9)
+    assert evaluate(block, t=2.0)["qd"] == pytest.approx(cruise * (qf - q0) / tmax, rel=1e-14)
+
+
+def test_the_toolboxs_default_makes_three_equal_parts() -> None:
+    # lspb(0, 1, 0:3): V = 1.5 / 3, a = V, so 1/4 after one second, 3/4 after two
+    block = Trapezoidal(tmax=3.0)
+    assert [float(evaluate(block, t=t)["q"]) for t in (1.0, 2.0)] == pytest.approx([0.25, 0.75], rel=1e-14)
+
+
+def test_many_segments() -> None:
+    points = RANDOM.normal(size=(4, 2))
+    block = MultiSegment(points=points, durations=[1.0, 2.0, 1.5], blend=0.4)
+    assert evaluate(block, t=0.0)["q"].tolist() == points[0].tolist()
+    for t in (4.9, 7.0):
+        assert evaluate(block, t=t)["q"] == pytest.approx(points[-1], abs=1e-14)
+        assert evaluate(block, t=t)["qd"] == pytest.approx([0, 0], abs=1e-15)
+    assert evaluate(block, t=9.0)["qd"].tolist() == [0, 0]
+    middle = evaluate(block, t=0.2 + 1.0 + 1.0)
+    assert middle["qd"] == pytest.approx((points[2] - points[1]) / 2.0, rel=1e-13)
+    assert middle["q"] == pytest.approx((points[1] + points[2]) / 2, rel=1e-13)
+    corner = evaluate(block, t=1.2)
+    change = (points[2] - points[1]) / 2.0 - (points[1] - points[0])
+    assert corner["q"] == pytest.approx(points[1] + change * 0.4 / 8, rel=1e-13)  # blend / 8 of the change
+    assert corner["qdd"] == pytest.approx(change / 0.4, rel=1e-13)
+    for t in (0.1, 0.7, 1.15, 2.0, 3.3, 4.8):
+        assert evaluate(block, t=t)["qd"] == pytest.approx(rate(block, "q", t), rel=1e-7, abs=1e-10)
+        assert evaluate(block, t=t)["qdd"] == pytest.approx(rate(block, "qd", t), rel=1e-7, abs=1e-10)
+
+
+@pytest.mark.parametrize("profile", ["lspb", "quintic"])
+def test_a_straight_way_of_the_tool(profile: str) -> None:
+    turns = Rotation.random(2, rng=RANDOM)
+    T0, T1 = np.eye(4), np.eye(4)
+    T0[:3, :3], T1[:3, :3] = turns.as_matrix()
+    T0[:3, 3], T1[:3, 3] = RANDOM.normal(size=(2, 3))
+    block = CTraj(tmax=6.0, profile=profile)
+    for t in (0.0, 1.0, 2.5, 5.0, 6.0, 8.0):
+        found = evaluate(block, T0, T1, t=t)
+        s = found["s"]
+        alone = Trapezoidal(tmax=6.0) if profile == "lspb" else JTraj(q0=[0.0], qf=[1.0], tmax=6.0)
+        assert s == pytest.approx(np.ravel(evaluate(alone, t=t)["q"])[0], rel=1e-14)
+        expected = Slerp([0, 1], turns)(float(np.clip(s, 0, 1))).as_matrix()
+        assert found["T"][:3, :3] == pytest.approx(expected, abs=1e-14)
+        assert found["T"][:3, 3] == pytest.approx(T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3]), rel=1e-14)
+    assert evaluate(block, T0, T0, t=2.0)["T"] == pytest.approx(T0, abs=1e-14)
+
+
+def test_a_circle() -> None:
+    block = CirclePath(radius=2.0, centre=[1.0, 2.0, 3.0], frequency=0.25, phase=0.1)
+    a = 2 * np.pi * 0.25 * 0.7 + 0.1
+    expected = [1 + 2 * np.cos(a), 2 + 2 * np.sin(a), 3]
+    assert evaluate(block, t=0.7)["y"] == pytest.approx(expected, rel=1e-15)
+
+
+def test_what_does_not_fit_is_said() -> None:
+    with pytest.raises(InputError, match=r"3 points make 2 segments but 1 durations are given"):
+        MultiSegment(durations=[1.0])
+    with pytest.raises(InputError, match=r"corners of 2 s do not fit into a segment of 1 s"):
+        MultiSegment(blend=2.0)
+    with pytest.raises(InputError, match=r"CirclePath: the centre has 2 numbers"):
+        CirclePath(centre=[0, 0])
+    with pytest.raises(InputError, match=r"'q0' has shape \(2,\) and 'qf' has shape \(3,\)"):
+        Trapezoidal(q0=[0, 0], qf=[1, 2, 3])

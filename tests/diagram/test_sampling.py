@@ -1,0 +1,114 @@
+"""Sample times: stated, inherited through wires, and refused where they do not fit."""
+
+from __future__ import annotations
+
+import pytest
+
+from armblocks.blocks import (
+    Clock,
+    Constant,
+    CounterLimited,
+    Gain,
+    Integrator,
+    Mux,
+    RateTransition,
+    Step,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
+from armblocks.diagram.trace import diagram_model
+from armblocks.equations import SampleClock
+from armblocks.errors import DiagramError, InputError
+
+
+def clocks_of(diagram: Diagram) -> dict[str, SampleClock]:
+    sampling = diagram_model(diagram).sampling
+    return {name: sampling.clocks[clock] for name, clock in sampling.clock_of.items()}
+
+
+def test_a_stated_sample_time_is_taken_and_inherited_through_blocks_that_calculate() -> None:
+    builder = DiagramBuilder("d")
+    hold = builder.add("hold", ZeroOrderHold(sample_time=(0.2, 0.05)), builder.add("t", Clock()))
+    gain = builder.add("gain", Gain(), hold)
+    mux = builder.add("mux", Mux(), gain, builder.add("one", Constant()))
+    builder.add("delay", UnitDelay(), builder.add("again", UnitDelay(), mux))
+    clocks = clocks_of(builder.build())
+    assert set(clocks.values()) == {SampleClock(0.2, 0.05)}
+    assert set(clocks) == {"hold", "delay", "again"}
+
+
+def test_the_fastest_is_inherited_and_tenths_are_decimal() -> None:
+    builder = DiagramBuilder("d")
+    slow = builder.add("slow", CounterLimited(sample_time=0.3))
+    fast = builder.add("fast", CounterLimited(sample_time=0.1))
+    builder.add("delay", UnitDelay(), builder.add("mux", Mux(), slow, fast))
+    diagram = builder.build()
+    assert clocks_of(diagram)["delay"] == SampleClock(0.1)
+    assert trace_diagram(diagram).clocks == (SampleClock(0.1), SampleClock(0.3))
+
+
+def test_constants_leave_the_choice_to_what_they_feed() -> None:
+    builder = DiagramBuilder("d")
+    delay = builder.add("delay", UnitDelay(), builder.add("one", Constant()))
+    builder.add("hold", ZeroOrderHold(sample_time=0.5), builder.add("gain", Gain(), delay))
+    assert clocks_of(builder.build())["delay"] == SampleClock(0.5)
+
+
+def test_a_loop_of_delays_inherits() -> None:
+    builder = DiagramBuilder("d")
+    mux = builder.add("mux", Mux(), builder.add("count", CounterLimited(sample_time=0.5)))
+    first = builder.add("first", UnitDelay(initial=[0.0, 0.0]), mux)
+    sum_of = builder.add(
+        "gain", Gain(gain=0.5), builder.add("hold", UnitDelay(), builder.add("one", Constant()))
+    )
+    builder.connect(sum_of, mux["u2"])
+    builder.add("third", UnitDelay(), first)
+    builder.add("end", ZeroOrderHold(sample_time=1.0), sum_of)
+    assert clocks_of(builder.build())["first"] == SampleClock(0.5)
+
+
+@pytest.mark.parametrize("source", [Clock(), Step(), Integrator()], ids=["clock", "step", "state"])
+def test_what_moves_by_itself_gives_no_sample_time(source: Clock | Step | Integrator) -> None:
+    builder = DiagramBuilder("d")
+    inputs = [builder.add("one", Constant())] if source.input_ports() else []
+    gain = builder.add("gain", Gain(), builder.add("source", source, *inputs))
+    builder.add("delay", UnitDelay(), gain)
+    with pytest.raises(DiagramError, match=r"block 'delay' \(Unit Delay\): .*'source' changes all the time"):
+        builder.build()
+
+
+def test_a_sample_time_that_nothing_gives_is_asked_for() -> None:
+    builder = DiagramBuilder("d")
+    builder.add("delay", UnitDelay(), builder.add("one", Constant()))
+    with pytest.raises(DiagramError, match=r"none of them is sampled.*give the block a sample_time"):
+        builder.build()
+
+
+def test_two_that_do_not_fit_are_named() -> None:
+    builder = DiagramBuilder("d")
+    a = builder.add("a", CounterLimited(sample_time=0.2))
+    b = builder.add("b", CounterLimited(sample_time=0.5))
+    builder.add("delay", UnitDelay(), builder.add("mux", Mux(), a, b))
+    message = r"'a' ticks every 0\.2 s \(offset 0 s\) and 'b' every 0\.5 s .* put a Rate Transition"
+    with pytest.raises(DiagramError, match=message):
+        builder.build()
+    builder = DiagramBuilder("d")
+    a = builder.add("a", CounterLimited(sample_time=0.2))
+    b = builder.add("b", RateTransition(sample_time=0.2), builder.add("b0", CounterLimited(sample_time=0.5)))
+    builder.add("delay", UnitDelay(), builder.add("mux", Mux(), a, b))
+    assert clocks_of(builder.build())["delay"] == SampleClock(0.2)
+
+
+@pytest.mark.parametrize("sample_time", [0.0, -2.0, (0.1, 0.1), (0.1, -0.1), (0.1, 0.0, 0.0), (-1.0, 0.1)])
+def test_a_sample_time_that_is_none_is_refused(sample_time: object) -> None:
+    builder = DiagramBuilder("d")
+    builder.add("count", CounterLimited(sample_time=sample_time))  # pyright: ignore
+    with pytest.raises(DiagramError, match=r"block 'count', CounterLimited\.sample_time: the sample time is"):
+        builder.build()
+
+
+@pytest.mark.parametrize(("period", "offset"), [(0.0, 0.0), (float("inf"), 0.0), (1.0, 1.0), (1.0, -0.1)])
+def test_a_clock_that_cannot_tick_is_refused(period: float, offset: float) -> None:
+    with pytest.raises(InputError, match=r"a clock has the period .* Allowed: a finite period > 0"):
+        SampleClock(period, offset)

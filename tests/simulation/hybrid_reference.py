@@ -1,0 +1,154 @@
+"""Clocks, events and implicit equations in plain Python: the second opinion on the native loop.
+
+Written from the description of the semantics, sharing nothing with the code under test: ticks are listed
+beforehand in rational arithmetic, flows come from SciPy's DOP853 at tight tolerances, zeros from a fine grid
+and Brent's method, implicit equations from Brent's method too, functions from CasADi's interpreter.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from armblocks.equations import HybridSystem
+
+GRID = 30
+NAMES = ("derivative", "signals", "residual", "update", "guards", "reset")
+
+
+class Reference:
+    """One run of a system from 0; ``signals`` at the samples, ``events`` so far."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        self.functions = {name: getattr(system, name).casadi_function() for name in NAMES}
+        self.p = system.parameter_values
+        self.x, self.z, self.w = (
+            np.asarray(getattr(system, name)(self.p)[0])
+            for name in ("initial_states", "initial_discrete", "initial_algebraic")
+        )
+        self.t = 0.0
+        self.events = 0
+        self.signs = np.zeros(len(system.guard_directions))
+
+    def call(self, name: str, t: float, x: np.ndarray, *more: np.ndarray) -> list[np.ndarray]:
+        w = self.w
+        if w.size and name != "residual":
+            w = self.solve(t, x)
+        results = self.functions[name].call([t, x, self.z, w, self.p, *more])
+        return [np.asarray(value).reshape(-1) for value in results]
+
+    def solve(self, t: float, x: np.ndarray) -> np.ndarray:
+        """The zero of one unknown, between -10 and 10."""
+
+        def residual(w: float) -> float:
+            return float(self.functions["residual"].call([t, x, self.z, w, self.p])[0])
+
+        return np.array([brentq(residual, -10.0, 10.0, xtol=1e-14)])
+
+    def ticks(self, stop: float) -> list[tuple[float, np.ndarray]]:
+        """All instants with ticks, and which clocks tick there."""
+        marks: dict[Fraction, np.ndarray] = {}
+        for k, clock in enumerate(self.system.clocks):
+            period, offset = Fraction(repr(clock.period)), Fraction(repr(clock.offset))
+            number = 0
+            while offset + number * period <= Fraction(repr(stop)):
+                mark = marks.setdefault(offset + number * period, np.zeros(len(self.system.clocks)))
+                mark[k] = 1.0
+                number += 1
+        return [(float(instant), marks[instant]) for instant in sorted(marks)]
+
+    def fired(self, g: np.ndarray) -> np.ndarray:
+        now, wanted = np.sign(g), np.array(self.system.guard_directions)
+        return np.where((now * self.signs < 0) & (now * wanted >= 0), now, 0.0)
+
+    def settle(self) -> None:
+        """Events at one instant until there are none."""
+        for _ in range(1000):
+            g = self.call("guards", self.t, self.x)[0]
+            e = self.fired(g)
+            self.signs = np.where(g != 0, np.sign(g), self.signs)
+            if not e.any():
+                return
+            self.events += int(np.abs(e).sum())
+            self.x, self.z = self.call("reset", self.t, self.x, e)
+            g = self.call("guards", self.t, self.x)[0]
+            self.signs = np.where(e != 0, np.sign(g), self.signs)
+        raise AssertionError("events without end")
+
+    def flow(self, end: float, samples: np.ndarray, rows: list[np.ndarray]) -> None:
+        """To ``end``, stopping at every event on the way."""
+        while self.t < end:
+            start, values = self.t, lambda t, x=self.x: x
+            if self.x.size:
+                solution = solve_ivp(
+                    lambda t, x: self.call("derivative", t, x)[0],
+                    (start, end),
+                    self.x,
+                    method="DOP853",
+                    rtol=1e-12,
+                    atol=1e-13,
+                    dense_output=True,
+                )
+                values = solution.sol
+            hit = self.first_zero(start, end, values)
+            reached = end if hit is None else hit
+            inside = samples[(samples > start) & (samples < reached * (1 - 1e-14))]
+            for instant in inside[inside > self.recorded]:
+                rows.append(self.call("signals", instant, values(instant))[0])
+                self.recorded = instant
+            self.t, self.x = reached, np.asarray(values(reached))
+            if hit is not None:
+                self.settle()
+                self.record_here(samples, rows)
+
+    def record_here(self, samples: np.ndarray, rows: list[np.ndarray]) -> None:
+        """The sample at the instant reached, if there is one that is not recorded yet."""
+        for sample in samples[np.isclose(samples, self.t, rtol=1e-14, atol=0)]:
+            if sample > self.recorded:
+                rows.append(self.call("signals", sample, self.x)[0])
+                self.recorded = sample
+
+    def first_zero(self, start: float, end: float, values: object) -> float | None:
+        """The far side of the first crossing, or ``None``; sides are noted on the way."""
+        if not self.signs.size:
+            return None
+        before = start
+        for instant in np.linspace(start, end, GRID)[1:]:
+            g = self.call("guards", instant, values(instant))[0]
+            e = self.fired(g)
+            if e.any():
+                roots = []
+                for k in np.flatnonzero(e):
+                    zero = lambda t, k=k: self.call("guards", t, values(t))[0][k]  # noqa: E731
+                    low = before
+                    while zero(low) * self.signs[k] <= 0:
+                        low += 1e-12
+                    root = brentq(zero, low, instant, xtol=1e-15, rtol=1e-15)
+                    while zero(root) * self.signs[k] >= 0:
+                        root += 4 * np.spacing(root)
+                    roots.append(root)
+                return min(roots)
+            self.signs = np.where(g != 0, np.sign(g), self.signs)
+            before = instant
+        return None
+
+    def run(self, samples: np.ndarray) -> np.ndarray:
+        """Signals at the samples, ``(ny, N)``."""
+        rows: list[np.ndarray] = []
+        self.recorded = -1.0
+        stop = float(samples[-1])
+        instants = self.ticks(stop)
+        if not instants or instants[0][0] > 0:
+            instants.insert(0, (0.0, np.zeros(len(self.system.clocks))))
+        instants.append((stop, np.zeros(len(self.system.clocks))))
+        for instant, marks in instants:
+            self.flow(instant, samples, rows)
+            if marks.any():
+                self.z = self.call("update", self.t, self.x, marks)[0]
+            self.settle()
+            self.record_here(samples, rows)
+        return np.array(rows).T

@@ -1,0 +1,113 @@
+"""Runs that go on where others ended: bit for bit as if they had not."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hybrid_systems import bouncing_ball, loop_of_cosine, relay_oscillator, sampled_loop, stick_slip
+from small_systems import oscillator, van_der_pol_pid
+
+from armblocks.compiler.system import CompiledSystem, compile_system
+from armblocks.equations import SimulationOptions
+from armblocks.errors import FormatError, InputError
+from armblocks.simulation import RunState, simulate
+
+SYSTEMS = {
+    "van_der_pol": compile_system(van_der_pol_pid()),
+    "ball": compile_system(bouncing_ball(0.9)),
+    "sampled": compile_system(sampled_loop(0.3)),
+    "relay": compile_system(relay_oscillator()),
+    "stick_slip": compile_system(stick_slip()),
+    "loop": compile_system(loop_of_cosine()),
+}
+
+
+@pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("dop853", None), ("rk4", 0.013)])
+@pytest.mark.parametrize("name", list(SYSTEMS))
+def test_an_interrupted_run_gives_the_bits_of_an_uninterrupted_one(
+    name: str, solver: str, step: float | None, tmp_path: Path
+) -> None:
+    system = SYSTEMS[name]
+
+    def options(stop: float) -> SimulationOptions:
+        return SimulationOptions(stop_time=stop, sample_time=0.05, solver=solver, step=step)
+
+    whole = simulate(system, options(4.0))
+    for cuts in ([1.55], [0.3, 1.5, 1.51, 3.3]):
+        state: RunState | None = None
+        for stop in cuts:
+            part = simulate(system, options(stop), initial_state=state)
+            assert part.final_state is not None
+            part.final_state.save(tmp_path / "state")
+            state = RunState.load(tmp_path / "state")
+        rest = simulate(system, options(4.0), initial_state=state)
+        assert "exactly as the run before" in rest.run.reason
+        assert rest.time[0] == cuts[-1]
+        same = np.isin(rest.time, whole.time)
+        assert same.sum() >= 14
+        later = np.isin(whole.time, rest.time)
+        assert rest.signals[:, same].tobytes() == whole.signals[:, later].tobytes()
+        assert rest.final_state is not None and whole.final_state is not None
+        assert rest.final_state.states.tobytes() == whole.final_state.states.tobytes()
+
+
+def first_second(system: CompiledSystem = SYSTEMS["sampled"], **more: object) -> RunState:
+    state = simulate(system, SimulationOptions(stop_time=1.0, **more)).final_state  # pyright: ignore
+    assert state is not None
+    return state
+
+
+def test_a_state_holds_the_values_at_the_end() -> None:
+    state = first_second()
+    assert state.time == 1.0
+    assert state.names == (("plant/x",), ("hold/y",), ())
+    assert state.discrete[0] == pytest.approx(0.7**3)
+    assert state.states[0] == pytest.approx(0.7**3 * (1 - 0.1))
+
+
+def test_other_settings_start_anew_from_the_values() -> None:
+    state = first_second()
+    result = simulate(
+        SYSTEMS["sampled"], SimulationOptions(stop_time=2.0, solver="dop853"), initial_state=state
+    )
+    assert "started anew" in result.run.reason
+    assert result["plant/x"][0] == state.states[0]
+    assert result["plant/x"][-1] == pytest.approx(0.7**6 * (1 - 0.2), rel=1e-12)
+
+
+def test_states_can_be_set() -> None:
+    state = dataclasses.replace(first_second(), states=np.array([5.0]), checkpoint=None)
+    result = simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=1.1), initial_state=state)
+    assert result["plant/x"][0] == 5.0
+
+
+def test_a_state_of_another_diagram_is_refused() -> None:
+    with pytest.raises(InputError, match="does not fit: 'hold/y' is only in one of them"):
+        simulate(SYSTEMS["relay"], SimulationOptions(stop_time=2.0), initial_state=first_second())
+    bad = dataclasses.replace(first_second(), states=np.array([np.nan]))
+    with pytest.raises(InputError, match="is not all finite numbers"):
+        simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=2.0), initial_state=bad)
+
+
+def test_a_run_cannot_go_on_backwards() -> None:
+    with pytest.raises(InputError, match=r"stop_time is 0\.5 s, and the run goes on from 1 s"):
+        simulate(SYSTEMS["sampled"], SimulationOptions(stop_time=0.5), initial_state=first_second())
+
+
+@pytest.mark.parametrize("content", [b"", b"PK", b"not a state at all", b"\x93NUMPY"])
+def test_another_file_is_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "state").write_bytes(content)
+    with pytest.raises(FormatError, match="this file holds no state of a run"):
+        RunState.load(tmp_path / "state")
+
+
+def test_changed_parameters_start_anew() -> None:
+    system = compile_system(oscillator())
+    state = first_second(system)
+    result = simulate(system, SimulationOptions(stop_time=2.0), {"mass.omega": 3.0}, initial_state=state)
+    assert "started anew" in result.run.reason
+    expected = np.cos(2.0) * np.cos(3.0) - 2.0 * np.sin(2.0) / 3.0 * np.sin(3.0)
+    assert result["mass/x"][-1] == pytest.approx(expected, abs=1e-5)

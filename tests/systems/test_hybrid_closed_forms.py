@@ -1,0 +1,346 @@
+"""Sampled, switching and implicit diagrams against closed forms, by fixed and adaptive steps alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from stepwise_reference import run_reference
+
+from armblocks.blocks import (
+    Backlash,
+    Clock,
+    Constant,
+    CoulombFriction,
+    DeadZone,
+    Gain,
+    Integrator,
+    IntegratorLimited,
+    PulseGenerator,
+    Quantizer,
+    Relay,
+    ResettableIntegrator,
+    Saturation,
+    SineWave,
+    Step,
+    StickSlipFriction,
+    Sum,
+    Switch,
+    Trigonometry,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.compiler.system import compile_system
+from armblocks.diagram import Block, BlockHandle, Diagram, DiagramBuilder, trace_diagram
+from armblocks.equations import SimulationOptions
+from armblocks.simulation import simulate
+
+Run = Callable[[Diagram, float], dict[str, np.ndarray]]
+SAMPLES = 100
+
+
+def native(solver: str, step: float | None = None) -> Run:
+    def run(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+        options = SimulationOptions(
+            stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
+        )
+        result = simulate(compile_system(trace_diagram(diagram)), options)
+        return {name: result[name] for name in result.names} | {"t": result.time}
+
+    return run
+
+
+def by_reference(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+    times = np.arange(SAMPLES + 1) * (stop / SAMPLES)
+    return run_reference(diagram, times.tolist(), step=stop / SAMPLES / 3) | {"t": times}
+
+
+RUNS = {"adaptive": native("rk45"), "fixed": native("rk4", 0.01), "reference": by_reference}
+
+
+@pytest.fixture(params=RUNS.values(), ids=RUNS)
+def run(request: pytest.FixtureRequest) -> Run:
+    return request.param
+
+
+def fed(block: Block, source: Block, *, name: str = "block") -> Diagram:
+    """A block behind a source, with the integral of its output, which tells when it switched."""
+    builder = DiagramBuilder("d")
+    out = builder.add(name, block, builder.add("source", source))
+    builder.add("integral", Integrator(), out)
+    return builder.build()
+
+
+def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
+    # rtol 1e-10 over a few hundred steps; RK4 of 0.01 on sines: h^4/120 = 1e-10
+    assert found == pytest.approx(expected, abs=tolerance)
+
+
+# -- sampled parts -----------------------------------------------------------------------------------------
+
+
+def test_a_sampled_loop_around_an_integrator(run: Run) -> None:
+    """x' = -k x(jT): x((j+1)T) = (1 - kT) x(jT), a straight line in between."""
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator(initial=1.0))
+    hold = builder.add("hold", ZeroOrderHold(sample_time=0.25), x)
+    builder.connect(builder.add("k", Gain(gain=-2.0), hold), x)
+    found = run(builder.build(), 2.0)
+    j = np.floor(found["t"] / 0.25 + 1e-9)
+    start = 0.5**j
+    close(found["hold/y"], start, 1e-14)
+    close(found["x/y"], start * (1 - 2.0 * (found["t"] - 0.25 * j)), 1e-14)
+
+
+def test_a_held_exponential(run: Run) -> None:
+    """The hold of x' = -x gives exp(-jT) at exactly jT, also where jT is no sum of steps."""
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator(initial=1.0))
+    builder.connect(builder.add("k", Gain(gain=-1.0), x), x)
+    builder.add("hold", ZeroOrderHold(sample_time=(0.3, 0.1)), x)
+    found = run(builder.build(), 3.0)
+    j = np.floor((found["t"] - 0.1) / 0.3 + 1e-9)
+    close(found["hold/y"], np.where(j >= 0, np.exp(-(0.1 + 0.3 * j)), 0.0))
+
+
+def test_two_rates_and_a_delay(run: Run) -> None:
+    """A slow clock sees the fast one's value of the same instant; the delay the one before."""
+    builder = DiagramBuilder("d")
+    t = builder.add("t", Clock())
+    fast = builder.add("fast", ZeroOrderHold(sample_time=0.2), t)
+    slow = builder.add("slow", ZeroOrderHold(sample_time=0.5), fast)
+    builder.add("before", UnitDelay(), slow)
+    found = run(builder.build(), 5.0)
+    fast_tick = 0.2 * np.floor(found["t"] / 0.2 + 1e-9)
+    slow_tick = 0.5 * np.floor(found["t"] / 0.5 + 1e-9)
+    seen = 0.2 * np.floor(slow_tick / 0.2 + 1e-9)
+    close(found["fast/y"], fast_tick, 1e-14)
+    close(found["slow/y"], seen, 1e-14)
+    before = np.where(slow_tick > 0, 0.2 * np.floor((slow_tick - 0.5) / 0.2 + 1e-9), 0.0)
+    close(found["before/y"], before, 1e-14)
+
+
+def test_a_limiter_between_sampled_blocks_limits_at_the_tick(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    hold = builder.add("hold", ZeroOrderHold(sample_time=0.5), builder.add("t", Clock()))
+    limit = builder.add("limit", Saturation(lower=-1.0, upper=1.2), hold)
+    builder.add("again", ZeroOrderHold(), limit)
+    found = run(builder.build(), 5.0)
+    expected = np.minimum(0.5 * np.floor(found["t"] / 0.5 + 1e-9), 1.2)
+    close(found["again/y"], expected, 1e-15)
+    close(found["limit/y"], expected, 1e-15)
+
+
+# -- switching ---------------------------------------------------------------------------------------------
+
+
+def test_saturation_and_dead_zone_of_a_sine(run: Run) -> None:
+    """The integral shows that the kinks are met: they lie at sin t = 1/2."""
+    t = np.linspace(0.0, 3.0, SAMPLES + 1)
+    edge = np.pi / 6
+    rise, fall = np.minimum(t, edge), np.maximum(t - (np.pi - edge), 0.0)
+    flat = np.clip(t - edge, 0.0, np.pi - 2 * edge)
+    limited = (1 - np.cos(rise)) + 0.5 * flat + (np.cos(np.pi - edge) - np.cos(np.pi - edge + fall))
+    found = run(fed(Saturation(), SineWave()), 3.0)
+    close(found["block/y"], np.clip(np.sin(t), -0.5, 0.5))
+    close(found["integral/y"], limited)
+    found = run(fed(DeadZone(), SineWave()), 3.0)
+    close(found["block/y"], np.maximum(np.sin(t) - 0.5, 0.0))
+    close(found["integral/y"], 1 - np.cos(t) - limited)
+
+
+def test_a_limiter_may_begin_beyond_its_limit_and_be_passed_in_one_jump(run: Run) -> None:
+    found = run(fed(Saturation(), Step(time=1.0, initial=3.0, final=-2.0)), 2.0)
+    assert found["block/y"].tolist() == [0.5] * 50 + [-0.5] * 51
+    close(found["integral/y"][-1:], np.zeros(1), 1e-14)
+
+
+def test_a_relay_with_hysteresis(run: Run) -> None:
+    """On from sin t = 0.5 upwards at pi/6, off at sin t = -0.5 downwards at 7 pi/6."""
+    found = run(fed(Relay(on_value=2.0, off_value=-1.0), SineWave()), 6.0)
+    t = found["t"]
+    on = (t >= np.pi / 6) & (t < 7 * np.pi / 6)
+    assert found["block/y"].tolist() == np.where(on, 2.0, -1.0).tolist()
+    close(found["integral/y"], -t + 3 * np.clip(t - np.pi / 6, 0.0, np.pi))
+
+
+def test_a_thermostat_cycles_with_its_exact_period(run: Run) -> None:
+    """T' = -1 below and 1 above the relay's points: a triangle between -1 and 1 of period 4."""
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator())
+    relay = builder.add("relay", Relay(on_point=1.0, off_point=-1.0, on_value=-1.0, off_value=1.0), x)
+    builder.connect(relay, x)
+    found = run(builder.build(), 12.5)
+    phase = (found["t"] + 1.0) % 4.0
+    close(found["x/y"], 1.0 - np.abs(phase - 2.0), 1e-10)
+
+
+def test_a_quantizer(run: Run) -> None:
+    found = run(fed(Quantizer(interval=0.4), SineWave()), 3.0)
+    t = found["t"]
+    assert found["block/y"] == pytest.approx(0.4 * np.floor(np.sin(t) / 0.4 + 0.5), abs=1e-15)
+    edges = np.arcsin([0.2, 0.6])
+    levels = 0.4 * sum(np.clip(t - edge, 0, np.pi - 2 * edge) for edge in edges)
+    # the step down is 1e-9 of the interval late
+    close(found["integral/y"], levels, 2e-9)
+
+
+def test_coulomb_friction_of_a_speed_that_turns(run: Run) -> None:
+    found = run(fed(CoulombFriction(offset=2.0, gain=3.0), SineWave(frequency=2.0)), 3.0)
+    t, u = found["t"], np.sin(2.0 * found["t"])
+    assert found["block/y"][0] == 0.0
+    close(found["block/y"], np.sign(u) * 2.0 + 3.0 * u)
+    moved = 2.0 * (np.minimum(t, np.pi / 2) - np.maximum(t - np.pi / 2, 0.0)) + 1.5 * (1 - np.cos(2 * t))
+    close(found["integral/y"], moved)
+
+
+def test_backlash_follows_and_rests(run: Run) -> None:
+    """u = sin t, play 0.5: y leaves 0 at sin t = 0.25, rests at 0.75 from pi/2 on until sin t = 0.5."""
+    found = run(fed(Backlash(width=0.5), SineWave()), 6.0)
+    t, u = found["t"], np.sin(found["t"])
+    expected = np.where(t < np.pi / 2, np.maximum(u - 0.25, 0.0), np.minimum(u + 0.25, 0.75))
+    expected = np.where(t > 3 * np.pi / 2, np.maximum(u - 0.25, -0.75), expected)
+    close(found["block/y"], expected)
+
+
+def test_a_switch_on_the_time(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    t, one = builder.add("t", Clock()), builder.add("one", Constant(value=5.0))
+    switch = builder.add("switch", Switch(threshold=0.7), one, t, t)
+    builder.add("integral", Integrator(), switch)
+    found = run(builder.build(), 2.0)
+    close(found["switch/y"], np.where(found["t"] >= 0.7, 5.0, found["t"]), 1e-12)
+    close(
+        found["integral/y"], np.minimum(found["t"], 0.7) ** 2 / 2 + 5 * np.maximum(found["t"] - 0.7, 0), 1e-11
+    )
+
+
+def test_pulses(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    pulses = builder.add("pulses", PulseGenerator(amplitude=3.0, period=0.5, width=50.0, delay=0.125))
+    builder.add("integral", Integrator(), pulses)
+    found = run(builder.build(), 2.0)
+    since = found["t"] - 0.125
+    count = np.floor(since / 0.5)
+    within = since - 0.5 * count
+    assert found["pulses/y"].tolist() == np.where((since >= 0) & (within < 0.25), 3.0, 0.0).tolist()
+    area = np.where(since < 0, 0.0, 0.75 * count + 3.0 * np.minimum(within, 0.25))
+    close(found["integral/y"], area, 1e-11)
+
+
+def test_a_limited_integrator_stays_and_leaves_at_once(run: Run) -> None:
+    """x' = 2 cos t, |x| <= 1: at 1 from pi/6 until cos t < 0 at pi/2, then 2 sin t - 1."""
+    builder = DiagramBuilder("d")
+    rate = builder.add("rate", SineWave(amplitude=2.0, phase=np.pi / 2))
+    builder.add("x", IntegratorLimited(), rate)
+    found = run(builder.build(), 3.0)
+    t = found["t"]
+    expected = np.where(t < np.pi / 2, np.minimum(2 * np.sin(t), 1.0), 2 * np.sin(t) - 1.0)
+    close(found["x/y"], expected)
+    assert found["x/saturated"].tolist() == ((t >= np.pi / 6) & (t < np.pi / 2)).astype(float).tolist()
+
+
+def test_an_integrator_reset_by_pulses(run: Run) -> None:
+    """It rises by 1 a second; each rising edge (0.5, 1, …) or falling one (0.25, 0.75, …) sets it anew."""
+    builder = DiagramBuilder("d")
+    pulses = builder.add("pulses", PulseGenerator(period=0.5, width=50.0))
+    one = builder.add("one", Constant())
+    builder.add("rising", ResettableIntegrator(initial=0.25), one, pulses)
+    builder.add("falling", ResettableIntegrator(external_reset="falling"), one, pulses)
+    found = run(builder.build(), 2.0)
+    t = found["t"]
+    close(found["rising/y"], 0.25 + t - 0.5 * np.floor(t / 0.5), 1e-12)
+    since = t - 0.25
+    close(found["falling/y"], np.where(since < 0, t, since - 0.5 * np.floor(since / 0.5)), 1e-12)
+
+
+def ball(builder: DiagramBuilder, restitution: float, height: float) -> BlockHandle:
+    """A falling ball that keeps ``restitution`` of its speed at each impact."""
+    g = builder.add("g", Constant(value=-9.81))
+    speed = builder.add(
+        "speed", ResettableIntegrator(external_reset="falling", initial_condition_source="external")
+    )
+    builder.connect(g, speed["u"])
+    builder.connect(builder.add("bounce", Gain(gain=-restitution), speed), speed["initial"])
+    position = builder.add("height", Integrator(initial=height), speed)
+    builder.connect(position, speed["reset"])
+    return position
+
+
+def test_a_bouncing_ball_hits_the_ground_at_the_published_times(run: Run) -> None:
+    """h0 = 1, e = 0.7: impacts at 0.451523640985731, 1.08365673836575, 1.52614990653177 (FMI reference)."""
+    builder = DiagramBuilder("d")
+    ball(builder, 0.7, 1.0)
+    found = run(builder.build(), 1.8)
+    impacts = [0.451523640985731, 1.08365673836575, 1.52614990653177]
+    t, v = found["t"], 9.81 * impacts[0]
+    height = 1.0 - 9.81 * t**2 / 2
+    for k, impact in enumerate(impacts):
+        since = t - impact
+        height = np.where(since >= 0, 0.7 ** (k + 1) * v * since - 9.81 * since**2 / 2, height)
+    close(found["height/y"], height, 1e-9)
+
+
+def test_a_sliding_mass_comes_to_true_rest(run: Run) -> None:
+    """v0 = 3 against 2 N on 1 kg: it stops after 1.5 s and 2.25 m, with exactly no speed."""
+    builder = DiagramBuilder("d")
+    force = builder.add("force", Constant(value=0.0))
+    builder.add("mass", StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0), force)
+    found = run(builder.build(), 3.0)
+    t = np.minimum(found["t"], 1.5)
+    close(found["mass/x"], 3 * t - t**2, 1e-11)
+    close(found["mass/v"], 3 - 2 * t, 1e-11)
+    assert not found["mass/v"][51:].any()
+
+
+def test_stick_slip_breaks_away_exactly(run: Run) -> None:
+    """F = t: it sticks until t = 1.2, then v' = t - 1."""
+    builder = DiagramBuilder("d")
+    builder.add("mass", StickSlipFriction(), builder.add("force", Clock()))
+    found = run(builder.build(), 3.0)
+    t = found["t"]
+    assert not found["mass/v"][t < 1.2 - 1e-9].any()
+    since = np.maximum(t - 1.2, 0.0)
+    close(found["mass/v"], 0.2 * since + since**2 / 2, 1e-10)
+    # at 1.2 itself it may still stick
+    other = np.abs(t - 1.2) > 1e-9
+    close(found["mass/friction"][other], np.where(t < 1.2, t, 1.0)[other], 1e-10)
+
+
+# -- implicit equations ------------------------------------------------------------------------------------
+
+
+def test_a_loop_that_is_not_linear_is_solved_as_time_goes(run: Run) -> None:
+    """u = cos(u) stays 0.739…, and x' = u."""
+    builder = DiagramBuilder("d")
+    u = builder.add("u", Trigonometry(function="cos"))
+    builder.connect(u, u)
+    builder.add("x", Integrator(), u)
+    found = run(builder.build(), 2.0)
+    close(found["u/y"], np.full(SAMPLES + 1, 0.7390851332151607), 1e-14)
+    close(found["x/y"], 0.7390851332151607 * found["t"], 1e-12)
+
+
+def test_a_moving_implicit_equation(run: Run) -> None:
+    """u = t + cos(u)/2 with the derivative u' = 1 / (1 + sin(u)/2)."""
+    builder = DiagramBuilder("d")
+    t = builder.add("t", Clock())
+    u = builder.add("u", Sum(), t)
+    half = builder.add("half", Gain(gain=0.5), builder.add("cos", Trigonometry(function="cos"), u))
+    builder.connect(half, u["u2"])
+    found = run(builder.build(), 3.0)
+    close(found["u/y"], found["t"] + np.cos(found["u/y"]) / 2, 1e-13)
+
+
+def test_a_saturated_loop_is_linear_in_each_of_its_pieces(run: Run) -> None:
+    """u = 2 sin t - sat(u): u is sin t while |sin t| < 1/2, and 2 sin t ∓ 1/2 beyond."""
+    builder = DiagramBuilder("d")
+    source = builder.add("source", SineWave(amplitude=2.0))
+    u = builder.add("u", Sum(signs="+-"), source)
+    builder.connect(builder.add("limit", Saturation(), u), u["u2"])
+    diagram = builder.build()
+    assert trace_diagram(diagram).algebraic.size == 0
+    found = run(diagram, 3.0)
+    s = np.sin(found["t"])
+    close(found["u/y"], np.where(s < 0.5, s, 2 * s - 0.5))
