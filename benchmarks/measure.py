@@ -16,30 +16,51 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+TURN_SECONDS = 0.03
+"""A turn repeats its work for about as long, so that a short work is not only met with the other's cache."""
+
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds of one unit of work over several repeats."""
+    """Seconds of one unit of work, turn by turn."""
 
-    median: float
-    best: float
+    turns: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        return statistics.median(self.turns)
+
+    @property
+    def best(self) -> float:
+        return min(self.turns)
 
     def per(self, count: int) -> Timing:
-        return Timing(self.median / count, self.best / count)
+        return Timing(tuple(turn / count for turn in self.turns))
+
+    def times_faster_than(self, other: Timing) -> float:
+        """Median of the ratios turn by turn: each pair was measured within the same fraction of a second."""
+        return statistics.median(b / a for a, b in zip(self.turns, other.turns, strict=True))
 
 
-def in_turn(works: Sequence[Callable[[], object]], repeats: int, warm: int = 1) -> list[Timing]:
+def in_turn(
+    works: Sequence[Callable[[], object]], repeats: int, warm: int = 1, turn_seconds: float = TURN_SECONDS
+) -> list[Timing]:
     """Time the works A B A B …, so that a drift of the machine hits all of them alike."""
+    runs: list[int] = []
     for work in works:
         for _ in range(warm):
             work()
+        start = time.perf_counter()
+        work()
+        runs.append(max(1, round(turn_seconds / (time.perf_counter() - start))))
     seconds: list[list[float]] = [[] for _ in works]
     for _ in range(repeats):
         for place, work in enumerate(works):
             start = time.perf_counter()
-            work()
-            seconds[place].append(time.perf_counter() - start)
-    return [Timing(statistics.median(row), min(row)) for row in seconds]
+            for _ in range(runs[place]):
+                work()
+            seconds[place].append((time.perf_counter() - start) / runs[place])
+    return [Timing(tuple(row)) for row in seconds]
 
 
 def process_in_turn(
@@ -52,7 +73,7 @@ def process_in_turn(
             command, check=True, env={**os.environ, **(env or {})}, stdout=subprocess.DEVNULL
         )
 
-    return in_turn([run(command) for command in commands], repeats)
+    return in_turn([run(command) for command in commands], repeats, turn_seconds=0)
 
 
 def reachable_peak() -> float:

@@ -104,6 +104,10 @@ def compare(repeats: int) -> tuple[Timing, Timing]:
     """Seconds for the 10 s run without compile: Drake's, and ours through the public ``simulate``."""
     diagram = ab.load_diagram("kr180model")
     ab.simulate(diagram)
-    theirs = sorted(drake_run() for _ in range(repeats))
-    [ours] = in_turn([lambda: ab.simulate(diagram)], 20 * repeats, warm=20)
-    return Timing(theirs[len(theirs) // 2], theirs[0]), ours
+    theirs: list[float] = []
+    ours: list[float] = []
+    for _ in range(repeats):
+        theirs.append(drake_run())
+        [timing] = in_turn([lambda: ab.simulate(diagram)], 1)
+        ours += timing.turns
+    return Timing(tuple(theirs)), Timing(tuple(ours))

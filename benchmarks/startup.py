@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import tempfile
+import time
 
 from measure import PYTHON, Timing, process_in_turn
 
@@ -22,24 +25,17 @@ def first_result(repeats: int) -> tuple[Timing, Timing]:
     cold = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder:
-            [timing] = process_in_turn_cold(folder)
-            cold.append(timing.best)
-    cold.sort()
+            cold.append(first_use(folder))
     with tempfile.TemporaryDirectory() as folder:
         [warm] = process_in_turn([[PYTHON, "-c", FIRST_RNE]], repeats, env={"ARMBLOCKS_CACHE_DIR": folder})
-    return Timing(cold[len(cold) // 2], cold[0]), warm
+    return Timing(tuple(cold)), warm
 
 
-def process_in_turn_cold(folder: str) -> list[Timing]:
-    """One process with an empty cache (no warm-up)."""
-    import os
-    import subprocess
-    import time
-
+def first_use(folder: str) -> float:
+    """Seconds of one process that finds its cache empty."""
     begin = time.perf_counter()
     subprocess.run([PYTHON, "-c", FIRST_RNE], check=True, env={**os.environ, "ARMBLOCKS_CACHE_DIR": folder})
-    seconds = time.perf_counter() - begin
-    return [Timing(seconds, seconds)]
+    return time.perf_counter() - begin
 
 
 def whole_report(repeats: int) -> Timing:

@@ -108,7 +108,8 @@ class NativeIntegrator:
         begins, stop = start.time, float(samples[-1])
         if checkpoint is not None:
             begins = float(checkpoint.reals[Real.TIME])
-        inside = np.unique(breakpoints[(breakpoints > begins) & (breakpoints <= stop)])
+        # A set and not np.unique, which would load all of numpy.ma for these few numbers.
+        inside = np.array(sorted({float(time) for time in breakpoints if begins < time <= stop}))
         ends = inside if inside.size and inside[-1] == stop else np.append(inside, stop)
         clamps = ends.copy()
         clamps[: inside.size] = np.nextafter(inside, -np.inf)
