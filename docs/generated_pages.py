@@ -82,11 +82,12 @@ def shipped_page() -> str:
             robot = ab.load_robot(name).robot
             about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
             lines.append(f"| `{name}` | {robot.joint_letters} | {about} |")
-        lines += ["", "## Examples", "", "| name | stop time | blocks |", "|---|---|---|"]
+        lines += ["", "## Examples", "", "| name | what it shows | stop time | blocks |", "|---|---|---|---|"]
         for name in ab.list_examples():
             diagram = ab.load_diagram(name)
             kinds = sorted({block.type_name() for block in diagram.blocks.values()})
-            lines.append(f"| `{name}` | {diagram.settings.stop_time:g} s | {', '.join(kinds)} |")
+            cells = (f"`{name}`", diagram.description, f"{diagram.settings.stop_time:g} s", ", ".join(kinds))
+            lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 

@@ -478,3 +478,9 @@ def _example() -> Diagram:
 
 
 EXAMPLE = _example()
+
+
+def test_a_description_is_kept_and_may_be_absent() -> None:
+    described = dataclasses.replace(small(), description="two blocks <and> a wire")
+    assert read(write(described)) == described
+    assert "description" not in json.loads(write(small()))

@@ -117,3 +117,7 @@ def test_van_der_pol_with_pid_agrees_with_scipy() -> None:
     found = [result["x1/y"][-1], result["x2/y"][-1]]
     # 100 s on a limit cycle at rtol 1e-6: the phase has drifted by some 1e-5 s.
     np.testing.assert_allclose(found, reference.y[:2, -1], atol=2e-4)
+
+
+def test_every_example_says_what_it_shows(example: Diagram) -> None:
+    assert 10 <= len(example.description) <= 60

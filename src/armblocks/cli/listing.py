@@ -57,10 +57,11 @@ def _blocks() -> Table:
 def _examples() -> Table:
     import armblocks as ab
 
-    rows = table(("example", "left"), ("blocks", "right"), ("stop time", "right"))
+    rows = table(("example", "left"), ("blocks", "right"), ("stop time", "right"), ("what it shows", "left"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         for name in ab.list_examples():
             diagram = ab.load_diagram(name)
-            rows.add_row(name, str(len(diagram.blocks)), f"{diagram.settings.stop_time:g} s")
+            stop = f"{diagram.settings.stop_time:g} s"
+            rows.add_row(name, str(len(diagram.blocks)), stop, diagram.description)
     return rows

@@ -54,8 +54,10 @@ class DiagramBuilder:
         *,
         settings: SimulationOptions | None = None,
         extras: Mapping[str, object] | None = None,
+        description: str = "",
     ) -> None:
         self.name = name
+        self.description = description
         self.settings = settings or SimulationOptions()
         self._extras = dict(extras or {})
         self._blocks: dict[str, Block] = {}
@@ -136,6 +138,7 @@ class DiagramBuilder:
             layout=self._layout,
             settings=self.settings,
             extras=self._extras,
+            description=self.description,
         )
         check_diagram(diagram)
         return diagram

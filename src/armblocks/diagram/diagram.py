@@ -53,6 +53,8 @@ class Diagram:
     layout: Mapping[str, Placement] = field(default_factory=dict[str, Placement])
     settings: SimulationOptions = field(default_factory=SimulationOptions)
     extras: Mapping[str, object] = field(default_factory=dict[str, object])
+    description: str = ""
+    """One line for people: what the diagram shows."""
 
     def __post_init__(self) -> None:
         for name in ("blocks", "layout", "extras"):

@@ -54,7 +54,7 @@ from armblocks.robot import Robot
 FORMAT_VERSION = 1
 MOST_BYTES = 16 * 2**20
 
-_DOCUMENT_KEYS = ("format", "name", "blocks", "connections", "layout", "robots", "settings")
+_DOCUMENT_KEYS = ("format", "name", "description", "blocks", "connections", "layout", "robots", "settings")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _WIRE = re.compile(r"([^/]+)/([^/\s]+) -> ([^/]+)/([^/\s]+)")
@@ -85,7 +85,10 @@ def diagram_from_bytes(
     blocks = {key: _block(key, node, library, robots, extras) for key, node in block_nodes.items()}
     placements = _layout(members["layout"], set(blocks), extras) if "layout" in members else {}
     builder = DiagramBuilder(
-        members["name"].text() if "name" in members else Path(name).stem, settings=settings, extras=extras
+        members["name"].text() if "name" in members else Path(name).stem,
+        settings=settings,
+        extras=extras,
+        description=members["description"].text() if "description" in members else "",
     )
     for key, block in blocks.items():
         with _located(block_nodes[key]):
@@ -137,6 +140,7 @@ def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: P
         **extras.get("", {}),
         "format": FORMAT_VERSION,
         "name": diagram.name,
+        **({"description": diagram.description} if diagram.description else {}),
         "blocks": blocks,
         "connections": [str(wire) for wire in diagram.connections],
         "layout": layout,

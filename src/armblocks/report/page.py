@@ -85,7 +85,9 @@ def _lead(contents: ReportContents) -> str:
     end = axis_number(float(result.time[-1])) if result.time.size else "0"
     robots = sorted({motion.robot.name for motion in contents.motions})
     arm = f", robot {escape(', '.join(robots))}" if robots else ""
-    return f"Simulation of {end} s, {count} blocks{arm}."
+    about = contents.diagram.description
+    shown = f"{escape(about[:1].upper() + about[1:])}. " if about else ""
+    return f"{shown}Simulation of {end} s, {count} blocks{arm}."
 
 
 def _facts(contents: ReportContents) -> str:
