@@ -10,8 +10,8 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
 from armblocks.cli.terminal import ACCENT
 
-_LINE_EVERY = 5.0
-"""Seconds between two plain lines."""
+_FIRST_LINE, _LINE_EVERY = 0.5, 5.0
+"""Seconds until the first plain line, and from one to the next; a short run has none."""
 
 
 class RunProgress:
@@ -20,7 +20,7 @@ class RunProgress:
     def __init__(self, name: str, console: Console) -> None:
         self._name = name
         self._console = console
-        self._told = time.perf_counter()
+        self._next_line = time.perf_counter() + _FIRST_LINE
         self._bar: Progress | None = None
         self._task: TaskID | None = None
 
@@ -49,6 +49,6 @@ class RunProgress:
         now = time.perf_counter()
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, total=1.0, completed=fraction, where=where)
-        elif now - self._told >= _LINE_EVERY:
-            self._told = now
+        elif now >= self._next_line and fraction < 1.0:
+            self._next_line = now + _LINE_EVERY
             self._console.print(f"{self._name}: {where} ({fraction:.0%})")
