@@ -128,6 +128,26 @@ def test_a_changed_parameter_changes_the_run(invoke: Invoke, tmp_path: Path) -> 
     assert (tmp_path / "short" / "report.html").is_file()
 
 
+def test_a_run_goes_on_from_a_saved_state_bit_for_bit(invoke: Invoke, tmp_path: Path) -> None:
+    first = ("run", "falling_pendulum", "--stop-time", "4", "--sample-time", "0.01", "--no-figures")
+    assert invoke(*first, "--save-state", "stopped.npz", "--out", "first").exit_code == 0
+    second = ("run", "falling_pendulum", "--stop-time", "6", "--sample-time", "0.01", "--no-figures")
+    assert invoke(*second, "--from-state", "stopped.npz", "--out", "second", "--format", "npz").exit_code == 0
+    whole = ab.simulate("falling_pendulum", stop_time=6.0, sample_time=0.01)
+    (archive,) = (tmp_path / "second").glob("*.npz")
+    with np.load(archive, allow_pickle=False) as data:
+        assert data["time"][0] == 4.0
+        for name in whole.names:
+            np.testing.assert_array_equal(data[name][1:], whole[name][whole.time > 4.0])
+
+
+def test_a_file_that_is_no_saved_state_is_refused(invoke: Invoke, tmp_path: Path) -> None:
+    (tmp_path / "other.npz").write_bytes(b"not a state")
+    result = invoke("run", "falling_pendulum", "--from-state", "other.npz", "--no-figures")
+    assert result.exit_code == 2
+    assert "other.npz" in result.stderr
+
+
 def test_what_is_beyond_a_limit_stands_out(invoke: Invoke) -> None:
     motion = next(
         name for name, block in ab.load_diagram("kr180model").blocks.items() if block.type_name() == "JTraj"

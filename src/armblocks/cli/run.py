@@ -5,14 +5,17 @@ from __future__ import annotations
 import warnings
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armblocks.cli.assignments import parse_assignments
 from armblocks.cli.progress import RunProgress
 from armblocks.cli.terminal import messages_console, results_console
-from armblocks.errors import ArmblocksError, FormatError, LimitWarning, SimulationError
+from armblocks.errors import FormatError, LimitWarning, SimulationError
+
+if TYPE_CHECKING:
+    from armblocks import Diagram, SimulationResult
 
 
 class DataFormat(StrEnum):
@@ -32,6 +35,12 @@ def run(
     sample_time: Annotated[float | None, typer.Option(help="Spacing of the recorded instants, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
+    from_state: Annotated[
+        Path | None, typer.Option(help="Go on from the state that an earlier run saved.")
+    ] = None,
+    save_state: Annotated[
+        Path | None, typer.Option(help="Save the final state in this .npz file, to go on from it later.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the report.", show_default="MODEL-report")
     ] = None,
@@ -66,14 +75,8 @@ def run(
         if value is not None
     }
     folder = _writable_folder(out or Path(f"{diagram.name}-report"))
-    failure: ArmblocksError | None = None
-    with RunProgress(diagram.name, messages_console()) as progress:
-        try:
-            result = ab.simulate(diagram, parameters=parameters, progress=progress, **settings)
-        except SimulationError as error:
-            if not isinstance(error.partial, ab.SimulationResult):
-                raise
-            failure, result = error, error.partial
+    settings.update(parameters=parameters, initial_state=from_state)
+    result, failure = _simulate(diagram, settings)
     with warnings.catch_warnings():
         # The summary below says every limit that is broken; once is enough.
         warnings.simplefilter("ignore", LimitWarning)
@@ -84,6 +87,8 @@ def run(
             formats=("svg", "png") if figures else (),
             data=("csv", "parquet", *(extra.value for extra in formats or [])),
         )
+    if save_state is not None and result.final_state is not None:
+        result.final_state.save(save_state)
     console = results_console()
     print_run(result, console)
     print_displays(diagram, result, console)
@@ -95,6 +100,19 @@ def run(
         raise failure
     if not result.run.complete:
         raise KeyboardInterrupt
+
+
+def _simulate(diagram: Diagram, settings: dict[str, Any]) -> tuple[SimulationResult, SimulationError | None]:
+    """The result, and why it is only a part of the run where that could not go on."""
+    import armblocks as ab
+
+    with RunProgress(diagram.name, messages_console()) as progress:
+        try:
+            return ab.simulate(diagram, progress=progress, **settings), None
+        except SimulationError as error:
+            if not isinstance(error.partial, ab.SimulationResult):
+                raise
+            return error.partial, error
 
 
 def _writable_folder(folder: Path) -> Path:
