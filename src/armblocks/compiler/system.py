@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,16 +16,15 @@ from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
 from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.integrator_workspace import LoopSizes
 from armblocks.compiler.ir_text import Module
+from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.native_integrator import NativeIntegrator
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
-from armblocks.equations import Signature, Slot
-from armblocks.errors import CompileError
 
 if TYPE_CHECKING:
-    from armblocks.equations import HybridSystem, TracedFunction
+    from armblocks.equations import HybridSystem
 
 Vector = NDArray[np.float64]
 
@@ -42,7 +41,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
 
     Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that tapes do not know.
     """
-    tapes = {name: _tape_of(getattr(system, name)) for name in _FUNCTIONS}
+    tapes = {name: tape_of(getattr(system, name)) for name in _FUNCTIONS}
     return CompiledSystem(_describe(system, tapes), tapes.__getitem__)
 
 
@@ -60,22 +59,16 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
             description = json.loads(stored)
 
             def tape(function: str) -> Tape:
-                found = cache.load(_tape_name(description["digests"][function]))
-                if found is not None:
-                    try:
-                        return Tape.from_bytes(found)
-                    except CompileError:
-                        pass  # a damaged tape is made anew
-                return _tape_of(getattr(trace(), function))
+                return kept_tape(description["digests"][function], lambda: getattr(trace(), function))
 
             return CompiledSystem(description, tape)
         except (ValueError, KeyError, TypeError):
             pass  # a record of another make is made anew
     system = trace()
-    tapes = {function: _tape_of(getattr(system, function)) for function in _FUNCTIONS}
+    tapes = {function: tape_of(getattr(system, function)) for function in _FUNCTIONS}
     description = _describe(system, tapes)
     for tape_made in tapes.values():
-        cache.store(_tape_name(tape_made.digest), tape_made.to_bytes())
+        keep_tape(tape_made)
     cache.store(name, json.dumps(description).encode())
     return CompiledSystem(description, tapes.__getitem__)
 
@@ -90,11 +83,11 @@ class CompiledSystem:
 
     def __init__(self, description: Mapping[str, Any], tape: Callable[[str], Tape]) -> None:
         self.name = str(description["name"])
-        self.states = _signature(description["states"])
-        self.discrete = _signature(description["discrete"])
-        self.algebraic = _signature(description["algebraic"])
-        self.parameters = _signature(description["parameters"])
-        self.signals_layout = _signature(description["signals"])
+        self.states = slots_from_json(description["states"])
+        self.discrete = slots_from_json(description["discrete"])
+        self.algebraic = slots_from_json(description["algebraic"])
+        self.parameters = slots_from_json(description["parameters"])
+        self.signals_layout = slots_from_json(description["signals"])
         self.parameter_values: Vector = np.array(description["parameter_values"], dtype=np.float64)
         self.parameter_values.flags.writeable = False
         self.aliases: Mapping[str, str] = dict(description["aliases"])
@@ -209,38 +202,21 @@ class CompiledSystem:
         return found
 
 
-def _tape_of(traced: TracedFunction) -> Tape:
-    from armblocks.compiler.from_casadi import tape_from
-
-    return tape_from(traced)
-
-
-def _tape_name(digest: str) -> str:
-    return cache.object_name(("tape", digest))
-
-
 def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]:
     """All of a system but its equations, as plain values that JSON gives back exactly."""
 
-    def slots(signature: Signature) -> list[list[Any]]:
-        return [[slot.name, list(slot.shape), slot.unit] for slot in signature]
-
     return {
         "name": system.name,
-        "states": slots(system.states),
-        "discrete": slots(system.discrete),
-        "algebraic": slots(system.algebraic),
+        "states": slots_to_json(system.states),
+        "discrete": slots_to_json(system.discrete),
+        "algebraic": slots_to_json(system.algebraic),
         "clocks": [[clock.period, clock.offset] for clock in system.clocks],
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
-        "parameters": slots(system.parameters),
-        "signals": slots(system.signals_layout),
+        "parameters": slots_to_json(system.parameters),
+        "signals": slots_to_json(system.signals_layout),
         "parameter_values": np.asarray(system.parameter_values, dtype=np.float64).tolist(),
         "aliases": dict(system.aliases),
         "breakpoints": system.breakpoints.outputs.size,
         "digests": {name: tape.digest for name, tape in tapes.items()},
     }
-
-
-def _signature(slots: Sequence[Sequence[Any]]) -> Signature:
-    return Signature(tuple(Slot(name, tuple(shape), unit) for name, shape, unit in slots))

@@ -1,0 +1,51 @@
+"""What the disk cache keeps of traced equations beside machine code: tapes, and signatures as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from armblocks.compiler import cache
+from armblocks.compiler.tape import Tape
+from armblocks.equations import Signature, Slot
+from armblocks.errors import CompileError
+
+if TYPE_CHECKING:
+    from armblocks.equations import TracedFunction
+
+
+def tape_of(traced: TracedFunction) -> Tape:
+    """The tape of a traced function; CasADi is imported only here."""
+    from armblocks.compiler.from_casadi import tape_from
+
+    return tape_from(traced)
+
+
+def keep_tape(tape: Tape) -> None:
+    """Put a tape on disk under its digest."""
+    cache.store(_name(tape.digest), tape.to_bytes())
+
+
+def kept_tape(digest: str, trace: Callable[[], TracedFunction]) -> Tape:
+    """The tape of that digest from disk; where it is absent or damaged it is made anew from ``trace()``."""
+    stored = cache.load(_name(digest))
+    if stored is not None:
+        try:
+            return Tape.from_bytes(stored)
+        except CompileError:
+            pass
+    return tape_of(trace())
+
+
+def slots_to_json(signature: Signature) -> list[list[Any]]:
+    """A signature as plain values."""
+    return [[slot.name, list(slot.shape), slot.unit] for slot in signature]
+
+
+def slots_from_json(slots: Sequence[Sequence[Any]]) -> Signature:
+    """Inverse of :func:`slots_to_json`. Raises ``TypeError`` or ``ValueError`` on anything else."""
+    return Signature(tuple(Slot(name, tuple(shape), unit) for name, shape, unit in slots))
+
+
+def _name(digest: str) -> str:
+    return cache.object_name(("tape", digest))
