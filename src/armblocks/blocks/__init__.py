@@ -9,6 +9,7 @@ from armblocks.blocks import (
     discontinuities,
     discrete,
     discrete_filters,
+    drives,
     dry_friction,
     expression,
     joint_control,
@@ -64,6 +65,7 @@ from armblocks.blocks.discrete_filters import (
     DiscreteStateSpace,
     DiscreteTransferFunction,
 )
+from armblocks.blocks.drives import DcMotor, MotorWinding
 from armblocks.blocks.dry_friction import Backlash, CoulombFriction, StickSlipFriction
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.joint_control import (
@@ -216,6 +218,7 @@ BLOCKS = BlockLibrary(
         poses,
         joint_paths,
         joint_control,
+        drives,
         expression,
     )
     for kind in _defined_in(family)
@@ -247,6 +250,7 @@ __all__ = [
     "CounterLimited",
     "CrossProduct",
     "CumulativeSum",
+    "DcMotor",
     "DeadZone",
     "DegreesToRadians",
     "Delay",
@@ -312,6 +316,7 @@ __all__ = [
     "MinMax",
     "Modulo",
     "MotorDrive",
+    "MotorWinding",
     "MultiSegment",
     "MultiportSwitch",
     "Mux",
