@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from armblocks.diagram import Diagram, DiagramBuilder
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
+    from armblocks.face.block_examples import block_example
     from armblocks.face.diagrams import list_blocks, list_examples, load_diagram, save_diagram
     from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
     from armblocks.face.payload import Payload
@@ -57,6 +58,7 @@ else:
             "SimulationOptions": "armblocks.equations",
             "SimulationResult": "armblocks.simulation",
             "Transform": "armblocks.spatial",
+            "block_example": "armblocks.face.block_examples",
             "blocks": "armblocks.blocks",
             "compile_diagram": "armblocks.face.model",
             "errors": "armblocks.errors",
@@ -94,6 +96,7 @@ __all__ = [
     "SimulationOptions",
     "SimulationResult",
     "Transform",
+    "block_example",
     "blocks",
     "compile_diagram",
     "errors",

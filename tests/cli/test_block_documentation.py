@@ -1,19 +1,18 @@
-"""``armblocks blocks NAME`` documents every block, and its examples are Python that makes a diagram."""
+"""``armblocks blocks`` lists and documents the blocks, and hands out their worked examples."""
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from typer.testing import Result
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS
-from armblocks.cli.blocks import example
-from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block
+from armblocks.formats import diagram_to_python
 
-PUMA = ab.load_robot("puma560").robot
 Invoke = Callable[..., Result]
 
 
@@ -36,24 +35,51 @@ def test_a_wrong_name_is_met_with_the_nearest(invoke: Invoke) -> None:
     assert "did you mean 'Integrator'?" in result.stderr
 
 
+def test_without_a_name_all_blocks_are_listed(invoke: Invoke) -> None:
+    text = invoke("blocks").stdout
+    assert all(f"\n{name} " in text for name in BLOCKS)
+    assert all(f"\n{family}" in text for family in BLOCKS.by_family())
+    assert f"{len(BLOCKS)} blocks" in text
+
+
+def test_a_search_lists_what_mentions_the_words(invoke: Invoke) -> None:
+    text = invoke("blocks", "--search", "hysteresis").stdout
+    assert "Relay" in text
+    assert "Gain" not in text
+    for line in text.splitlines()[4:-2]:
+        kind = BLOCKS.get(line.split()[0]) if line[:1].isalpha() else None
+        assert kind is None or "hysteresis" in (kind.__doc__ or "").casefold()
+
+
+def test_a_search_without_a_find_says_so(invoke: Invoke) -> None:
+    result = invoke("blocks", "--search", "xyzzy")
+    assert result.exit_code == 2
+    assert "no block's documentation has 'xyzzy'" in result.stderr
+
+
+def test_options_that_do_not_go_together_are_refused(invoke: Invoke) -> None:
+    both = invoke("blocks", "Gain", "--search", "gain")
+    assert both.exit_code == 2
+    assert "the block 'Gain' and the search 'gain' are both given" in both.stderr
+    nameless = invoke("blocks", "--save", "gain.json")
+    assert nameless.exit_code == 2
+    assert "--save needs a block" in nameless.stderr
+
+
+def test_the_example_is_saved_to_be_run(invoke: Invoke, tmp_path: Path) -> None:
+    path = tmp_path / "relay.json"
+    result = invoke("blocks", "Relay", "--save", str(path))
+    assert result.exit_code == 0, result.output
+    assert ab.load_diagram(path) == ab.block_example("Relay")
+    assert f"armblocks run {path}" in result.stdout
+
+
 @pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
-def test_every_block_has_documentation_and_an_example(kind: type[Block], invoke: Invoke) -> None:
+def test_every_block_is_shown_with_its_example(kind: type[Block], invoke: Invoke) -> None:
     result = invoke("blocks", kind.type_name())
     assert result.exit_code == 0, result.output
     assert kind.summary().split(":")[0] in " ".join(result.stdout.split())
-    tree = ast.parse("\n".join(line.removeprefix("    ") for line in example(kind).splitlines()))
-    builder, added = DiagramBuilder("example"), {}
-    for node in tree.body:  # the lines that add blocks, done by hand: tests evaluate no text either
-        if isinstance(node, ast.Assign) and "builder.add" in ast.unparse(node):
-            call = node.value
-            assert isinstance(call, ast.Call)
-            name, block, *sources = call.args
-            assert isinstance(block, ast.Call)
-            values = {entry.arg: entry.value for entry in block.keywords}
-            made = {key: PUMA if key == "robot" else ast.literal_eval(value) for key, value in values.items()}
-            added[ast.unparse(node.targets[0])] = builder.add(
-                ast.literal_eval(name),
-                BLOCKS[ast.unparse(block.func)](**made),
-                *(added[ast.unparse(source)] for source in sources),
-            )
-    trace_diagram(builder.build())
+    code = "".join(
+        f"    {line}".rstrip() + "\n" for line in diagram_to_python(ab.block_example(kind)).splitlines()
+    )
+    assert code in result.stdout

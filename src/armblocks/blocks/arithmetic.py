@@ -11,7 +11,18 @@ from casadi import SX, atan2, ceil, cos, fabs, floor, fmod, hypot, if_else, logi
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
 
 
 def _round(u: SX) -> SX:
@@ -140,6 +151,9 @@ class Sqrt(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Sqrt"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The root of a straight rise.", inputs={"u": made("Ramp")}
+    )
 
     function: str = parameter("sqrt", choices=tuple(_ROOTS), doc="root, signed root or reciprocal root")
 
@@ -238,6 +252,10 @@ class Divide(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Divide"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine divided by a divisor that rises from 1 to 3.",
+        inputs={"dividend": made("SineWave"), "divisor": made("Ramp", slope=0.2, initial=1.0)},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("dividend", "what is divided"), Port("divisor", "by what"))

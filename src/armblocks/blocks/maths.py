@@ -13,7 +13,18 @@ from casadi import SX, atan2, fmax, fmin, mtimes
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
 from armblocks.errors import InputError
 
 
@@ -258,6 +269,10 @@ class Power(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Power"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A base between 1 and 3 to a power that rises from -1 to 1: at 5 s, power 0, the output is 1.",
+        inputs={"base": made("SineWave", bias=2.0), "exponent": made("Ramp", slope=0.2, initial=-1.0)},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("base", "the base"), Port("exponent", "the exponent"))

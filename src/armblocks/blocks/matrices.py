@@ -11,7 +11,7 @@ from casadi import SX, cross, diag, horzcat, mtimes, reshape, trace, vertcat
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
 from armblocks.blocks.elimination import determinant, solve
-from armblocks.diagram import Block, Port, Shapes, Signals, parameter
+from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, made, parameter
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -72,6 +72,10 @@ class MatrixInverse(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Matrix Inverse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The entries of the inverse of [1 a; 0 2] while a rises: only the one off the diagonal moves.",
+        inputs={"u": made("Ramp", slope=((0.0, 0.2), (0.0, 0.0)), initial=((1.0, 0.0), (0.0, 2.0)))},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the matrix (n, n)"),)
@@ -93,6 +97,14 @@ class LinearSolve(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Matrix Solve"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The solution of [2 1; 1 3] y = (sin t, cos t).",
+        inputs={
+            "A": made("Constant", value=((2.0, 1.0), (1.0, 3.0))),
+            "B": made("SineWave", phase=(0.0, 1.5707963267948966)),
+        },
+        shown=("B", "y"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("A", "the matrix (n, n)"), Port("B", "the right side (n,) or (n, k)"))

@@ -1,9 +1,10 @@
-"""``armblocks blocks NAME``: what a block does, its equation, ports, units and parameters, and an example."""
+"""``armblocks blocks``: all blocks by family, or one: its equation, ports, parameters, a worked example."""
 
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -14,15 +15,40 @@ from armblocks.cli.terminal import STRONG, results_console, table
 
 if TYPE_CHECKING:
     from armblocks.diagram import Block, Parameter, Port
-    from armblocks.equations import Shape
-
-_EXAMPLE_ROBOT = "puma560"
 
 
-def describe_block(
-    name: Annotated[str, typer.Argument(help="The block, as 'armblocks list blocks' names it.")],
+def describe_blocks(
+    name: Annotated[str | None, typer.Argument(help="A block, by its type or title; none: all.")] = None,
+    search: Annotated[
+        str | None, typer.Option("--search", metavar="TEXT", help="Only blocks whose documentation has TEXT.")
+    ] = None,
+    save: Annotated[
+        Path | None,
+        typer.Option("--save", metavar="FILE.json", help="Write the block's example, for 'armblocks run'."),
+    ] = None,
 ) -> None:
-    """Show what a block does: its equation, ports, units, parameters, and how to use it from Python."""
+    """List the blocks, or show one: its equation, ports, units, parameters, and a worked example."""
+    from armblocks.errors import InputError
+
+    console = results_console()
+    if name is not None and search is not None:
+        raise InputError(
+            f"the block '{name}' and the search '{search}' are both given",
+            allowed="a block's name or --search",
+            fix="leave one of them out",
+        )
+    if name is None and save is not None:
+        raise InputError("--save needs a block", allowed="armblocks blocks NAME --save FILE", fix="name one")
+    if name is None:
+        _list(console, search)
+    elif save is not None:
+        _save(console, _found(name), save)
+    else:
+        _show(console, _found(name))
+
+
+def _found(name: str) -> type[Block]:
+    """The block of this type name or title, in any case."""
     from armblocks.blocks import BLOCKS
     from armblocks.errors import UnknownNameError
 
@@ -31,15 +57,56 @@ def describe_block(
     kind = by_name.get(name.casefold()) or by_title.get(name.casefold())
     if kind is None:
         raise UnknownNameError("block", name, BLOCKS)
-    _show(results_console(), kind)
+    return kind
+
+
+def _list(console: Console, search: str | None) -> None:
+    from armblocks.blocks import BLOCKS
+    from armblocks.errors import InputError
+
+    kinds = [kind for kind in BLOCKS.values() if search is None or _mentions(kind, search)]
+    if not kinds:
+        raise InputError(
+            f"no block's documentation has '{search}'",
+            allowed="part of a word of a block's name, title or documentation",
+            fix="list them all with 'armblocks blocks'",
+        )
+    console.print(blocks_table(kinds))
+    console.print(Text(f"\n{len(kinds)} blocks. 'armblocks blocks NAME' shows one, with an example."))
+
+
+def _mentions(kind: type[Block], search: str) -> bool:
+    words = (kind.type_name(), kind.title, kind.family, inspect.cleandoc(kind.__doc__ or ""))
+    wanted = " ".join(search.casefold().split())
+    return any(wanted in " ".join(text.casefold().split()) for text in words)
+
+
+def blocks_table(kinds: list[type[Block]]) -> Table:
+    """A line for each block, under the names of their families."""
+    rows = table(("block", "left"), ("what it does", "left"))
+    for family in dict.fromkeys(kind.family for kind in kinds):
+        rows.add_row(Text(f"\n{family}", STRONG))
+        for kind in kinds:
+            if kind.family == family:
+                rows.add_row(kind.type_name(), kind.summary())
+    return rows
+
+
+def _save(console: Console, kind: type[Block], path: Path) -> None:
+    import armblocks as ab
+
+    ab.save_diagram(ab.block_example(kind), path)
+    console.print(f"wrote {path}; 'armblocks run {path}' runs it", soft_wrap=True)
 
 
 def _show(console: Console, kind: type[Block]) -> None:
-    block = kind(**_needed(kind))
-    paragraphs = inspect.cleandoc(kind.__doc__ or "").replace("``", "").split("\n\n")
+    from armblocks.face.block_examples import block_example, caption, example_block
+    from armblocks.formats import diagram_to_python
+
+    block = example_block(kind)
     console.print(Text.assemble((kind.type_name(), STRONG), f"  ({kind.title}; {kind.family})"))
-    for paragraph in paragraphs:
-        console.print(Text("\n" + " ".join(paragraph.split())))
+    for line in _paragraphs(inspect.cleandoc(kind.__doc__ or "")):
+        console.print(line)
     for title, ports in (
         ("inputs", block.input_ports()),
         ("outputs", block.output_ports()),
@@ -51,78 +118,37 @@ def _show(console: Console, kind: type[Block]) -> None:
     if kind.parameters():
         console.print()
         console.print(_parameters(kind.parameters()))
-    console.print(Text("\nexample", STRONG))
-    console.print(Text(example(kind)), soft_wrap=True)
+    console.print(Text.assemble(("\nexample  ", STRONG), caption(kind)))
+    code = diagram_to_python(block_example(kind)).splitlines()
+    console.print(Text("\n" + "\n".join(f"    {line}" if line else "" for line in code)), soft_wrap=True)
+    save = f"{kind.type_name()}.json"
+    console.print(
+        Text(f"\nrun it   armblocks blocks {kind.type_name()} --save {save} && armblocks run {save}"),
+        soft_wrap=True,
+    )
 
 
-def example(kind: type[Block]) -> str:
-    """A few lines of Python that put the block, with its defaults, into a diagram."""
-    needed = _needed(kind)
-    values = _fitting_values(kind(**needed))
-    name = kind.type_name()
-    stated = [f"{key}=robot" for key in needed]
-    # A sample time that is inherited by default has nobody to inherit it from here.
-    stated += [f"{rule.name}=0.1" for rule in kind.parameters() if rule.name == "sample_time"]
-    arguments = ", ".join(stated)
-    sources = "".join(f", {port}" for port in values)
-    lines = ["import armblocks as ab", f"from armblocks.blocks import {_imports(kind, bool(values))}", ""]
-    if needed:
-        lines.append(f'robot = ab.load_robot("{_EXAMPLE_ROBOT}").robot')
-    lines.append('builder = ab.DiagramBuilder("example")')
-    lines += [f'{port} = builder.add("{port}", Constant(value={value}))' for port, value in values.items()]
-    lines.append(f'block = builder.add("block", {name}({arguments}){sources})')
-    lines.append("result = ab.simulate(builder.build(), stop_time=1.0)")
-    return "\n".join(f"    {line}" if line else "" for line in lines)
-
-
-def _needed(kind: type[Block]) -> dict[str, Any]:
-    """The shipped robot for the parameters that have no default."""
-    rules = [rule for rule in kind.parameters() if rule.required]
-    if not rules:
-        return {}
-    import warnings
-
-    import armblocks as ab
-    from armblocks.errors import InertiaWarning
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", InertiaWarning)
-        robot = ab.load_robot(_EXAMPLE_ROBOT).robot
-    return {rule.name: robot for rule in rules}
-
-
-def _imports(kind: type[Block], fed: bool) -> str:
-    return ", ".join(sorted({kind.type_name(), *(["Constant"] if fed else [])}))
-
-
-def _fitting_values(block: Block) -> dict[str, Any]:
-    """Values by input port, of the first of a few shapes that the block takes where a port leaves it open."""
-    from armblocks.errors import InputError
-
-    tried: dict[str, Any] = {}
-    for open_shape in ((), (2,), (3, 3)):
-        shapes = {port.name: open_shape if port.shape is None else port.shape for port in block.input_ports()}
-        tried = {name: _value(shape) for name, shape in shapes.items()}
-        try:
-            block.output_shapes(shapes)
-        except InputError:
-            continue
-        return tried
-    return tried
-
-
-def _value(shape: Shape) -> Any:
-    """The identity where the shape is a square matrix, else rising numbers."""
-    if len(shape) == 2:
-        return [[1.0 if i == j else 0.0 for j in range(shape[1])] for i in range(shape[0])]
-    return [0.5 * k for k in range(1, shape[0] + 1)] if shape else 1.0
+def _paragraphs(docstring: str) -> list[Text]:
+    """The docstring for a terminal: prose is filled anew, indented formulas stay as they are."""
+    found: list[Text] = []
+    for paragraph in docstring.replace("::\n", ":\n").replace("``", "").split("\n\n"):
+        kept = paragraph.startswith("    ")
+        found.append(Text("\n" + (paragraph if kept else " ".join(paragraph.split()))))
+    return found
 
 
 def _ports(title: str, ports: tuple[Port, ...]) -> Table:
     rows = table((title, "left"), ("shape", "left"), ("unit", "left"), ("what it is", "left"))
     for port in ports:
-        rows.add_row(port.name, "any" if port.shape is None else str(port.shape), port.unit, port.doc)
+        rows.add_row(port.name, shape_text(port), port.unit, port.doc)
     return rows
+
+
+def shape_text(port: Port) -> str:
+    """``any``, ``scalar``, ``3``, ``4 x 4``."""
+    if port.shape is None:
+        return "any"
+    return " x ".join(map(str, port.shape)) or "scalar"
 
 
 def _parameters(rules: tuple[Parameter, ...]) -> Table:

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 from rich.table import Table
-from rich.text import Text
 
-from armblocks.cli.terminal import STRONG, results_console, table
+from armblocks.cli.blocks import blocks_table
+from armblocks.cli.terminal import results_console, table
 from armblocks.errors import InertiaWarning
 
 
@@ -46,12 +46,7 @@ def _robots() -> Table:
 def _blocks() -> Table:
     from armblocks.blocks import BLOCKS
 
-    rows = table(("block", "left"), ("what it does", "left"))
-    for family, kinds in BLOCKS.by_family().items():
-        rows.add_row(Text(f"\n{family}", STRONG))
-        for kind in kinds:
-            rows.add_row(kind.type_name(), kind.summary())
-    return rows
+    return blocks_table(list(BLOCKS.values()))
 
 
 def _examples() -> Table:

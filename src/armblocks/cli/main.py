@@ -49,7 +49,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
-app.command("blocks")(blocks.describe_block)
+app.command("blocks")(blocks.describe_blocks)
 app.command("bench")(bench.bench)
 
 

@@ -14,6 +14,7 @@ from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
 from armblocks.diagram.variation import with_parameters
+from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
 
 __all__ = [
     "REQUIRED",
@@ -25,6 +26,8 @@ __all__ = [
     "Diagram",
     "DiagramBuilder",
     "DiagramShapes",
+    "Fed",
+    "Feed",
     "Guard",
     "Parameter",
     "ParameterKind",
@@ -37,6 +40,7 @@ __all__ = [
     "State",
     "View",
     "ViewKind",
+    "WorkedExample",
     "block_equations",
     "broadcast",
     "check_block_name",
@@ -44,6 +48,7 @@ __all__ = [
     "infer_shapes",
     "infer_units",
     "integral_unit",
+    "made",
     "parameter",
     "rate_unit",
     "sample_time_parameter",

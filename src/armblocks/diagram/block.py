@@ -13,6 +13,7 @@ from casadi import SX
 
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import Guard, Port, State, View
+from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 
 Shapes = Mapping[str, Shape]
@@ -61,6 +62,8 @@ class Block(ABC):
     """Whether the block works at the ticks of a clock only; it then has the parameter ``sample_time``."""
     rated_inputs: ClassVar[tuple[str, ...]] = ()
     """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
+    example: ClassVar[WorkedExample] = WorkedExample()
+    """What shows the block at work; left out, it is fed with signals that fit its ports."""
 
     def __post_init__(self) -> None:
         for rule in self.parameters():

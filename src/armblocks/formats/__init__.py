@@ -7,6 +7,7 @@ from armblocks.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from armblocks.formats.diagram_files import list_examples, load_diagram, read_diagram, write_diagram
     from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
+    from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.matlab_script import Script, read_script
     from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot
     from armblocks.formats.robot_format import RobotFormat
@@ -22,6 +23,7 @@ else:
             "Script": "armblocks.formats.matlab_script",
             "diagram_from_bytes": "armblocks.formats.diagram_json",
             "diagram_to_bytes": "armblocks.formats.diagram_json",
+            "diagram_to_python": "armblocks.formats.diagram_python",
             "list_examples": "armblocks.formats.diagram_files",
             "list_robots": "armblocks.formats.robot_files",
             "load_diagram": "armblocks.formats.diagram_files",
@@ -41,6 +43,7 @@ __all__ = [
     "Script",
     "diagram_from_bytes",
     "diagram_to_bytes",
+    "diagram_to_python",
     "list_examples",
     "list_robots",
     "load_diagram",

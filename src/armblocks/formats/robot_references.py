@@ -92,7 +92,7 @@ class RobotWriter:
     def reference(self, robot: Robot) -> str:
         """A shipped name or a path that gives an equal robot, else a key of the table."""
         if robot not in self._known:
-            entry = _shortest(robot, self._folder, self._resolve_robot)
+            entry = shortest_reference(robot, self._folder, self._resolve_robot)
             if isinstance(entry, str):
                 self._known[robot] = entry
             else:
@@ -109,7 +109,9 @@ class RobotWriter:
         return next(key for key in keys if key not in taken)
 
 
-def _shortest(robot: Robot, folder: Path | None, resolve_robot: ResolveRobot) -> str | Mapping[str, object]:
+def shortest_reference(
+    robot: Robot, folder: Path | None, resolve_robot: ResolveRobot
+) -> str | Mapping[str, object]:
     """The shortest way to say a robot. A path is tried where the robot's file still gives the same."""
     for reference, base in _candidates(robot, folder, resolve_robot):
         modelled = base.with_friction_model(robot.friction_model)

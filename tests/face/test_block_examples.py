@@ -1,0 +1,58 @@
+"""Every block has a worked example that runs, as a diagram and as the Python that is shown for it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block
+from armblocks.errors import FormatError, UnknownNameError
+from armblocks.face.block_examples import caption
+from armblocks.formats import diagram_to_python
+
+
+def run_as_typed(code: str) -> dict[str, object]:
+    """What a reader has after typing the lines."""
+    namespace: dict[str, object] = {}
+    exec(compile(code, "example", "exec"), namespace)  # noqa: S102
+    return namespace
+
+
+@pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+def test_the_worked_example_runs_and_its_python_is_the_same_diagram(kind: type[Block]) -> None:
+    diagram = ab.block_example(kind)
+    assert kind in map(type, diagram.blocks.values())
+    assert diagram.views() or kind.type_name() == "Terminator", "something is to be seen"
+    assert caption(kind).endswith((".", "…"))
+    typed = run_as_typed(diagram_to_python(diagram))
+    assert typed["diagram"] == dataclasses.replace(diagram, description="")
+    result = typed["result"]
+    assert isinstance(result, ab.SimulationResult)
+    assert result.run.complete
+    assert all(np.isfinite(result[name]).all() for name in result.names)
+
+
+@pytest.mark.parametrize("name", [name for name in ab.list_examples() if name != "falling_pendulum"])
+def test_a_shipped_example_as_python_is_the_same_diagram(name: str) -> None:
+    diagram = dataclasses.replace(
+        ab.load_diagram(name), layout={}, description="", settings=ab.SimulationOptions()
+    )
+    code, _, run = diagram_to_python(ab.load_diagram(name)).rpartition("\n\n")
+    assert run_as_typed(code)["diagram"] == diagram
+    assert f"stop_time={ab.load_diagram(name).settings.stop_time}" in run
+
+
+def test_a_robot_without_a_name_cannot_be_said_in_python() -> None:
+    with pytest.raises(
+        FormatError, match=r"neither a shipped one nor that of a file.*write the diagram as JSON"
+    ):
+        diagram_to_python(ab.load_diagram("falling_pendulum"))
+
+
+def test_an_unknown_block_has_no_example() -> None:
+    with pytest.raises(UnknownNameError, match="there is no block type named 'Gian'"):
+        ab.block_example("Gian")
