@@ -1,0 +1,255 @@
+"""The linear systems of first and second order that control engineers think in; all gains are tunable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    broadcast,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+from armblocks.equations import Shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstOrderLag(Block):
+    """A lag of first order (PT1): y = gain / (T s + 1) u, that is T y' = gain u - y."""
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "First-Order Lag"
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    time_constant: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="T", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the lagging output"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _common(self, inputs)}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("y", _common(self, inputs), "the output"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["y"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": (p["gain"] * u["u"] - x["y"]) / p["time_constant"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SecondOrderLag(Block):
+    """A lag of second order (PT2): y = gain w^2 / (s^2 + 2 damping w s + w^2) u, at rest at the start."""
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "Second-Order Lag"
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    natural_frequency: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, above=0.0, doc="w, without damping", unit="rad/s"
+    )
+    damping: ArrayLike = parameter(
+        0.7, kind=ParameterKind.ARRAY, minimum=0.0, doc="damping ratio; 1 is critical"
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the lagging output"), Port("rate", "its rate of change"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shape = _common(self, inputs)
+        return {"y": shape, "rate": shape}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = _common(self, inputs)
+        return (State("y", shape, "the output"), State("rate", shape, "its rate of change"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["y"], "rate": x["rate"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        w = p["natural_frequency"]
+        pull = w * (p["gain"] * u["u"] - x["y"]) - 2.0 * p["damping"] * x["rate"]
+        return {"y": x["rate"], "rate": w * pull}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"y": SX(0.0), "rate": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeadLag(Block):
+    """A lead or lag compensator: y = gain (T1 s + 1) / (T2 s + 1) u, at rest at the start.
+
+    It leads (its phase is positive) where T1 is the greater of the two times, else it lags.
+    """
+
+    family: ClassVar[str] = "continuous"
+    title: ClassVar[str] = "Lead-Lag"
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="T1", unit="s")
+    lag_time: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, above=0.0, doc="T2", unit="s")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the compensated signal"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _common(self, inputs)}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", _common(self, inputs), "the input, lagging by T2"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        ratio = p["lead_time"] / p["lag_time"]
+        return {"y": p["gain"] * (x["x"] + ratio * (u["u"] - x["x"]))}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": (u["u"] - x["x"]) / p["lag_time"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransferFunctionFirstOrder(Block):
+    """A sampled lag with a final value of 1: y(k) = pole y(k-1) + (1 - pole) u(k)."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Transfer Fcn First Order"
+    sampled: ClassVar[bool] = True
+
+    pole: ArrayLike = parameter(0.95, kind=ParameterKind.ARRAY, doc="the pole in the z plane")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the lagging output"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _common(self, inputs)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", _common(self, inputs), "the output at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["pole"] * x["x"] + (1.0 - p["pole"]) * u["u"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": self.outputs(t, x, u, p)["y"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransferFunctionLeadOrLag(Block):
+    """A sampled compensator: y(k) = pole y(k-1) + u(k) - zero u(k-1), which is (z - zero) / (z - pole).
+
+    It leads where zero > pole. At once it passes the input itself, in the end (1 - zero) / (1 - pole) of it.
+    """
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Transfer Fcn Lead or Lag"
+    sampled: ClassVar[bool] = True
+
+    pole: ArrayLike = parameter(0.95, kind=ParameterKind.ARRAY, doc="the pole in the z plane")
+    zero: ArrayLike = parameter(0.75, kind=ParameterKind.ARRAY, doc="the zero in the z plane")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output before the first tick")
+    initial_input: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the compensated signal"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _common(self, inputs)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", _common(self, inputs), "pole y - zero u of the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"] + u["u"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": p["pole"] * (x["x"] + u["u"]) - p["zero"] * u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["pole"] * p["initial"] - p["zero"] * p["initial_input"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransferFunctionRealZero(Block):
+    """A sampled zero: y(k) = u(k) - zero u(k-1), which is (z - zero) / z."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Transfer Fcn Real Zero"
+    sampled: ClassVar[bool] = True
+
+    zero: ArrayLike = parameter(0.75, kind=ParameterKind.ARRAY, doc="the zero in the z plane")
+    initial_input: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the input, its past taken off"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _common(self, inputs)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", _common(self, inputs), "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] - p["zero"] * x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial_input"]}
+
+
+def _common(block: Block, inputs: Shapes) -> Shape:
+    """The shape of the input and of all tunable parameters; scalars spread."""
+    own = {
+        rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.parameters() if rule.tunable
+    }
+    return broadcast({**inputs, **own})
