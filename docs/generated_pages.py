@@ -9,6 +9,7 @@ from pathlib import Path
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS
+from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.diagram import Block, Parameter
 from armblocks.simulation.tableaux import TABLEAUX
 
@@ -92,10 +93,13 @@ def shipped_page() -> str:
 
 
 def solver_table() -> str:
-    """Every explicit integrator."""
-    lines = ["| name | also known as | order | step | method |", "|---|---|---|---|---|"]
+    """Every integrator."""
+    heads = ("name", "also known as", "order", "step", "kind", "method", "source")
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for tableau in TABLEAUX:
         aliases = ", ".join(f"`{alias}`" for alias in tableau.aliases)
         step = "adaptive" if tableau.adaptive else "fixed"
-        lines.append(f"| `{tableau.name}` | {aliases} | {tableau.order} | {step} | {tableau.title} |")
+        kind = "explicit" if isinstance(tableau, ButcherTableau) else "for stiff systems"
+        cells = (f"`{tableau.name}`", aliases, str(tableau.order), step, kind, tableau.title, tableau.source)
+        lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

@@ -1,7 +1,7 @@
-"""An explicit Runge-Kutta integrator in plain Python and NumPy: the second opinion on the native one.
+"""Runge-Kutta and Rosenbrock integrators in plain Python and NumPy: the second opinion on the native ones.
 
-Written from the description in Hairer, Norsett, Wanner I, II.4 to II.6, sharing nothing with the code under
-test but the tables.
+Written from the description in Hairer, Norsett, Wanner I, II.4 to II.6, and II, IV.7, sharing nothing with
+the code under test but the tables.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.rosenbrock_tableau import RosenbrockTableau, Tableau
 
 Field = Callable[[float, np.ndarray], np.ndarray]
 
@@ -39,7 +40,9 @@ def first_step(
     return min(100 * h0, h1, end - t)
 
 
-def error_norm(tableau: ButcherTableau, K: np.ndarray, h: float, scale: np.ndarray) -> float:
+def error_norm(tableau: Tableau, K: np.ndarray, h: float, scale: np.ndarray) -> float:
+    if isinstance(tableau, RosenbrockTableau):
+        return rms(h * (np.array(tableau.error) @ K[1 : tableau.stages + 1]) / scale)
     e = np.array(tableau.error) @ K[: tableau.stages + 1]
     if tableau.stretched_error is None:
         return rms(h * e / scale)
@@ -48,9 +51,36 @@ def error_norm(tableau: ButcherTableau, K: np.ndarray, h: float, scale: np.ndarr
     return 0.0 if e5 == e3 == 0 else float(h * e5 / np.sqrt((e5 + 0.01 * e3) * scale.size))
 
 
+def slopes_of(f: Field, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Jacobian and time derivative of ``f`` by complex steps, which subtract nothing."""
+    tiny = 1e-100
+    columns = [np.imag(f(t, x + 1j * tiny * unit)) / tiny for unit in np.eye(x.size)]
+    return np.column_stack(columns), np.imag(f(t + 1j * tiny, x)) / tiny
+
+
+def rosenbrock_stages(
+    tableau: RosenbrockTableau,
+    slope: Field,
+    jacobian: tuple[np.ndarray, np.ndarray],
+    t: float,
+    x: np.ndarray,
+    h: float,
+    K: np.ndarray,
+) -> np.ndarray:
+    """Fill rows 1 … s of K; gives the new state."""
+    J, T = jacobian
+    matrix = np.eye(x.size) / tableau.gamma - h * J
+    for i in range(tableau.stages):
+        before = K[1 : i + 1]
+        f = slope(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ before)) if i else K[0]
+        right = f + np.array(tableau.couplings[i]) @ before + h * tableau.time_weights[i] * T
+        K[1 + i] = np.linalg.solve(matrix, right)
+    return x + h * (np.array(tableau.weights) @ K[1 : tableau.stages + 1])
+
+
 def integrate(
     f: Field,
-    tableau: ButcherTableau,
+    tableau: Tableau,
     x0: Sequence[float],
     samples: np.ndarray,
     breakpoints: Sequence[float] = (),
@@ -74,6 +104,9 @@ def integrate(
             counts.evaluations += 1
             return np.asarray(f(min(time, limit), state))
 
+        def complex_slope(time: float, state: np.ndarray) -> np.ndarray:
+            return np.asarray(f(time, state))
+
         K = np.zeros((tableau.rows, x.size))
         K[0] = slope(t, x)
         h = step
@@ -91,10 +124,14 @@ def integrate(
                     t_new = end if t_new + 1e-9 * step >= end else t_new
                 t_new = min(t_new, end)
                 h = t_new - t
-                for i in range(1, s):
-                    K[i] = slope(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ K[:i]))
-                x_new = x + h * (np.array(tableau.weights) @ K[:s])
-                K[s] = slope(t_new, x_new)
+                if isinstance(tableau, RosenbrockTableau):
+                    jacobian = slopes_of(complex_slope, min(t, limit), x)
+                    x_new = rosenbrock_stages(tableau, slope, jacobian, t, x, h, K)
+                else:
+                    for i in range(1, s):
+                        K[i] = slope(t + tableau.nodes[i] * h, x + h * (np.array(tableau.matrix[i]) @ K[:i]))
+                    x_new = x + h * (np.array(tableau.weights) @ K[:s])
+                K[tableau.end_row] = slope(t_new, x_new)
                 if not tableau.adaptive:
                     break
                 norm = error_norm(tableau, K, h, atol + rtol * np.maximum(np.abs(x), np.abs(x_new)))
@@ -107,17 +144,17 @@ def integrate(
                 counts.rejected += 1
             counts.accepted += 1
             inside = samples[(samples > t) & (samples <= t_new)]
-            if tableau.extra_nodes and np.any(inside < t_new):
+            if isinstance(tableau, ButcherTableau) and tableau.extra_nodes and np.any(inside < t_new):
                 for i, node in enumerate(tableau.extra_nodes):
                     weights = np.array(tableau.extra_matrix[i])
                     K[s + 1 + i] = slope(t + node * h, x + h * (weights @ K[: s + 1 + i]))
             for instant in inside:
                 theta = (instant - t) / h
                 powers = theta ** np.arange(1, len(tableau.dense[0]) + 1)
-                value = x + h * ((np.array(tableau.dense) @ powers) @ K)
+                value = x + h * ((np.array(tableau.dense_rows) @ powers) @ K)
                 rows.append(x_new.copy() if instant == t_new else value)
             t, x = t_new, x_new
-            K[0] = K[s]
+            K[0] = K[tableau.end_row]
             if tableau.adaptive:
                 h = h_next
     return np.array(rows), counts

@@ -30,7 +30,12 @@ def run(
     stop_time: Annotated[
         float | None, typer.Option(help="Simulated time, s.", show_default="the model's")
     ] = None,
-    solver: Annotated[str | None, typer.Option(help="Integrator, such as rk45 or rk4.")] = None,
+    solver: Annotated[
+        str | None,
+        typer.Option(
+            help="auto, or one of the table in the docs: rk45, dop853, rk4 …; rodas5p for stiff systems."
+        ),
+    ] = None,
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
     sample_time: Annotated[float | None, typer.Option(help="Spacing of the recorded instants, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,

@@ -99,6 +99,27 @@ class ButcherTableau:
         """Rows of ``K``: stages, the derivative at the new point, and the extra stages."""
         return len(self.dense)
 
+    @property
+    def end_row(self) -> int:
+        """The row of ``K`` with the derivative at the new point."""
+        return self.stages
+
+    @property
+    def error_row(self) -> Row | None:
+        """``error`` over the rows of ``K``."""
+        return self.error
+
+    @property
+    def dense_rows(self) -> tuple[Row, ...]:
+        """``dense`` over the rows of ``K``."""
+        return self.dense
+
+    @property
+    def measures_stiffness(self) -> bool:
+        """Whether its last two evaluations, both at a step's end, show the fastest rate (Hairer, Wanner II,
+        IV.2, equation (2.20))."""
+        return self.adaptive and self.stages > 1 and self.nodes[-1] == 1.0
+
     @cached_property
     def real_stability(self) -> float:
         """Length of the interval of absolute stability on the negative real axis.

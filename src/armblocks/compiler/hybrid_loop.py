@@ -21,10 +21,11 @@ zero right after it fired, or at the start, counts with the sign it takes first.
 
 from __future__ import annotations
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.hybrid_functions import emit_functions
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_text import Module, number_text
+from armblocks.compiler.linear_equations import LinearSpace
+from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.runge_kutta import Loop
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
@@ -38,9 +39,14 @@ class HybridLoop(Loop):
     kept_counts = (*Loop.kept_counts, Count.INSTANTS)
 
     def __init__(
-        self, module: Module, tableau: ButcherTableau, workspace: Workspace, sizes: LoopSizes
+        self,
+        module: Module,
+        tableau: Tableau,
+        workspace: Workspace,
+        sizes: LoopSizes,
+        space: LinearSpace | None = None,
     ) -> None:
-        super().__init__(module, tableau, workspace)
+        super().__init__(module, tableau, workspace, space)
         self.sizes = sizes
         self.guards = len(sizes.directions)
         emit_functions(module, workspace, sizes)
@@ -67,6 +73,13 @@ class HybridLoop(Loop):
         self.emit_solve(instant, x)
         z, w = self.at(self.places.z), self.at(self.places.trial_w)
         self.w.do(f"call void @derivative(ptr {instant}, ptr {x}, ptr {z}, ptr {w}, ptr %p, ptr {xd})")
+
+    def emit_jacobian(self, instant: str, x: str) -> None:
+        """The derivatives of the flow and of the implicit equations at a point, into the scratch."""
+        self.emit_solve(instant, x)
+        z, w = self.at(self.places.z), self.at(self.places.trial_w)
+        arguments = f"ptr {instant}, ptr {x}, ptr {z}, ptr {w}, ptr %p"
+        self.w.do(f"call void @flow_jacobian({arguments}, {self.jacobian_places()})")
 
     def watch(self, time: str, x: int) -> str:
         """Evaluate all guards and mark those that fire; how many do."""
@@ -291,7 +304,7 @@ class HybridLoop(Loop):
         )
         w.branch(happens, instant, plain)
         w.place(plain)
-        step.copy(step.K(self.tableau.stages), step.K(0))
+        step.copy(step.K(self.tableau.end_row), step.K(0))
         if self.sizes.algebraic:
             # The samples may have changed it; a zero of the same equations is found again at once.
             w.put(w.minimum(new_time, w.get(self.clamp)), self.instant)

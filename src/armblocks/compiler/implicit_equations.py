@@ -49,22 +49,8 @@ class _Newton:
         place = self.w.word_op("add", self.w.word_op("mul", row, str(self.n)), column)
         return self.address(self.places.jacobian, place)
 
-    def count(self, start: str, stop: str, write: Callable[[str], None]) -> None:
-        """What ``write(index)`` writes, for ``index = start … stop - 1``."""
-        w = self.w
-        head, turn, done = w.fresh("head"), w.fresh("turn"), w.fresh("done")
-        variable = w.variable("i64", start)
-        w.place(head)
-        index = w.get(variable, "i64")
-        w.branch(w.word_test("slt", index, stop), turn, done)
-        w.place(turn)
-        write(index)
-        w.put(w.word_op("add", index, "1"), variable, "i64")
-        w.jump(head)
-        w.place(done)
-
     def all(self, write: Callable[[str], None]) -> None:
-        self.count("0", str(self.n), write)
+        self.w.count("0", str(self.n), write)
 
     def copy(self, source: int, target: int) -> None:
         self.all(lambda i: self.w.put(self.w.get(self.address(source, i)), self.address(target, i)))
@@ -171,11 +157,11 @@ class _Newton:
                     target = self.entry(i, j)
                     w.put(w.fma(factor, w.get(self.entry(k, j)), w.get(target)), target)
 
-                self.count(below, size, subtract)
+                self.w.count(below, size, subtract)
                 right = self.address(self.places.residual, i)
                 w.put(w.fma(factor, w.get(self.address(self.places.residual, k)), w.get(right)), right)
 
-            self.count(below, size, row)
+            self.w.count(below, size, row)
 
         self.all(column)
 
@@ -187,7 +173,7 @@ class _Newton:
                 known = w.negate(w.get(self.address(self.places.residual, j)))
                 w.put(w.fma(known, w.get(self.entry(k, j)), w.get(right)), right)
 
-            self.count(w.word_op("add", k, "1"), size, subtract)
+            self.w.count(w.word_op("add", k, "1"), size, subtract)
             w.put(w.divide(w.get(right), w.get(self.entry(k, k))), right)
 
         self.all(back)
@@ -204,7 +190,7 @@ class _Newton:
             )
             w.put(w.let(f"select i1 {larger}, i64 {i}, i64 {known}"), best, "i64")
 
-        self.count(w.word_op("add", k, "1"), str(self.n), look)
+        self.w.count(w.word_op("add", k, "1"), str(self.n), look)
         row = w.get(best, "i64")
 
         def swap(one: str, other: str) -> None:
@@ -212,5 +198,5 @@ class _Newton:
             w.put(b, one)
             w.put(a, other)
 
-        self.count(k, str(self.n), lambda j: swap(self.entry(k, j), self.entry(row, j)))
+        self.w.count(k, str(self.n), lambda j: swap(self.entry(k, j), self.entry(row, j)))
         swap(self.address(self.places.residual, k), self.address(self.places.residual, row))

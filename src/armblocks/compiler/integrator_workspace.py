@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.rosenbrock_tableau import Tableau
 
 
 class Status(IntEnum):
@@ -71,7 +71,15 @@ class Count(IntEnum):
     """The guard that fired last, counted from 1."""
     SAVED = 14
     """Whether the checkpoint is written."""
-    END = 15
+    WATCHED = 15
+    """Adaptive explicit steps so far."""
+    STIFF = 16
+    """Looks that found a step bound by stability."""
+    CALM = 17
+    """Looks in a row that did not."""
+    WATCHING = 18
+    """Whether the run wants to be told that it is stiff: it then pauses with ``STIFF`` at its limit."""
+    END = 19
 
 
 class Stage(IntEnum):
@@ -116,7 +124,7 @@ class Workspace:
     ``before``.
     """
 
-    def __init__(self, tableau: ButcherTableau, sizes: LoopSizes) -> None:
+    def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
         n, nz, nw, ng = sizes.states, sizes.discrete, sizes.algebraic, len(sizes.directions)
         self.states = n
         self.x = int(Real.END)

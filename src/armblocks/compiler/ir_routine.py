@@ -115,3 +115,16 @@ class Routine(Body):
         self.put(following, variable, "i64")
         self.branch(self.word_test("slt", following, str(count)), turn, done)
         self.place(done)
+
+    def count(self, start: str, stop: str, write: Callable[[str], None]) -> None:
+        """What ``write(index)`` writes, for ``index = start … stop - 1``, as a loop."""
+        head, turn, done = self.fresh("head"), self.fresh("turn"), self.fresh("done")
+        variable = self.variable("i64", start)
+        self.place(head)
+        index = self.get(variable, "i64")
+        self.branch(self.word_test("slt", index, stop), turn, done)
+        self.place(turn)
+        write(index)
+        self.put(self.word_op("add", index, "1"), variable, "i64")
+        self.jump(head)
+        self.place(done)

@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.elimination import JacobianPattern
 from armblocks.compiler.hybrid_loop import HybridLoop
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_text import Module
+from armblocks.compiler.linear_equations import LinearSpace
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
+from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.runge_kutta import POINTERS, Loop, define_loop
 
 if TYPE_CHECKING:
@@ -53,31 +56,35 @@ class NativeIntegrator:
         sizes: LoopSizes,
         digests: Mapping[str, str],
         tape: Callable[[str], Tape],
-        tableau: ButcherTableau,
+        tableau: Tableau,
+        pattern: JacobianPattern | None = None,
     ) -> None:
         """``digests`` are those of the tapes, which ``tape(name)`` gives if the disk cache lacks the code.
 
-        ``derivative`` alone for a system that only flows, else also those of :func:`needed_tapes`.
+        ``derivative`` alone for a system that only flows, else also those of :func:`needed_tapes`. A
+        Rosenbrock method needs the ``pattern`` of ``flow_jacobian`` too, and its tape.
         """
         self.tableau = tableau
+        self.space = None if pattern is None else LinearSpace(pattern)
         self.sizes = sizes
         self.states = sizes.states
         self.workspace = Workspace(tableau, sizes)
-        names = needed_tapes(sizes)
+        names = (*needed_tapes(sizes), *(("flow_jacobian",) if pattern else ()))
 
         def write() -> str:
             module = Module()
             for name in names:
                 emit_function(module, tape(name), name)
             if sizes.hybrid:
-                loop = HybridLoop(module, tableau, self.workspace, sizes)
+                loop = HybridLoop(module, tableau, self.workspace, sizes, self.space)
             else:
-                loop = Loop(module, tableau, self.workspace)
+                loop = Loop(module, tableau, self.workspace, self.space)
             define_loop("advance", loop)
             return module.text
 
         # The code object must outlive every call into it.
-        self.key = ("runge_kutta", tableau.content, repr(sizes), *(digests[name] for name in names))
+        shape = "" if pattern is None else repr((pattern.rows, pattern.columns))
+        self.key = ("runge_kutta", tableau.content, repr(sizes), shape, *(digests[name] for name in names))
         self._code = load_code(self.key, write)
         self._advance = _ADVANCE(self._code.address("advance"))
 
@@ -176,7 +183,8 @@ class Integration:
         self._saved = Checkpoint(reals=np.full_like(self.reals, np.nan), counts=np.zeros_like(self.counts))
         self._kept = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
         arrays = (self.reals, self.counts, *self._kept, self.states, self.discrete, self.algebraic)
-        arrays += (self._saved.reals, self._saved.counts)
+        self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
+        arrays += (self._saved.reals, self._saved.counts, self._scratch)
         self._addresses = tuple(array.ctypes.data for array in arrays)
 
     def place(self, start: RunPoint, *, step: float, first: bool) -> None:
@@ -287,7 +295,7 @@ class Integration:
 
     def weighted_errors(self) -> Vector:
         """Error of every state in the step tried last, over what is allowed, ``(n,)`` (adaptive methods)."""
-        weights = np.array(self.integrator.tableau.error)
+        weights = np.array(self.integrator.tableau.error_row)
         after = self._vector(self.integrator.workspace.y, self.integrator.states)
         rtol, atol = self.reals[Real.RTOL], self.reals[Real.ATOL]
         error = self.last_step * (weights @ self._stage_derivatives()[: weights.size])
@@ -297,10 +305,12 @@ class Integration:
         """Time and state at which the derivative of the step tried last became NaN or infinite first."""
         tableau = self.integrator.tableau
         K, h, clamp = self._stage_derivatives(), self.last_step, self._kept[3][self.counts[Count.SEGMENT]]
-        bad = [stage for stage in range(tableau.stages) if not np.isfinite(K[stage]).all()]
-        stage = bad[0] if bad else tableau.stages
+        # Before the stages a Rosenbrock method keeps the derivative at the start.
+        first = 0 if isinstance(tableau, ButcherTableau) else 1
+        bad = [stage for stage in range(tableau.stages) if not np.isfinite(K[first + stage]).all()]
+        stage = bad[0] if bad and np.isfinite(K[0]).all() else 0 if bad else tableau.stages
         row = [*tableau.matrix, tableau.weights][stage]
         state = self.state.copy()
-        for weight, slope in zip(row, K):
+        for weight, slope in zip(row, K[first:]):
             state += h * weight * slope
         return min(self.time + [*tableau.nodes, 1.0][stage] * h, float(clamp)), state

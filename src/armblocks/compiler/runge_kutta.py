@@ -1,4 +1,4 @@
-"""The whole loop of an explicit Runge-Kutta method, written as LLVM IR around one traced derivative.
+"""The whole loop of a one-step method, explicit or Rosenbrock, as LLVM IR around one traced derivative.
 
 One call of the native function takes many steps: stages, error estimate, step control, values at the sample
 instants and restarts at breakpoints, without returning to Python. All of its state lies in two flat arrays
@@ -13,12 +13,23 @@ rejection, the same choice of the first step. Step counts can therefore be laid 
 from __future__ import annotations
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, Row
+from armblocks.compiler.explicit_step import ExplicitStep
 from armblocks.compiler.integrator_workspace import Count, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module, number_text
-from armblocks.compiler.runge_kutta_step import StepWriter
+from armblocks.compiler.linear_equations import LinearSpace
+from armblocks.compiler.rosenbrock_step import RosenbrockStep
+from armblocks.compiler.rosenbrock_tableau import Tableau
+from armblocks.compiler.step_writer import StepWriter
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+LOOK_EVERY = 16
+"""Steps between two looks at what bounds them: a power of two."""
+NEAR_BORDER = 0.97
+"""Of the stability interval: a step beyond it is bound by stability (3.2 of 3.3, as in Hairer's DOPRI5)."""
+STIFF_LOOKS, CALM_LOOKS = 250, 6
+"""So many looks that find a step bound by stability, 4000 steps, make the system stiff; so many in a row that
+do not make it calm again."""
 
 _ARGUMENTS = (
     "%reals",
@@ -32,6 +43,7 @@ _ARGUMENTS = (
     "%out_w",
     "%saved_reals",
     "%saved_counts",
+    "%scratch",
 )
 POINTERS = len(_ARGUMENTS)
 _KEPT_REALS = (Real.TIME, Real.STEP, Real.TRIED)
@@ -45,6 +57,9 @@ _KEPT_COUNTS = (
     Count.EVALUATIONS,
     Count.FRESH,
     Count.SAVED,
+    Count.WATCHED,
+    Count.STIFF,
+    Count.CALM,
 )
 
 
@@ -54,8 +69,9 @@ def define_loop(symbol: str, loop: Loop) -> None:
     ``samples`` are the instants to record and ``out`` their states, ``(N, n)`` (``out_z``, ``out_w`` likewise
     what a hybrid system has besides). ``ends`` are the ends of the segments between breakpoints and
     ``clamps`` the latest time at which each segment may evaluate its derivative. Into ``saved_reals`` and
-    ``saved_counts`` goes the state from which a run that ends later would go on. The integers and all other
-    pointers are ``int64`` and ``float64``. The result is a ``Status``.
+    ``saved_counts`` goes the state from which a run that ends later would go on; ``scratch`` has room for the
+    linear equations of a step (:class:`LinearSpace`). The integers and all other pointers are ``int64`` and
+    ``float64``. The result is a ``Status``.
     """
 
     def write() -> str:
@@ -69,13 +85,16 @@ def define_loop(symbol: str, loop: Loop) -> None:
 class Loop:
     """Writes the loop of a system that only flows, for one method; the blocks stand in the order they run in.
 
-    The module has ``void derivative(ptr t, ptr x, ptr z, ptr w, ptr p, ptr xd)``.
+    The module has ``void derivative(ptr t, ptr x, ptr z, ptr w, ptr p, ptr xd)`` and, for a Rosenbrock
+    method, whose linear equations lie in ``space``, ``void flow_jacobian(ptr t, …, ptr J, ptr T)``.
     """
 
     kept_reals: tuple[Real, ...] = _KEPT_REALS
     kept_counts: tuple[Count, ...] = _KEPT_COUNTS
 
-    def __init__(self, module: Module, tableau: ButcherTableau, workspace: Workspace) -> None:
+    def __init__(
+        self, module: Module, tableau: Tableau, workspace: Workspace, space: LinearSpace | None = None
+    ) -> None:
         self.w = w = Routine(module)
         self.tableau = tableau
         self.places = workspace
@@ -96,14 +115,31 @@ class Loop:
         self.h = w.variable("double", number_text(0.0))
         self.new_time = w.variable("double", number_text(0.0))
         self.extra_done = w.variable("i64", "0")
-        self.step = StepWriter(
-            w, tableau, workspace, self.emit_flow, self.clamp, self.counts[Count.EVALUATIONS]
-        )
+        self.step: StepWriter
+        evaluations = self.counts[Count.EVALUATIONS]
+        if isinstance(tableau, ButcherTableau):
+            self.step = ExplicitStep(w, tableau, workspace, self.emit_flow, self.clamp, evaluations)
+        else:
+            assert space is not None
+            self.space = space
+            self.step = RosenbrockStep(
+                w, tableau, workspace, self.emit_flow, self.clamp, evaluations, space, self.emit_jacobian
+            )
         self.on_start, self.on_step, self.on_leave = (w.fresh(stem) for stem in ("start", "step", "leave"))
 
     def emit_flow(self, instant: str, x: str, xd: str) -> None:
         """One evaluation of the derivative, between three addresses."""
         self.w.do(f"call void @derivative(ptr {instant}, ptr {x}, ptr null, ptr null, ptr %p, ptr {xd})")
+
+    def emit_jacobian(self, instant: str, x: str) -> None:
+        """The derivatives of the flow at a point, into the scratch."""
+        arguments = f"ptr {instant}, ptr {x}, ptr null, ptr null, ptr %p"
+        self.w.do(f"call void @flow_jacobian({arguments}, {self.jacobian_places()})")
+
+    def jacobian_places(self) -> str:
+        """Where ``flow_jacobian`` writes."""
+        J, T = (self.w.at("%scratch", place) for place in (self.space.J, self.space.T))
+        return f"ptr {J}, ptr {T}"
 
     def emit(self) -> None:
         """The whole body."""
@@ -113,8 +149,9 @@ class Loop:
         self.emit_start()
         w.place(self.on_step)
         self.leave_unless(w.word_test("slt", w.get(self.taken, "i64"), "%max_steps"), Status.PAUSED)
-        if self.tableau.error is not None:
-            self.emit_adaptive_step(self.tableau.error)
+        error = self.tableau.error_row
+        if error is not None:
+            self.emit_adaptive_step(error)
         else:
             self.emit_fixed_step()
         self.emit_accepted()
@@ -211,6 +248,7 @@ class Loop:
         w.put(w.minimum(w.maximum(w.get(length), shortest), self.max_step), length)
         new_time = w.minimum(w.add(time, w.get(length)), w.get(self.end))
         self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
+        step.prepare(time)
         growth = w.variable("double", number_text(GROW))
         attempt, rejected, too_small, accepted = (
             w.fresh(stem) for stem in ("attempt", "rejected", "small", "accepted")
@@ -238,7 +276,39 @@ class Loop:
         self.leave_unless(finite, Status.NON_FINITE)
         self.leave(Status.STEP_TOO_SMALL)
         w.place(accepted)
+        if isinstance(step, ExplicitStep) and step.butcher.measures_stiffness:
+            self.emit_stiffness_watch(step)
         self.emit_next_length(w.multiply(h, w.minimum(ideal, w.get(growth))))
+
+    def emit_stiffness_watch(self, step: ExplicitStep) -> None:
+        """Now and then, see whether stability bounds the step; if it has for long, pause at the next one.
+
+        A step counts as bound where ``h`` times the fastest rate is at the border of the stability region;
+        six calm looks in a row clear the count (Hairer, Wanner II, IV.2).
+        """
+        w = self.w
+        watched, stiff, calm = (self.counts[place] for place in (Count.WATCHED, Count.STIFF, Count.CALM))
+        look, bound, free, clear, on = (w.fresh(stem) for stem in ("look", "bound", "free", "clear", "on"))
+        w.increase(watched)
+        turn = w.word_op("and", w.get(watched, "i64"), str(LOOK_EVERY - 1))
+        w.branch(w.word_test("eq", turn, "0"), look, on)
+        w.place(look)
+        border = (NEAR_BORDER * step.butcher.real_stability) ** 2
+        w.branch(w.compare("ogt", step.stiffness(), number_text(border)), bound, free)
+        w.place(bound)
+        w.increase(stiff)
+        w.put("0", calm, "i64")
+        wanted = w.word_test("ne", w.get(w.at("%counts", Count.WATCHING, "i64"), "i64"), "0")
+        long = w.word_test("sge", w.get(stiff, "i64"), str(STIFF_LOOKS))
+        enough = w.let(f"select i1 {w.both(wanted, long)}, i64 %max_steps, i64 {w.get(self.taken, 'i64')}")
+        w.put(enough, self.taken, "i64")
+        w.jump(on)
+        w.place(free)
+        w.increase(calm)
+        w.branch(w.word_test("sge", w.get(calm, "i64"), str(CALM_LOOKS)), clear, on)
+        w.place(clear)
+        w.put("0", stiff, "i64")
+        w.place(on)
 
     def emit_next_length(self, proposed: str) -> None:
         """Settle the length of the step after an accepted one."""
@@ -261,8 +331,9 @@ class Loop:
         last = w.compare("oge", w.fma(spacing, number_text(1e-9), instant), end)
         new_time = self.bounded(time, w.select(last, end, instant))
         self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
+        step.prepare(time)
         self.emit_trial(time, new_time)
-        self.leave_unless(step.all_finite(step.y, step.K(self.tableau.stages)), Status.NON_FINITE)
+        self.leave_unless(step.all_finite(step.y, step.K(self.tableau.end_row)), Status.NON_FINITE)
 
     def passed(self, time: str, spacing: str) -> str:
         """Grid instants up to this time are behind."""
@@ -310,7 +381,7 @@ class Loop:
 
     def emit_extra_stages_once(self, time: str, h: str) -> None:
         """The stages that only the dense output needs, for the first sample instant inside a step."""
-        if not self.tableau.extra_nodes:
+        if not (isinstance(self.tableau, ButcherTableau) and self.tableau.extra_nodes):
             return
         w = self.w
         needed, ready = w.fresh("needed"), w.fresh("ready")
@@ -327,7 +398,7 @@ class Loop:
         w.put("0", self.extra_done, "i64")
         self.emit_samples(w.get(self.kept[Real.TIME]), new_time, w.get(self.h))
         step.copy(step.y, step.x)
-        step.copy(step.K(self.tableau.stages), step.K(0))
+        step.copy(step.K(self.tableau.end_row), step.K(0))
         w.put(new_time, self.kept[Real.TIME])
         w.increase(self.counts[Count.ACCEPTED])
         w.put("0", self.counts[Count.FRESH], "i64")

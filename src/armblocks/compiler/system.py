@@ -17,9 +17,11 @@ from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.integrator_workspace import LoopSizes
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
+from armblocks.compiler.kept_jacobian import KeptJacobian, kept_jacobian
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.native_integrator import NativeIntegrator
+from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
 
@@ -42,7 +44,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
     Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that tapes do not know.
     """
     tapes = {name: tape_of(getattr(system, name)) for name in _FUNCTIONS}
-    return CompiledSystem(_describe(system, tapes), tapes.__getitem__)
+    return CompiledSystem(_describe(system, tapes), tapes.__getitem__, lambda: system)
 
 
 def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem:
@@ -61,7 +63,7 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
             def tape(function: str) -> Tape:
                 return kept_tape(description["digests"][function], lambda: getattr(trace(), function))
 
-            return CompiledSystem(description, tape)
+            return CompiledSystem(description, tape, trace)
         except (ValueError, KeyError, TypeError):
             pass  # a record of another make is made anew
     system = trace()
@@ -70,7 +72,7 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
     for tape_made in tapes.values():
         keep_tape(tape_made)
     cache.store(name, json.dumps(description).encode())
-    return CompiledSystem(description, tapes.__getitem__)
+    return CompiledSystem(description, tapes.__getitem__, lambda: system)
 
 
 class CompiledSystem:
@@ -81,7 +83,9 @@ class CompiledSystem:
     Arrays that are given are float64 and C-contiguous, and nothing is checked.
     """
 
-    def __init__(self, description: Mapping[str, Any], tape: Callable[[str], Tape]) -> None:
+    def __init__(
+        self, description: Mapping[str, Any], tape: Callable[[str], Tape], trace: Callable[[], HybridSystem]
+    ) -> None:
         self.name = str(description["name"])
         self.states = slots_from_json(description["states"])
         self.discrete = slots_from_json(description["discrete"])
@@ -102,6 +106,7 @@ class CompiledSystem:
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = {name: description["digests"][name] for name in _FUNCTIONS}
         self._make_tape = tape
+        self._trace = trace
         self._integrators: dict[int, NativeIntegrator] = {}
 
     def tape(self, function: str) -> Tape:
@@ -143,7 +148,7 @@ class CompiledSystem:
             self._point_functions[name](p.ctypes.data, result.ctypes.data)
         return result
 
-    def prepare(self, tableau: ButcherTableau | None) -> None:
+    def prepare(self, tableau: Tableau | None) -> None:
         """Compile, or load from disk, all that a run by this method needs (``None``: no integration)."""
         _ = self._signals
         if tableau is not None:
@@ -192,12 +197,25 @@ class CompiledSystem:
             self._signals(0, t.size, t.size, *addresses)
         return y
 
-    def integrator(self, tableau: ButcherTableau) -> NativeIntegrator:
+    @cached_property
+    def _flow_jacobian(self) -> KeptJacobian:
+        return kept_jacobian(self._digests["derivative"], self._digests["residual"], self._trace)
+
+    def integrator(self, tableau: Tableau) -> NativeIntegrator:
         """The native loop that steps this system by a method; made once."""
         found = self._integrators.get(id(tableau))
         if found is None:
             # The integrator keeps its tableau alive, so the identity stays its own.
-            found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
+            if isinstance(tableau, ButcherTableau):
+                found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
+            else:
+                kept = self._flow_jacobian
+                digests = {**self._digests, "flow_jacobian": kept.digest}
+
+                def tape(function: str) -> Tape:
+                    return kept.tape() if function == "flow_jacobian" else self.tape(function)
+
+                found = NativeIntegrator(self.sizes, digests, tape, tableau, kept.pattern)
             self._integrators[id(tableau)] = found
         return found
 

@@ -6,6 +6,7 @@ from armblocks.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from armblocks.equations.continuous import continuous_system
+    from armblocks.equations.flow_jacobian import FlowJacobian, trace_flow_jacobian
     from armblocks.equations.hybrid_system import HybridSystem, SampleClock
     from armblocks.equations.options import SimulationOptions
     from armblocks.equations.signatures import Shape, Signature, Slot, signature
@@ -15,6 +16,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
+            "FlowJacobian": "armblocks.equations.flow_jacobian",
             "HybridSystem": "armblocks.equations.hybrid_system",
             "SampleClock": "armblocks.equations.hybrid_system",
             "Shape": "armblocks.equations.signatures",
@@ -26,11 +28,13 @@ else:
             "flatten": "armblocks.equations.symbols",
             "matrix_shape": "armblocks.equations.symbols",
             "signature": "armblocks.equations.signatures",
+            "trace_flow_jacobian": "armblocks.equations.flow_jacobian",
             "unflatten": "armblocks.equations.symbols",
         },
     )
 
 __all__ = [
+    "FlowJacobian",
     "HybridSystem",
     "SampleClock",
     "Shape",
@@ -42,5 +46,6 @@ __all__ = [
     "flatten",
     "matrix_shape",
     "signature",
+    "trace_flow_jacobian",
     "unflatten",
 ]

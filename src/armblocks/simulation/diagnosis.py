@@ -7,12 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.compiler.butcher_tableau import ButcherTableau
 from armblocks.compiler.integrator_workspace import Status
 from armblocks.compiler.native_integrator import Integration
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
 from armblocks.simulation.result import element_names
+from armblocks.simulation.rosenbrock import ROS5
+from armblocks.simulation.tableaux import STIFF
 
 Array = NDArray[np.float64]
 
@@ -134,8 +137,8 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     The spectral radius of the Jacobian where the run ended, by power iteration on differences of the
     derivative, times the mean step, against the method's stability interval.
     """
-    tried = run.accepted + run.rejected
-    if tried < MANY_STEPS or run.time <= 0.0:
+    tried, tableau = run.accepted + run.rejected, run.integrator.tableau
+    if tried < MANY_STEPS or run.time <= 0.0 or not isinstance(tableau, ButcherTableau):
         return ""
     point = run.point
     x, t, rest = point.x, point.time, (point.z, point.w, p)
@@ -153,10 +156,10 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
             return ""
         direction = change
     mean_step = run.time / run.accepted
-    if rate * mean_step < 0.5 * run.integrator.tableau.real_stability:
+    if rate * mean_step < 0.5 * tableau.real_stability:
         return ""
     return (
         f"this system looks stiff: {tried} steps of {mean_step:.2g} s on average were held short by the "
-        f"stability of the explicit method, not by accuracy (fastest rate about {rate:.2g} 1/s). Replace the "
-        "fastest dynamics by their steady state, or make them slower, to run faster"
+        f"stability of the explicit method, not by accuracy (fastest rate about {rate:.2g} 1/s). "
+        f"solver='{STIFF.name if tableau.adaptive else ROS5.name}' is made for such systems"
     )

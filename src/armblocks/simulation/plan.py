@@ -10,11 +10,11 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, find_tableau
+from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, TABLEAUX, find_tableau
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ SMALLEST_RTOL = 1e-13
 class Plan:
     """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time."""
 
-    tableau: ButcherTableau | None
+    tableau: Tableau | None
     solver: str
     reason: str
     instants: Array
@@ -97,7 +97,7 @@ def _number(
     raise InputError(f"{name} is {value!r}", allowed=allowed, fix=f"give another {name}")
 
 
-def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[ButcherTableau | None, str]:
+def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau | None, str]:
     automatic = options.solver.casefold() == "auto"
     named = None if automatic else find_tableau(options.solver)
     if system.states.size == 0 and system.sizes.hybrid:
@@ -113,8 +113,8 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Butcher
         raise InputError(
             f"solver {named.name} chooses its own steps, and step is {options.step:g} s",
             where=system.name,
-            allowed="step with a fixed-step solver: euler, heun, rk3, rk4, rk5",
-            fix="use max_step to bound the steps, or solver='rk4'",
+            allowed=f"step with a fixed-step solver: {', '.join(t.name for t in TABLEAUX if not t.adaptive)}",
+            fix="use max_step to bound the steps, or solver='rk4' ('ros5' for a stiff system)",
         )
     return named, f"asked for: {named.title}"
 

@@ -1,4 +1,4 @@
-"""Every explicit integrator, as data: adding one is adding one table to ``TABLEAUX``.
+"""Every integrator, as data: adding one is adding one table to ``TABLEAUX``.
 
 Names are matched without regard to case; Simulink's and SciPy's names are accepted as aliases. A
 fixed-step method up to order 4 gets the cubic Hermite polynomial between its steps, which keeps its order;
@@ -8,8 +8,10 @@ fixed-step method up to order 4 gets the cubic Hermite polynomial between its st
 from __future__ import annotations
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, hermite_dense
+from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.errors import UnknownNameError
 from armblocks.simulation.dormand_prince_853 import DOP853
+from armblocks.simulation.rosenbrock import RODAS5P, ROSENBROCK_TABLEAUX
 
 EULER = ButcherTableau(
     name="euler",
@@ -183,16 +185,22 @@ TSIT5 = ButcherTableau(
     ),
 )
 
-TABLEAUX: tuple[ButcherTableau, ...] = (EULER, HEUN, RK3, RK4, RK5, RK23, RK45, TSIT5, DOP853)
-"""All integrators, the fixed-step ones first, each kind by rising order."""
+EXPLICIT_TABLEAUX = (EULER, HEUN, RK3, RK4, RK5, RK23, RK45, TSIT5, DOP853)
+"""The explicit integrators, the fixed-step ones first, each kind by rising order."""
+
+TABLEAUX: tuple[Tableau, ...] = (*EXPLICIT_TABLEAUX, *ROSENBROCK_TABLEAUX)
+"""All integrators: the explicit ones, then those for stiff systems."""
 
 DEFAULT = RK45
-"""What ``auto`` takes where a system has states."""
+"""What ``auto`` begins with where a system has states."""
+
+STIFF = RODAS5P
+"""What ``auto`` goes on with where the system turns out to be stiff."""
 
 _BY_NAME = {name.casefold(): tableau for tableau in TABLEAUX for name in (tableau.name, *tableau.aliases)}
 
 
-def find_tableau(name: str) -> ButcherTableau:
+def find_tableau(name: str) -> Tableau:
     """The integrator of this name or alias, in any case.
 
     Raises ``UnknownNameError`` with the nearest name.

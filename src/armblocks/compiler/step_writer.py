@@ -1,21 +1,24 @@
-"""The arithmetic of one Runge-Kutta step as LLVM IR: stages, error norm, first step, values between steps.
+"""The arithmetic that all steps share, as LLVM IR: error norm, first step, values between steps.
 
 Everything is written for vectors of ``n`` states that lie in the workspace ``%reals``: the old state x, the
-new one y and the stage derivatives K. Nothing here decides; the loop around it is
-:mod:`armblocks.compiler.runge_kutta`.
+new one y and the rows of K. What a method does to get from x to y is in
+:mod:`armblocks.compiler.explicit_step` and :mod:`armblocks.compiler.rosenbrock_step`. Nothing here decides;
+the loop around it is :mod:`armblocks.compiler.runge_kutta`.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from armblocks.compiler.butcher_tableau import ButcherTableau, Row
 from armblocks.compiler.integrator_workspace import Real, Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import number_text
+from armblocks.compiler.rosenbrock_tableau import Tableau
 
 
-class StepWriter:
+class StepWriter(ABC):
     """Appends the arithmetic of ``tableau``'s steps to a routine that has ``%reals`` and ``%p``.
 
     ``derivative(t, x, xd)`` writes one evaluation of the derivative, between three addresses. ``clamp`` and
@@ -25,7 +28,7 @@ class StepWriter:
     def __init__(
         self,
         routine: Routine,
-        tableau: ButcherTableau,
+        tableau: Tableau,
         workspace: Workspace,
         derivative: Callable[[str, str, str], None],
         clamp: str,
@@ -69,7 +72,7 @@ class StepWriter:
         """``y = x + h sum_j weights[j] K[j]``."""
 
         def write(index: str) -> None:
-            moved = self.w.fma(h, self._combination(weights, index), self.read(self.x, index))
+            moved = self.w.fma(h, self.combination(weights, index), self.read(self.x, index))
             self.w.put(moved, self.element(self.y, index))
 
         self.w.for_each(self.n, write)
@@ -82,33 +85,37 @@ class StepWriter:
                 total = self.w.fma(self.read(place, index), number_text(0.0), total)
             return total
 
-        return self.w.compare("oeq", self._total(term), number_text(0.0))
+        return self.w.compare("oeq", self.total(term), number_text(0.0))
 
     # The step.
 
+    @abstractmethod
+    def prepare(self, time: str) -> None:
+        """What a step needs that does not depend on its length."""
+
+    @abstractmethod
     def stages(self, time: str, h: str, new_time: str) -> None:
-        """All stages, the new state into y and the derivative there into row ``s`` of K."""
-        tableau = self.tableau
-        for stage in range(1, tableau.stages):
-            self.move(tableau.matrix[stage], h)
-            self.evaluate(self.w.fma(number_text(tableau.nodes[stage]), h, time), self.y, stage)
-        self.move(tableau.weights, h)
-        self.evaluate(new_time, self.y, tableau.stages)
+        """All stages, the new state into y and the derivative there into row ``end_row`` of K."""
+
+    @abstractmethod
+    def extra_stages(self, time: str, h: str) -> None:
+        """The stages that only the dense output needs; y keeps its value."""
 
     def error_norm(self, h: str, error: Row) -> str:
         """Weighted root-mean-square norm of the error estimate of the step to y."""
-        w, stretched = self.w, self.tableau.stretched_error
+        w, tableau = self.w, self.tableau
+        stretched = tableau.stretched_error if isinstance(tableau, ButcherTableau) else None
 
         def weighted(weights: Row) -> Callable[[str], str]:
             def element(index: str) -> str:
                 before, after = (w.absolute(self.read(place, index)) for place in (self.x, self.y))
-                return w.divide(self._combination(weights, index), self._scale(w.maximum(before, after)))
+                return w.divide(self.combination(weights, index), self._scale(w.maximum(before, after)))
 
             return element
 
         if stretched is None:
-            return w.multiply(h, self._mean_square(weighted(error)))
-        e5, e3 = self._square(weighted(error)), self._square(weighted(stretched))
+            return w.multiply(h, self.mean_square(weighted(error)))
+        e5, e3 = self.square(weighted(error)), self.square(weighted(stretched))
         denominator = w.square_root(w.multiply(w.fma(number_text(0.01), e3, e5), number_text(float(self.n))))
         norm = w.divide(w.multiply(h, e5), denominator)
         nothing = w.compare("oeq", denominator, number_text(0.0))
@@ -124,8 +131,8 @@ class StepWriter:
         def weighted(value: Callable[[str], str]) -> Callable[[str], str]:
             return lambda i: w.divide(value(i), self._scale(w.absolute(self.read(self.x, i))))
 
-        d0 = self._mean_square(weighted(lambda i: self.read(self.x, i)))
-        d1 = self._mean_square(weighted(lambda i: self.read(self.K(0), i)))
+        d0 = self.mean_square(weighted(lambda i: self.read(self.x, i)))
+        d1 = self.mean_square(weighted(lambda i: self.read(self.K(0), i)))
         tiny = number_text(1e-5)
         small = w.either(w.compare("olt", d0, tiny), w.compare("olt", d1, tiny))
         h0 = w.select(small, number_text(1e-6), w.divide(w.multiply(number_text(0.01), d0), d1))
@@ -134,7 +141,7 @@ class StepWriter:
         self.move((1.0,), h0)
         self.evaluate(w.add(time, h0), self.y, 1)
         change = weighted(lambda i: w.subtract(self.read(self.K(1), i), self.read(self.K(0), i)))
-        d2 = w.divide(self._mean_square(change), h0)
+        d2 = w.divide(self.mean_square(change), h0)
         steepest = w.maximum(d2, d1)
         # Kept inside the range of inverse_root; beyond it the other bounds decide anyway.
         bounded = w.multiply(number_text(100.0), steepest)
@@ -149,22 +156,13 @@ class StepWriter:
 
     # Between steps.
 
-    def extra_stages(self, time: str, h: str) -> None:
-        """The stages that only the dense output needs; y keeps its value."""
-        tableau = self.tableau
-        for k, node in enumerate(tableau.extra_nodes):
-            self.move(tableau.extra_matrix[k], h)
-            self.evaluate(self.w.fma(number_text(node), h, time), self.y, tableau.stages + 1 + k)
-        # The extra stages went through y: give it the new state again, by the same operations.
-        self.move(tableau.weights, h)
-
     def interpolate(self, instant: str, time: str, h: str, target: str) -> None:
         """The state at ``instant``, between ``time`` and ``time + h``, to the address ``target``."""
         w = self.w
         theta = w.divide(w.subtract(instant, time), h)
         weights = [
             (row, w.multiply(w.polynomial(theta, powers), theta))
-            for row, powers in enumerate(self.tableau.dense)
+            for row, powers in enumerate(self.tableau.dense_rows)
             if any(powers)
         ]
 
@@ -181,7 +179,7 @@ class StepWriter:
     def _scale(self, magnitude: str) -> str:
         return self.w.fma(magnitude, self._rtol, self._atol)
 
-    def _combination(self, weights: Row, index: str) -> str:
+    def combination(self, weights: Row, index: str) -> str:
         """``sum_j weights[j] K[j][index]``, zeros left out."""
         w = self.w
         total: str | None = None
@@ -191,21 +189,21 @@ class StepWriter:
                 total = w.multiply(*factors) if total is None else w.fma(*factors, total)
         return total or number_text(0.0)
 
-    def _total(self, term: Callable[[str, str], str]) -> str:
+    def total(self, term: Callable[[str, str], str]) -> str:
         """``sum_i``: ``term(index, sum so far)`` gives the next sum."""
         total = self.w.variable("double", number_text(0.0))
         self.w.for_each(self.n, lambda index: self.w.put(term(index, self.w.get(total)), total))
         return self.w.get(total)
 
-    def _square(self, element: Callable[[str], str]) -> str:
+    def square(self, element: Callable[[str], str]) -> str:
         """``sum_i element(i)^2``."""
 
         def term(index: str, total: str) -> str:
             value = element(index)
             return self.w.fma(value, value, total)
 
-        return self._total(term)
+        return self.total(term)
 
-    def _mean_square(self, element: Callable[[str], str]) -> str:
+    def mean_square(self, element: Callable[[str], str]) -> str:
         """``sqrt(sum_i element(i)^2 / n)``."""
-        return self.w.square_root(self.w.divide(self._square(element), number_text(float(self.n))))
+        return self.w.square_root(self.w.divide(self.square(element), number_text(float(self.n))))

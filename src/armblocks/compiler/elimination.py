@@ -1,0 +1,151 @@
+"""The plan of a sparse Gaussian elimination: in which order, and where entries fill in. No numbers, no LLVM.
+
+The matrix ``diagonal - h J`` of a stiff step has the same places filled at every step, so all of this is
+worked out once. Pivots stand on the diagonal; how good they were is judged by the numbers, at every step.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class JacobianPattern:
+    """Where the derivatives of ``(f, g)`` by ``(x, w)`` may differ from zero: entry k at rows[k], columns[k].
+
+    The first ``states`` rows and columns are those of the flow, the rest those of the implicit equations.
+    """
+
+    states: int
+    size: int
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elimination:
+    """``A = L U`` in the order ``columns[0], columns[1], …`` of the unknowns; all places count in this order.
+
+    Row ``i`` is equation ``equations[i]``. ``entries[i]`` are pairs of an entry of J and its place in row i,
+    ``lower[i]`` and ``upper[i]`` the places of L and U in it, beside the diagonal, rising.
+    """
+
+    columns: tuple[int, ...]
+    equations: tuple[int, ...]
+    entries: tuple[tuple[tuple[int, int], ...], ...]
+    lower: tuple[tuple[int, ...], ...]
+    upper: tuple[tuple[int, ...], ...]
+
+    @property
+    def filled(self) -> int:
+        """Numbers in L and U together."""
+        return len(self.columns) + sum(map(len, self.lower)) + sum(map(len, self.upper))
+
+
+def plan_elimination(pattern: JacobianPattern) -> Elimination:
+    """The elimination in the order of least degree, which keeps few entries filled in (George, Liu, *Computer
+    Solution of Large Sparse Positive Definite Systems*, chapter 5).
+
+    An implicit equation is put at the unknown that a matching of both gives it: its own place may be empty.
+    """
+    equation_of = _match(pattern)
+    place_of = {equation: place for place, equation in enumerate(equation_of)}
+    neighbours: list[set[int]] = [set() for _ in range(pattern.size)]
+    by_row: list[list[tuple[int, int]]] = [[] for _ in range(pattern.size)]
+    for entry, (row, column) in enumerate(zip(pattern.rows, pattern.columns)):
+        place = place_of[row]
+        by_row[place].append((entry, column))
+        if place != column:
+            neighbours[place].add(column)
+            neighbours[column].add(place)
+    order = _least_degree(neighbours)
+    position = {place: i for i, place in enumerate(order)}
+    entries = [tuple((entry, position[column]) for entry, column in by_row[place]) for place in order]
+    lower: list[tuple[int, ...]] = []
+    upper: list[tuple[int, ...]] = []
+    for i, row in enumerate(entries):
+        filled = {place for _, place in row}
+        left = [place for place in filled if place < i]
+        heapq.heapify(left)
+        eliminated: list[int] = []
+        while left:
+            k = heapq.heappop(left)
+            eliminated.append(k)
+            for place in upper[k]:
+                if place not in filled:
+                    filled.add(place)
+                    if place < i:
+                        heapq.heappush(left, place)
+        lower.append(tuple(eliminated))
+        upper.append(tuple(sorted(place for place in filled if place > i)))
+    return Elimination(
+        columns=tuple(order),
+        equations=tuple(equation_of[place] for place in order),
+        entries=tuple(entries),
+        lower=tuple(lower),
+        upper=tuple(upper),
+    )
+
+
+def _match(pattern: JacobianPattern) -> list[int]:
+    """The equation for every unknown: a state's own, and implicit ones by augmenting paths.
+
+    Where no complete matching exists the rest is put anywhere: the numbers will be singular, and say so.
+    """
+    n, size = pattern.states, pattern.size
+    equation_of = list(range(n)) + [-1] * (size - n)
+    unknowns: list[list[int]] = [[] for _ in range(size)]
+    for row, column in zip(pattern.rows, pattern.columns):
+        if row >= n and column >= n:
+            unknowns[row].append(column)
+    for start in range(n, size):
+        reached: dict[int, int] = {}  # unknown: the equation that came to it
+        queue = [start]
+        free = -1
+        while queue and free < 0:
+            equation = queue.pop()
+            for unknown in unknowns[equation]:
+                if unknown in reached:
+                    continue
+                reached[unknown] = equation
+                if equation_of[unknown] < 0:
+                    free = unknown
+                    break
+                queue.append(equation_of[unknown])
+        while free >= 0:
+            equation = reached[free]
+            before = next((place for place in range(n, size) if equation_of[place] == equation), -1)
+            equation_of[free] = equation
+            free = before
+    left = sorted(set(range(size)) - set(equation_of))
+    return [left.pop() if equation < 0 else equation for equation in equation_of]
+
+
+def _least_degree(neighbours: Sequence[set[int]]) -> list[int]:
+    """Eliminate an unknown with the fewest neighbours, join these to one another, and so on."""
+    around = [set(near) for near in neighbours]
+    heap = [(len(near), place) for place, near in enumerate(around)]
+    heapq.heapify(heap)
+    order: list[int] = []
+    done = [False] * len(around)
+    left = len(around)
+    while heap:
+        degree, place = heapq.heappop(heap)
+        if done[place] or degree != len(around[place]):
+            continue
+        done[place] = True
+        order.append(place)
+        near = around[place]
+        left -= 1
+        if len(near) == left:
+            # All that is left is joined to all: any order is as good.
+            order.extend(sorted(near))
+            break
+        for other in near:
+            around[other] |= near
+            around[other] -= {other, place}
+            heapq.heappush(heap, (len(around[other]), other))
+        around[place] = set()
+    return order

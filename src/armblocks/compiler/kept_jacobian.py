@@ -1,0 +1,68 @@
+"""The Jacobian of a system's flow: differentiated when a stiff solver first asks, then kept on disk."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from armblocks.compiler import cache
+from armblocks.compiler.elimination import JacobianPattern
+from armblocks.compiler.kept import keep_tape, kept_tape, tape_of
+from armblocks.compiler.tape import Tape
+
+if TYPE_CHECKING:
+    from armblocks.equations import FlowJacobian, HybridSystem
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptJacobian:
+    """Where its entries are, and the digest of the tape that works them out."""
+
+    pattern: JacobianPattern
+    digest: str
+    tape: Callable[[], Tape]
+
+
+def kept_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSystem]) -> KeptJacobian:
+    """The Jacobian of the flow whose tapes have these digests.
+
+    The system is traced, and CasADi loaded, only where the disk cache lacks the result.
+    """
+    name = cache.object_name(("flow_jacobian", derivative, residual))
+    stored = cache.load(name)
+    if stored is not None:
+        try:
+            kept = json.loads(stored)
+            pattern = JacobianPattern(
+                states=int(kept["states"]),
+                size=int(kept["size"]),
+                rows=tuple(kept["rows"]),
+                columns=tuple(kept["columns"]),
+            )
+            digest = str(kept["digest"])
+            tape = lambda: kept_tape(digest, lambda: _traced(trace).function)  # noqa: E731
+            return KeptJacobian(pattern=pattern, digest=digest, tape=tape)
+        except (ValueError, KeyError, TypeError):
+            pass  # a record of another make is made anew
+    traced = _traced(trace)
+    made = tape_of(traced.function)
+    states, size = (slot.size for slot in (traced.function.inputs["x"], traced.function.outputs["T"]))
+    pattern = JacobianPattern(states=states, size=size, rows=traced.rows, columns=traced.columns)
+    keep_tape(made)
+    record = {
+        "states": states,
+        "size": size,
+        "rows": pattern.rows,
+        "columns": pattern.columns,
+        "digest": made.digest,
+    }
+    cache.store(name, json.dumps(record).encode())
+    return KeptJacobian(pattern=pattern, digest=made.digest, tape=lambda: made)
+
+
+def _traced(trace: Callable[[], HybridSystem]) -> FlowJacobian:
+    from armblocks.equations import trace_flow_jacobian
+
+    return trace_flow_jacobian(trace())

@@ -1,0 +1,196 @@
+"""A Rosenbrock method as data: linearly implicit steps with the exact Jacobian, for stiff systems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armblocks.compiler.butcher_tableau import CONSISTENCY, ButcherTableau, Row
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class RosenbrockTableau:
+    """One Rosenbrock method with the polynomial that gives its values between the steps.
+
+    One step of size ``h`` from ``(t, x)``, with ``J = df/dx`` and ``T = df/dt`` there and ``s`` stages::
+
+        (I / gamma - h J) k[i] = f(t + nodes[i] h,  x + h * sum_j matrix[i][j] k[j])
+                                 + sum_j couplings[i][j] k[j] + h time_weights[i] T         j < i
+        x_new = x + h * sum_j weights[j] k[j]
+        x(t + theta h) = x + h * sum_j (sum_m dense[j][m] theta^(m+1)) k[j]
+
+    This is the form in which no product with ``J`` is left (Hairer, Wanner II, IV.7, equation (7.25), with
+    ``u = h k``); :func:`from_textbook` makes it from ``alpha``, ``Gamma``, ``b``. The estimate of the error
+    is ``h * sum_j error[j] k[j]``, of order ``error_order``; without ``error`` the step is fixed.
+
+    Where implicit equations ``0 = g(t, x, w)`` belong to the system, ``J`` and ``T`` are those along their
+    solution ``w(t, x)``: the matrix gets the rows of ``g`` below it and is eliminated as a whole.
+    """
+
+    name: str
+    title: str
+    source: str
+    order: int
+    dense_order: int
+    gamma: float
+    nodes: Row
+    matrix: tuple[Row, ...]
+    couplings: tuple[Row, ...]
+    time_weights: Row
+    weights: Row
+    dense: tuple[Row, ...]
+    aliases: tuple[str, ...] = ()
+    error: Row | None = None
+    error_order: int = 0
+
+    def __post_init__(self) -> None:
+        s = self.stages
+        triangular = [list(range(s)), [len(row) for row in self.matrix], [len(row) for row in self.couplings]]
+        rows = {
+            "matrix": triangular[1] == triangular[0],
+            "couplings": triangular[2] == triangular[0],
+            "time_weights": len(self.time_weights) == s,
+            "weights": len(self.weights) == s,
+            "error": self.error is None or len(self.error) == s,
+            "dense": len(self.dense) == s and len({len(row) for row in self.dense}) == 1,
+        }
+        for field, fits in rows.items():
+            if not fits:
+                raise InputError(
+                    f"'{field}' does not fit the {s} stages",
+                    where=f"integrator {self.name}",
+                    allowed="row i of a matrix has i numbers; see RosenbrockTableau",
+                )
+        # Back in the textbook's form, rows add up to the nodes, to the weights of T, to one and to zero.
+        inverse = np.eye(s) / self.gamma - _square(self.couplings)
+        sums = np.linalg.solve(inverse, np.ones(s))
+        checks = {f"matrix row {i}": (float(_square(self.matrix)[i] @ sums), self.nodes[i]) for i in range(s)}
+        checks |= {f"row {i} of Gamma": (float(sums[i]), self.time_weights[i]) for i in range(s)}
+        checks["weights"] = (float(np.array(self.weights) @ sums), 1.0)
+        ends = [sum(row) for row in self.dense]
+        checks |= {f"dense row {j} at the step's end": (ends[j], w) for j, w in enumerate(self.weights)}
+        if self.error is not None:
+            checks["error"] = (float(np.array(self.error) @ sums), 0.0)
+        for what, (found, expected) in checks.items():
+            # Published with 15 or 16 digits, in products with numbers of up to 300.
+            if abs(found - expected) > 100 * CONSISTENCY * max(1.0, abs(expected)):
+                raise InputError(
+                    f"{what} adds up to {found!r}",
+                    where=f"integrator {self.name}",
+                    allowed=f"{expected!r}",
+                    fix="check the coefficients against their source",
+                )
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether the method estimates its error and chooses its steps."""
+        return self.error is not None
+
+    @property
+    def stages(self) -> int:
+        """Systems of linear equations that one step solves."""
+        return len(self.nodes)
+
+    @property
+    def rows(self) -> int:
+        """Rows of ``K``: the derivative at the step's start, the stages, the derivative at its end."""
+        return self.stages + 2
+
+    @property
+    def end_row(self) -> int:
+        """The row of ``K`` with the derivative at the new point."""
+        return self.stages + 1
+
+    @property
+    def error_row(self) -> Row | None:
+        """``error`` over the rows of ``K``."""
+        return None if self.error is None else (0.0, *self.error)
+
+    @property
+    def dense_rows(self) -> tuple[Row, ...]:
+        """``dense`` over the rows of ``K``."""
+        nothing = (0.0,) * len(self.dense[0])
+        return (nothing, *self.dense, nothing)
+
+    @property
+    def content(self) -> str:
+        """All numbers of the method as text, exactly: the part of a cache key that stands for it."""
+        numbers = (
+            self.gamma,
+            self.nodes,
+            self.matrix,
+            self.couplings,
+            self.time_weights,
+            self.weights,
+            self.dense,
+            self.error,
+            self.error_order,
+        )
+        return repr(("rosenbrock", numbers))
+
+
+Tableau = ButcherTableau | RosenbrockTableau
+"""A method as data, of either kind."""
+
+
+def from_textbook(
+    *,
+    alpha: Sequence[Sequence[float]],
+    gamma: Sequence[Sequence[float]],
+    b: Sequence[float],
+    dense: Sequence[Sequence[float]],
+    error: Sequence[float] | None = None,
+) -> dict[str, object]:
+    """The fields of a :class:`RosenbrockTableau` from the usual form of a method.
+
+    ``(I - h gamma[i][i] J) k[i] = f(t + alpha_i h, x + h sum_j alpha[i][j] k[j]) + h J sum_j gamma[i][j] k[j]
+    + h gamma_i T`` with ``alpha_i``, ``gamma_i`` the sums of the rows, ``x_new = x + h sum_j b[j] k[j]``
+    (Hairer, Wanner II, IV.7, equation (7.4)). Row i of ``alpha`` has i numbers, row i of ``gamma`` i + 1;
+    ``dense`` and ``error`` are weights of these ``k``.
+    """
+    G = _square(gamma)
+    inverse = np.linalg.inv(G)
+    A = _square(alpha)
+    mixed, couplings = A @ inverse, np.diag(1.0 / np.diag(G)) - inverse
+    return {
+        "gamma": float(G[0, 0]),
+        "nodes": _row(A.sum(axis=1)),
+        "matrix": tuple(_row(mixed[i, :i]) for i in range(len(b))),
+        "couplings": tuple(_row(couplings[i, :i]) for i in range(len(b))),
+        "time_weights": _row(G.sum(axis=1)),
+        "weights": _row(np.array(b) @ inverse),
+        "dense": tuple(_row(row) for row in (np.array(dense).T @ inverse).T),
+        "error": None if error is None else _row(np.array(error) @ inverse),
+    }
+
+
+def stiffly_accurate_dense(weights: Row, inner: Sequence[Row]) -> tuple[Row, ...]:
+    """``dense`` of the Rodas family from the published ``H``, ``(m, s)``.
+
+    ``x(theta) = (1 - theta) x + theta (x_new + (1 - theta) (y_1 + theta (y_2 + theta y_3)))`` with
+    ``y_i = h sum_j H[i][j] k[j]`` (Hairer, Wanner II, VI.4).
+    """
+    rows: list[Row] = []
+    for j, weight in enumerate(weights):
+        powers = [weight] + [0.0] * len(inner)
+        for m, row in enumerate(inner):  # theta (1 - theta) theta^m
+            powers[m] += row[j]
+            powers[m + 1] -= row[j]
+        rows.append(tuple(powers))
+    return tuple(rows)
+
+
+def _square(rows: Sequence[Sequence[float]]) -> np.ndarray:
+    """A lower triangle as a square matrix."""
+    matrix = np.zeros((len(rows), len(rows)))
+    for i, row in enumerate(rows):
+        matrix[i, : len(row)] = row
+    return matrix
+
+
+def _row(values: ArrayLike) -> Row:
+    return tuple(float(value) for value in np.asarray(values))

@@ -1,0 +1,46 @@
+"""The exact derivative of a system's flow, and of its implicit equations, by states, unknowns and time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from casadi import SX, densify, jacobian, vertcat
+
+from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.signatures import signature
+from armblocks.equations.traced_function import TracedFunction
+
+
+@dataclass(frozen=True, eq=False)
+class FlowJacobian:
+    """Derivatives of ``F = (derivative, residual)`` by ``v = (x, w)`` and by the time.
+
+    ``function`` has the inputs of ``derivative`` and the outputs ``J``, the entries of ``dF/dv`` that are not
+    zero for structural reasons, and ``T (nx + nw,)``, ``dF/dt``. Entry ``k`` stands in row ``rows[k]`` and
+    column ``columns[k]``.
+    """
+
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    function: TracedFunction
+
+
+def trace_flow_jacobian(system: HybridSystem) -> FlowJacobian:
+    """Differentiate the traced equations; the work is shared between columns that do not overlap."""
+    flow = system.derivative
+    t, x, z, w, p = flow.arguments
+    (residual,) = system.residual.casadi_function().call([t, x, z, w, p], True, False)
+    F, v = vertcat(flow.results[0], residual), vertcat(x, w)
+    J = jacobian(F, v)
+    entries = SX(0, 1) if J.nnz() == 0 else vertcat(*J.nonzeros())
+    return FlowJacobian(
+        rows=tuple(J.sparsity().row()),
+        columns=tuple(J.sparsity().get_col()),
+        function=TracedFunction(
+            "flow_jacobian",
+            flow.inputs,
+            signature(("J", (J.nnz(),)), ("T", (F.numel(),))),
+            flow.arguments,
+            (entries, densify(jacobian(F, t))),
+        ),
+    )
