@@ -4,6 +4,7 @@ from types import ModuleType
 
 from armblocks.blocks import (
     arithmetic,
+    arm_plant,
     continuous,
     delays,
     discontinuities,
@@ -50,6 +51,7 @@ from armblocks.blocks.arithmetic import (
     Sqrt,
     UnaryMinus,
 )
+from armblocks.blocks.arm_plant import ArmPlant
 from armblocks.blocks.continuous import PID, Derivative, Integrator, StateSpace, TransferFunction
 from armblocks.blocks.delays import Delay, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
 from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
@@ -241,6 +243,7 @@ BLOCKS = BlockLibrary(
         joint_paths,
         joint_control,
         drives,
+        arm_plant,
         expression,
     )
     for kind in _defined_in(family)
@@ -253,6 +256,7 @@ __all__ = [
     "Abs",
     "AngleAxis2T",
     "AngleDifference",
+    "ArmPlant",
     "Assignment",
     "Atan2",
     "Backlash",

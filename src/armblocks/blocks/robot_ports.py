@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from casadi import SX
 
-from armblocks.diagram import Port, rate_unit
+from armblocks.diagram import Block, Port, rate_unit, shape_of
 from armblocks.equations import TracedFunction, flatten, unflatten
+from armblocks.errors import InputError
 from armblocks.robot import Robot
 
 
@@ -40,3 +41,14 @@ def qdd_port(robot: Robot, name: str = "qdd") -> Port:
 def tau_port(robot: Robot, doc: str) -> Port:
     """Joint forces (n,)."""
     return Port("tau", doc, {"rad": "N m", "m": "N"}.get(coordinate_unit(robot), ""), (robot.n,))
+
+
+def check_joint_values(block: Block, robot: Robot, name: str) -> None:
+    """Raise ``InputError`` unless a parameter has one number, or one for each joint."""
+    shape = shape_of(block.parameter_value(name))
+    if shape not in ((), (robot.n,)):
+        raise InputError(
+            f"{name} has {shape[0]} joints",
+            where=block.type_name(),
+            allowed=f"{robot.n}, as '{robot.name}' has, or one number for all",
+        )

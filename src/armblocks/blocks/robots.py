@@ -13,7 +13,7 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks import dynamics
-from armblocks.blocks.robot_ports import apply_traced, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.robot_ports import apply_traced, check_joint_values, q_port, qd_port, qdd_port, tau_port
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -244,13 +244,7 @@ class ForwardDynamics(Block):
 
     def check(self) -> None:
         for name in ("q0", "qd0"):
-            shape = shape_of(self.parameter_value(name))
-            if shape not in ((), (self.robot.n,)):
-                raise InputError(
-                    f"{name} has {shape[0]} joints",
-                    where="ForwardDynamics",
-                    allowed=f"{self.robot.n}, as '{self.robot.name}' has, or one number for all",
-                )
+            check_joint_values(self, self.robot, name)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (tau_port(self.robot, "torque or force at the joints"),)

@@ -1,0 +1,174 @@
+"""Equations of motion of an arm some of whose joints are held: by dry friction that sticks, or by a stop.
+
+Which joints are held is a question of a moment (:func:`settled` answers it); while the time flows it stays,
+so that the equations are smooth. Sources: Siciliano et al., *Robotics*, 2009, 7.3 (equations of motion);
+Pfeiffer, Glocker, *Multibody Dynamics with Unilateral Contacts*, 1996 (stick and slip as a complementarity,
+impacts).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from casadi import SX, if_else, logic_and, logic_or, mtimes, sign, vertcat
+from numpy.typing import NDArray
+
+from armblocks.dynamics.base_parameters import regrouped
+from armblocks.dynamics.crba import SquareMatrix, crba, solve_factored
+from armblocks.dynamics.forward import check_accelerations_exist
+from armblocks.dynamics.joint_motion import entries, joint_motions
+from armblocks.dynamics.loads import at_tip, carrying
+from armblocks.dynamics.rnea import rnea
+from armblocks.robot.robot import Robot
+from armblocks.robot.tree import KinematicTree
+
+ROUNDING = 1e-9
+"""A torque that works against a joint's motion counts beyond this part of its friction, as it breaks away."""
+_SOME_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class DryFriction:
+    """Coulomb friction of the joints, N m or N: ``forward`` >= 0 and ``backward`` <= 0, each (n,).
+
+    A joint sticks while what would move it lies within ``breakaway`` times these two.
+    """
+
+    forward: NDArray[np.float64]
+    backward: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, robot: Robot) -> DryFriction:
+        """The joint's share of the motors' Coulomb friction, by the robot's friction model."""
+        limits = np.zeros((robot.n, 2))
+        for k, motor in enumerate(robot.motors):
+            if motor is not None:
+                limits[k] = robot.friction_model.factors(motor.gear_ratio)[1] * np.array(
+                    motor.coulomb_friction
+                )
+        return cls(limits[:, 0] + 0.0, limits[:, 1] + 0.0)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """The joints that have any."""
+        return tuple(int(k) for k in np.flatnonzero((self.forward != 0.0) | (self.backward != 0.0)))
+
+    def sliding(self, mode: SX) -> SX:
+        """The torque against the motion of joints that slide forwards (1) or backwards (-1); 0 of others."""
+        return if_else(mode > 0.0, SX(self.forward), if_else(mode < 0.0, SX(self.backward), 0.0))
+
+
+def viscous_friction(robot: Robot) -> NDArray[np.float64]:
+    """Torque per joint speed (n,), N m s/rad or N s/m, by the robot's friction model."""
+    return np.array(
+        [
+            robot.friction_model.factors(motor.gear_ratio)[0] * motor.viscous_friction if motor else 0.0
+            for motor in robot.motors
+        ]
+    )
+
+
+class JointEquations:
+    """``M(q) qdd + bias(q, qd) = torque`` at one state, where ``torque`` is all that acts at the joints.
+
+    ``bias`` has gravity, velocity terms and the ``wrench`` (see :mod:`armblocks.dynamics.traces`); ``M`` and
+    ``bias`` have the ``payload``. Raises RobotError, naming the joint, where one has nothing to accelerate.
+    """
+
+    def __init__(
+        self, robot: Robot, q: SX, qd: SX, wrench: SX | None = None, payload: SX | None = None
+    ) -> None:
+        tree = regrouped(KinematicTree.of(robot))
+        check_accelerations_exist(tree if payload is None else carrying(tree, _SOME_PAYLOAD))
+        on_bodies = None if wrench is None else at_tip(tree, wrench)
+        if payload is not None:
+            tree = carrying(tree, payload)
+        self._tree = tree
+        joints = joint_motions(tree, q)
+        still = [0.0] * tree.n
+        self.bias = SX(vertcat(*rnea(tree, joints, entries(qd), still, tree.gravity, on_bodies)))
+        self._M: SquareMatrix = crba(tree, joints)
+        place = sorted(range(tree.n), key=lambda i: tree.bodies[i].joint)
+        self.M = SX(vertcat(*(vertcat(*(SX(self._M[i][j]) for j in place)).T for i in place)))
+
+    def solve(self, right: SX, free: SX) -> SX:
+        """``x`` with ``M x = right`` in the rows of the free joints (1), and exactly 0 of the others (0)."""
+        n, bodies = self._tree.n, self._tree.bodies
+        on = [free[body.joint] for body in bodies]
+        masked: SquareMatrix = [
+            [self._M[i][j] if i == j else self._M[i][j] * on[i] * on[j] for j in range(n)] for i in range(n)
+        ]
+        solution = solve_factored(
+            self._tree, masked, [right[body.joint] * on[i] for i, body in enumerate(bodies)]
+        )
+        result = SX(n, 1)
+        for body, value in zip(bodies, solution):
+            result[body.joint] = value
+        return result
+
+    def accelerations(self, torque: SX, free: SX) -> SX:
+        """``qdd`` (n,), exactly 0 of the joints that are held."""
+        return self.solve(torque - self.bias, free)
+
+    def unbalanced(self, torque: SX, qdd: SX) -> SX:
+        """What is left to move each joint (n,): of a held one, the torque that has to hold it."""
+        return torque - self.bias - mtimes(self.M, qdd)
+
+    def stopped(self, qd: SX, stopping: SX) -> SX:
+        """Speeds after an impact that stops some joints (1) and leaves the others free (0).
+
+        The impulse acts at the joints that stop and at no other: ``M (qd+ - qd)`` is 0 elsewhere.
+        """
+        halt = -stopping * qd
+        change = self.solve(-mtimes(self.M, halt), 1.0 - stopping)
+        return if_else(stopping, 0.0, qd + change)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """How joints stand: ``mode`` 1 slides forwards (or is free), -1 backwards, 0 is held;
+    ``contact`` 1 at the upper stop, -1 at the lower one, 0 at none. Each (n,)."""
+
+    mode: SX
+    contact: SX
+
+
+def from_rest(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
+    """Whither a held joint goes: 1 forwards, -1 backwards, 0 where friction or its stop holds it."""
+    forwards = logic_and(held_torque > forward, contact <= 0.0)
+    backwards = logic_and(held_torque < backward, contact >= 0.0)
+    return forwards - backwards
+
+
+def settled(
+    equations: JointEquations, qd: SX, driving: SX, start: Rest, friction: DryFriction, breakaway: SX
+) -> Rest:
+    """Which joints are held at this moment, and whither the others slide.
+
+    ``driving`` is the torque (n,) at the joints without dry friction and rigid stops; ``start`` a first
+    guess. A joint that moves slides. Of those at rest, all that friction cannot hold are let go, and all that
+    would slide against their own direction are held, as many rounds as there are joints. (The accelerations
+    are those of least constraint, min 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction |qdd|, which is
+    convex: there is one answer.) What is not settled then, the guards find.
+    """
+    n = qd.numel()
+    dry = np.zeros(n)
+    dry[list(friction.joints)] = 1.0
+    has_friction = SX(dry)
+    forward, backward = breakaway * SX(friction.forward), breakaway * SX(friction.backward)
+    slack = ROUNDING * SX(friction.forward - friction.backward)
+    mode, contact = start.mode, start.contact
+    for round_ in range(n + 1):
+        torque = driving - friction.sliding(mode)
+        qdd = equations.accelerations(torque, mode != 0.0)
+        released = from_rest(equations.unbalanced(torque, qdd), contact, forward, backward)
+        slides = mode
+        if round_ < n:
+            inertia = SX(vertcat(*(equations.M[i, i] for i in range(n))))
+            slides = if_else(mode * qdd * inertia < -slack, 0.0, mode)
+        dry_mode = if_else(qd != 0.0, sign(qd), if_else(mode == 0.0, released, slides))
+        held = logic_and(logic_and(contact != 0.0, mode == 0.0), released == 0.0)
+        mode = if_else(has_friction, dry_mode, if_else(held, 0.0, 1.0))
+        contact = if_else(logic_or(mode != 0.0, qd != 0.0), 0.0, contact)
+    return Rest(mode, contact)
