@@ -15,7 +15,18 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.robot_ports import check_joint_values, q_port, qd_port, qdd_port, tau_port
 from armblocks.blocks.switching import JUST
-from armblocks.diagram import Block, Guard, ParameterKind, Port, Shapes, Signals, State, parameter
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+)
 from armblocks.dynamics.held_joints import (
     DryFriction,
     JointEquations,
@@ -49,6 +60,12 @@ class ArmPlant(Block):
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Robot with Dry Friction and Stops"
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The Puma sinks from a stretched pose against the friction of its motors, and rests for good.",
+        parameters={"robot": "puma560", "q0": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0)},
+        inputs={"tau": made("Constant", value=(0.0,) * 6)},
+        shown=("q", "qd", "friction"),
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     q0: ArrayLike = parameter(

@@ -19,7 +19,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     shape_of,
 )
@@ -35,6 +37,12 @@ class DcMotor(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "DC Motor"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The motor runs up under 12 V, and a load from 3 s on slows it and draws current.",
+        parameters={"R": 2.0, "L": 0.1, "k": 0.3, "J": 0.02, "b": 0.01},
+        inputs={"v": made("Constant", value=12.0), "load": made("Step", time=3.0, final=0.5)},
+        shown=("w", "i"),
+    )
 
     R: float = parameter(1.0, above=0.0, doc="resistance of the armature", unit="ohm")
     L: float = parameter(0.5, above=0.0, doc="inductance of the armature", unit="H")
@@ -88,6 +96,12 @@ class MotorWinding(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Motor Winding"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The current of a motor at rest follows 24 V within its time constant L / R of 0.5 s.",
+        parameters={"R": 2.0, "L": 1.0, "gear_ratio": 50.0},
+        inputs={"v": made("Step", time=1.0, final=24.0), "w": made("Constant", value=0.0)},
+        shown=("v", "i", "tau"),
+    )
 
     R: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="resistance", unit="ohm")
     L: ArrayLike = parameter(1e-3, kind=ParameterKind.ARRAY, above=0.0, doc="inductance", unit="H")
