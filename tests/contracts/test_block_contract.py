@@ -134,6 +134,9 @@ def test_its_equations_have_the_shapes_that_it_infers(kind: type[Block]) -> None
     block = make(kind)
     tried = list(fitting_shapes(block))
     assert tried, "no input shapes fit"
+    if kind.virtual:  # it is wires: what it leads where is tested in diagram/test_hierarchy.py
+        assert numbers(block, tried[0]) == []
+        return
     for shapes in tried:
         equations = block_equations(block, shapes)
         stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}

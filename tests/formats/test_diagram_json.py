@@ -28,6 +28,7 @@ from armblocks.blocks import (
     Rne,
     Saturation,
     Scope,
+    Subsystem,
     Sum,
 )
 from armblocks.diagram import Diagram, DiagramBuilder, Placement, with_parameters
@@ -484,3 +485,54 @@ def test_a_description_is_kept_and_may_be_absent() -> None:
     described = dataclasses.replace(small(), description="two blocks <and> a wire")
     assert read(write(described)) == described
     assert "description" not in json.loads(write(small()))
+
+
+# -- diagrams inside blocks --------------------------------------------------------------------------------
+
+
+def _nested(depth: int) -> Diagram:
+    builder = DiagramBuilder("inner", extras={"": {"colour": "red"}})
+    builder.output("y", builder.add("gain", Gain(gain=2.0), builder.input("u", unit="m")))
+    builder.place("gain", 10.0, 20.0)
+    diagram = builder.build()
+    for level in range(depth):
+        builder = DiagramBuilder(f"level {level}")
+        builder.output("y", builder.add("sub", Subsystem(diagram=diagram), builder.input("u")))
+        diagram = builder.build()
+    return diagram
+
+
+def test_diagrams_inside_blocks_are_written_and_read_again(schema: jsonschema.Draft202012Validator) -> None:
+    for depth in (1, 2, 99):
+        diagram = _nested(depth)
+        data = diagram_to_bytes(diagram, load_robot)
+        again = diagram_from_bytes(data, "model.json", BLOCKS, load_robot)
+        assert again == diagram
+        assert diagram_to_bytes(again, load_robot) == data
+        assert data.count(b'"format"') == 1
+        assert b'"gain": {"x": 10, "y": 20}' in data
+        assert b'"colour": "red"' in data
+        if depth < 10:  # the validator recurses
+            schema.validate(json.loads(data))
+
+
+def test_faults_inside_a_block_are_told_with_line_and_path() -> None:
+    text = diagram_to_bytes(_nested(1), load_robot).decode()
+    wrong = text.replace('"gain": 2', '"gain": "two"')
+    line = wrong[: wrong.index('"two"')].count("\n") + 1
+    with pytest.raises(FormatError) as caught:
+        diagram_from_bytes(wrong.encode(), "model.json", BLOCKS, load_robot)
+    assert f"model.json:{line}, blocks.sub.diagram.blocks.gain.parameters.gain" in str(caught.value)
+    with pytest.raises(UnknownNameError, match="there is no parameter of Subsystem named 'diagram'"):
+        diagram_from_bytes(
+            text.replace('"parameters": {}', '"parameters": {"diagram": {}}').encode(),
+            "m",
+            BLOCKS,
+            load_robot,
+        )
+
+
+def test_too_many_diagrams_inside_each_other_are_refused() -> None:
+    start = '{"format": 1, "blocks": {' + '"s": {"type": "Subsystem", "diagram": {"blocks": {' * 110
+    with pytest.raises(FormatError, match="objects and arrays lie too deep in each other"):
+        diagram_from_bytes((start + "}" * 332).encode(), "model.json", BLOCKS, load_robot)

@@ -204,7 +204,9 @@ from armblocks.blocks.sinks import Display, Scope, Terminator, ToWorkspace, XYGr
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
 from armblocks.blocks.transforms import T2xyz, Xyz2T
 from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
-from armblocks.diagram import Block, BlockLibrary
+from armblocks.diagram import Block, BlockLibrary, structure, virtual_wiring
+from armblocks.diagram.structure import Inport, Outport, Subsystem
+from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 
 
 def _defined_in(family: ModuleType) -> list[type[Block]]:
@@ -226,6 +228,8 @@ BLOCKS = BlockLibrary(
         discrete,
         discrete_filters,
         routing,
+        virtual_wiring,
+        structure,
         transforms,
         robots,
         sinks,
@@ -262,6 +266,9 @@ __all__ = [
     "Backlash",
     "BandLimitedWhiteNoise",
     "Bias",
+    "BusAssignment",
+    "BusCreator",
+    "BusSelector",
     "CTraj",
     "CartesianToPolar",
     "Chirp",
@@ -308,14 +315,17 @@ __all__ = [
     "FirstOrderLag",
     "Fkine",
     "ForwardDynamics",
+    "From",
     "FromTable",
     "Gain",
+    "Goto",
     "GravityCompensation",
     "Gravload",
     "Ground",
     "Hypot",
     "IndexVector",
     "Inertia",
+    "Inport",
     "Integrator",
     "IntegratorLimited",
     "InterpolationUsingPrelookup",
@@ -351,6 +361,7 @@ __all__ = [
     "MultiportSwitch",
     "Mux",
     "Norm",
+    "Outport",
     "PolarToCartesian",
     "Polynomial",
     "PoseInverse",
@@ -398,6 +409,7 @@ __all__ = [
     "Step",
     "StickSlipFriction",
     "SubMatrix",
+    "Subsystem",
     "Sum",
     "SumOfElements",
     "Switch",

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
-from armblocks.diagram import ViewKind
+from armblocks.diagram import ViewKind, diagram_views
 from armblocks.report.analysis import JointSummary, LimitKind, people_unit, summarise
 from armblocks.report.motion import motions
 from armblocks.report.numbers import wall_time
@@ -50,7 +50,7 @@ def factor_text(factor: float) -> str:
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:
     """The last value of everything that a Display block shows."""
     shown = table(("display", "left"), ("signal", "left"), ("at the end", "left"), ("", "left"))
-    for block, view in diagram.views():
+    for block, view in diagram_views(diagram):
         if view.kind is not ViewKind.VALUE or not result.time.size:
             continue
         labels = view.labels or ("",) * len(view.signals)

@@ -5,15 +5,25 @@ from armblocks.diagram.block_equations import BlockEquations, SlotKind, block_eq
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.diagram import Connection, Diagram, Placement
+from armblocks.diagram.hierarchy import (
+    Bus,
+    Carried,
+    FlatForm,
+    diagram_views,
+    flat_diagram,
+    flatten_hierarchy,
+)
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
 from armblocks.diagram.port import Guard, Port, PortRef, State, View, ViewKind
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
+from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
 from armblocks.diagram.variation import with_parameters
+from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
 
 __all__ = [
@@ -22,13 +32,23 @@ __all__ = [
     "BlockEquations",
     "BlockHandle",
     "BlockLibrary",
+    "Bus",
+    "BusAssignment",
+    "BusCreator",
+    "BusSelector",
+    "Carried",
     "Connection",
     "Diagram",
     "DiagramBuilder",
     "DiagramShapes",
     "Fed",
     "Feed",
+    "FlatForm",
+    "From",
+    "Goto",
     "Guard",
+    "Inport",
+    "Outport",
     "Parameter",
     "ParameterKind",
     "Placement",
@@ -38,6 +58,7 @@ __all__ = [
     "Signals",
     "SlotKind",
     "State",
+    "Subsystem",
     "View",
     "ViewKind",
     "WorkedExample",
@@ -45,6 +66,9 @@ __all__ = [
     "broadcast",
     "check_block_name",
     "check_diagram",
+    "diagram_views",
+    "flat_diagram",
+    "flatten_hierarchy",
     "infer_shapes",
     "infer_units",
     "integral_unit",

@@ -60,6 +60,8 @@ class Block(ABC):
 
     sampled: ClassVar[bool] = False
     """Whether the block works at the ticks of a clock only; it then has the parameter ``sample_time``."""
+    virtual: ClassVar[bool] = False
+    """Whether the block stands for wires only: it has no equations and is gone before a diagram is traced."""
     rated_inputs: ClassVar[tuple[str, ...]] = ()
     """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
     example: ClassVar[WorkedExample] = WorkedExample()

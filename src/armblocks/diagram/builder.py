@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from typing import Any
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.diagram import Connection, Diagram, Placement
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.diagram.port import PortRef
+from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, UnknownNameError
 
@@ -44,7 +48,15 @@ class DiagramBuilder:
         height = builder.add("height", Integrator(initial=10.0), speed)
         diagram = builder.build()
 
-    The names of blocks become the paths of signals, ``"height/y"``. Errors are ``DiagramError`` or
+    The names of blocks become the paths of signals, ``"height/y"``. A diagram inside a block is built in
+    place, and its signals are ``"controller/error/y"``::
+
+        with builder.subsystem("controller", wanted, position) as inner:
+            error = inner.add("error", Sum(signs="+-"), inner.input("wanted"), inner.input("position"))
+            inner.output("force", inner.add("gain", Gain(gain=5.0), error))
+        builder.connect(builder["controller"], motor["force"])
+
+    Errors are ``DiagramError`` or
     ``UnknownNameError``, at the line that makes them.
     """
 
@@ -67,7 +79,12 @@ class DiagramBuilder:
         self._layout: dict[str, Placement] = {}
 
     def add(self, name: str, block: Block, *inputs: Source, **inputs_by_port: Source) -> BlockHandle:
-        """Add a block under a new name and connect its inputs, in order or by port name."""
+        """Add a block under a new name and connect its inputs, in order or by port name.
+
+        In and Out blocks without a number get the next one.
+        """
+        if isinstance(block, Inport | Outport) and block.port == 0:
+            block = dataclasses.replace(block, port=self._next_port(type(block)))
         where = f"diagram '{self.name}'"
         check_block_name(name, where)
         other = self._taken.get(folded(name))
@@ -99,6 +116,25 @@ class DiagramBuilder:
         for port_name, source in inputs_by_port.items():
             self.connect(source, PortRef(name, port_name))
         return handle
+
+    def __getitem__(self, name: str) -> BlockHandle:
+        """The block of this name; raises ``UnknownNameError`` with the nearest."""
+        return BlockHandle(name, self._known(name))
+
+    def input(self, name: str, **parameters: Any) -> BlockHandle:
+        """Add an In block: the next input of the subsystem that this diagram is inside."""
+        return self.add(name, Inport(**parameters))
+
+    def output(self, name: str, source: Source, **parameters: Any) -> BlockHandle:
+        """Add an Out block: the next output of the subsystem that this diagram is inside."""
+        return self.add(name, Outport(**parameters), source)
+
+    @contextmanager
+    def subsystem(self, name: str, *inputs: Source, **inputs_by_port: Source) -> Generator[DiagramBuilder]:
+        """Build a diagram inside a block of this diagram; the block is added when the ``with`` ends."""
+        inner = DiagramBuilder(name)
+        yield inner
+        self.add(name, Subsystem(diagram=inner.build()), *inputs, **inputs_by_port)
 
     def connect(self, source: Source, target: Source) -> None:
         """Connect an output port to an input port; a block stands for its only output or only input."""
@@ -142,6 +178,10 @@ class DiagramBuilder:
         )
         check_diagram(diagram)
         return diagram
+
+    def _next_port(self, kind: type[Inport | Outport]) -> int:
+        given = [block.port for block in self._blocks.values() if isinstance(block, kind)]
+        return max(given, default=0) + 1
 
     def _known(self, name: str) -> Block:
         if name not in self._blocks:

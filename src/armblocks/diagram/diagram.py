@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
+from typing import TypeVar, cast
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.port import PortRef, View
+from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
 from armblocks.errors import UnknownNameError
+
+_Kept = TypeVar("_Kept")
 
 
 @dataclass(frozen=True, order=True)
@@ -55,6 +58,7 @@ class Diagram:
     extras: Mapping[str, object] = field(default_factory=dict[str, object])
     description: str = ""
     """One line for people: what the diagram shows."""
+    _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
 
     def __post_init__(self) -> None:
         for name in ("blocks", "layout", "extras"):
@@ -64,6 +68,9 @@ class Diagram:
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.blocks.items()), self.connections, self.settings))
+
+    def __str__(self) -> str:
+        return f"diagram '{self.name}' of {len(self.blocks)} blocks"
 
     @cached_property
     def drivers(self) -> Mapping[PortRef, PortRef]:
@@ -76,6 +83,8 @@ class Diagram:
             raise UnknownNameError("block", name, self.blocks, where=f"diagram '{self.name}'")
         return self.blocks[name]
 
-    def views(self) -> tuple[tuple[str, View], ...]:
-        """Every picture that the diagram asks for, with the name of the block that asks."""
-        return tuple((name, view) for name, block in self.blocks.items() for view in block.views())
+    def keep(self, name: str, work_out: Callable[[], _Kept]) -> _Kept:
+        """What a pure function of this diagram gives, worked out once and kept with it under a name."""
+        if name not in self._kept:
+            self._kept[name] = work_out()
+        return cast("_Kept", self._kept[name])

@@ -32,6 +32,7 @@ class ParameterKind(Enum):
     STRING = "string"
     BOOLEAN = "boolean"
     ROBOT = "robot"
+    DIAGRAM = "diagram"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +42,7 @@ class Parameter:
     ``tunable``: its value stays an input of the compiled system (numbers and arrays only; an array's shape
     is part of the structure). ``dimensions``: how many axes an array may have (0 is a plain number).
     ``minimum``, ``above``, ``maximum`` bound every entry; ``finite`` refuses infinities (NaN always is).
-    ``of_type``: the class that an object of kind ``ROBOT`` must have.
+    ``of_type``: the class that an object of kind ``ROBOT`` or ``DIAGRAM`` must have.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Parameter:
             ParameterKind.STRING: "text",
             ParameterKind.BOOLEAN: "true or false",
             ParameterKind.ROBOT: "a Robot",
+            ParameterKind.DIAGRAM: "a Diagram",
         }[self.kind]
         bounds = [
             f"{sign} {bound:g}"
@@ -198,7 +200,7 @@ def _check_boolean(rule: Parameter, value: object, where: str) -> bool:
     return value
 
 
-def _check_robot(rule: Parameter, value: object, where: str) -> object:
+def _check_object(rule: Parameter, value: object, where: str) -> object:
     if rule.of_type is not None and not isinstance(value, rule.of_type):
         raise _refuse(rule, value, where)
     return value
@@ -211,5 +213,6 @@ _CHECKS: dict[ParameterKind, Callable[[Parameter, object, str], Value]] = {
     ParameterKind.CHOICE: _check_choice,
     ParameterKind.STRING: _check_string,
     ParameterKind.BOOLEAN: _check_boolean,
-    ParameterKind.ROBOT: _check_robot,
+    ParameterKind.ROBOT: _check_object,
+    ParameterKind.DIAGRAM: _check_object,
 }

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from armblocks.diagram.block import Block, Shapes
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.hierarchy import FlatForm
 from armblocks.diagram.port import PortRef
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
@@ -50,8 +51,21 @@ class DiagramShapes:
     outputs: Mapping[str, Shapes]
 
 
+def check_stated(form: FlatForm, shapes: DiagramShapes) -> None:
+    """Raise ``DiagramError`` where what passes the end of a subsystem is not what the end states."""
+    for target, (source, stated) in form.stated.items():
+        given = shapes.outputs[source.block][source.port]
+        if not shapes_agree(given, stated):
+            raise DiagramError(
+                f"'{source}' gives shape {given} but '{target}' takes shape {stated}",
+                where=f"diagram '{form.diagram.name}'",
+                allowed="what the dimensions of the subsystem's In and Out blocks say",
+                fix="change the dimensions of the one or the width of the other",
+            )
+
+
 def infer_shapes(diagram: Diagram) -> DiagramShapes:
-    """Find the shape of every signal; every input must be connected.
+    """Find the shape of every signal of a flat diagram; every input must be connected.
 
     Shapes spread from the ports that state theirs. A loop in which nobody does starts from what its
     integrators assume (a scalar start value), which is widened where the loop turns out to be wider.

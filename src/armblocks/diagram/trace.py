@@ -22,11 +22,13 @@ from armblocks.diagram.block_equations import (
     tunable_slots,
 )
 from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.ordering import HELD, Evaluation, Network, Node, Value, evaluation_order
 from armblocks.diagram.port import Guard, PortRef
 from armblocks.diagram.sampling import Sampling, resolve_sampling
-from armblocks.diagram.shapes import DiagramShapes, infer_shapes
+from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
+from armblocks.diagram.structure import Outport
 from armblocks.diagram.units import infer_units
 from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, flatten, signature
 from armblocks.errors import ArmblocksError, DiagramError
@@ -46,12 +48,16 @@ class Model:
 
 
 def diagram_model(diagram: Diagram) -> Model:
-    """Look at a diagram whose inputs are all connected.
+    """Look at the flat form of a diagram.
 
-    Raises ``DiagramError`` for shapes and sample times that do not fit and for blocks whose parameters allow
-    no equations (a robot without mass), ``AlgebraicLoopError`` for loops that no order can solve.
+    Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
+    blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops that
+    no order can solve.
     """
+    form = flatten_hierarchy(diagram)
+    diagram = form.diagram
     shapes = infer_shapes(diagram)
+    check_stated(form, shapes)
     free = {name: block for name, block in diagram.blocks.items() if not block.sampled}
     equations = {name: _equations(name, block, shapes) for name, block in free.items()}
     sampling = resolve_sampling(diagram, equations)
@@ -98,6 +104,8 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     have no solution, or no single one.
     """
     model = diagram_model(diagram)
+    form = flatten_hierarchy(diagram)
+    diagram = form.diagram
     symbols = _Symbols(model)
     flow = _Tracing(model.flow, symbols)
     for node in model.flow_order.order:
@@ -159,7 +167,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
                 for time in block.breakpoints(symbols.parameters_of(name))
             ],
         ),
-        aliases=_aliases(diagram, layout),
+        aliases=_aliases(form, layout),
     )
 
 
@@ -474,15 +482,18 @@ def _initial_discrete(model: Model, symbols: _Symbols) -> list[SX]:
     return values
 
 
-def _aliases(diagram: Diagram, layout: Signature) -> dict[str, str]:
-    """Other names of signals: a block's bare name, and the input ports."""
+def _aliases(form: FlatForm, layout: Signature) -> dict[str, str]:
+    """Other names of signals: a block's bare name, the input ports, and the ports of virtual blocks."""
     aliases: dict[str, str] = {}
-    for name, block in diagram.blocks.items():
+    taken = set(layout.names)
+    for name, block in form.diagram.blocks.items():
         outputs = block.output_ports()
         if len(outputs) == 1:
             aliases[name] = f"{name}/{outputs[0].name}"
-    taken = set(layout.names)
-    for wire in diagram.connections:
+    for wire in form.diagram.connections:
         if str(wire.target) not in taken:
             aliases[str(wire.target)] = str(wire.source)
+        if isinstance(form.diagram.blocks[wire.target.block], Outport):
+            aliases[wire.target.block] = str(wire.source)
+    aliases.update({name: str(ref) for name, ref in form.aliases.items() if name not in taken})
     return aliases

@@ -10,7 +10,7 @@ from armblocks.diagram.port import PortRef
 
 
 def infer_units(diagram: Diagram) -> Mapping[PortRef, str]:
-    """The unit of every output port; ``""`` where nobody can tell. For people only."""
+    """The unit of every output port of a flat diagram; ``""`` where nobody can tell. For people only."""
     drivers = diagram.drivers
     consumers: dict[str, list[str]] = {name: [] for name in diagram.blocks}
     for wire in diagram.connections:

@@ -98,6 +98,8 @@ class _Assembly:
             self._feeds[port] = self._source(feed)
         for port, source in self._feeds.items():
             self._builder.connect(source, PortRef(self._name, port))
+        for feed in self._example.besides:
+            self._added(feed)
         self._show()
         for feed, target in self._wires:
             self._builder.connect(self._source(feed), target)
@@ -124,6 +126,11 @@ class _Assembly:
             if slash:
                 return PortRef(block, port)
             return self._feeds.get(feed) or PortRef(self._name, feed)
+        name = self._added(feed)
+        return PortRef(name, feed.port or self._handles[name].block.output_ports()[0].name)
+
+    def _added(self, feed: Fed) -> str:
+        """The name of a block that a feed means, after it was added with what feeds it."""
         block = _block(BLOCKS[feed.type_name], feed.parameters)
         name = self._free_name(feed, block)
         if name not in self._handles:
@@ -133,7 +140,7 @@ class _Assembly:
             while self._wires:  # what feeds it, now, so that names are given in reading order
                 deeper, target = self._wires.pop(0)
                 self._builder.connect(self._source(deeper), target)
-        return PortRef(name, feed.port or block.output_ports()[0].name)
+        return name
 
     def _free_name(self, feed: Fed, block: Block) -> str:
         if feed.name:

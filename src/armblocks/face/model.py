@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.compiler.system import CompiledSystem, compile_system
-from armblocks.diagram import Diagram, trace_diagram, with_parameters
+from armblocks.diagram import Diagram, flat_diagram, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import UnknownNameError
 from armblocks.face.diagrams import load_diagram
@@ -72,10 +72,13 @@ class CompiledDiagram:
     def _retuned(self, changed: Diagram, parameters: Mapping[str, object]) -> NDArray[np.float64] | None:
         """The parameter vector with the new values, or ``None`` where a structural parameter changes."""
         layout, values = self.system.parameters, self.system.parameter_values.copy()
+        blocks = flat_diagram(changed).blocks
         for path in parameters:
+            if path not in layout.ranges:
+                return None
             block, _, name = path.rpartition(".")
-            value: NDArray[np.float64] = np.asarray(changed.blocks[block].parameter_value(name))
-            if path not in layout.ranges or value.shape != layout[path].shape:
+            value: NDArray[np.float64] = np.asarray(blocks[block].parameter_value(name))
+            if value.shape != layout[path].shape:
                 return None
             values[layout.ranges[path]] = value.ravel()
         return values

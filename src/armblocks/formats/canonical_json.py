@@ -15,13 +15,17 @@ from armblocks.errors import FormatError
 from armblocks.formats.json_document import DEEPEST, KeyPath, path_text
 
 
-def canonical_bytes(value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False) -> bytes:
+def canonical_bytes(
+    value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, deepest: int = DEEPEST
+) -> bytes:
     """The one way to write a document of dicts, lists, texts, numbers, booleans and ``None``.
 
-    ``one_line`` says of the path of an object or array whether it is kept on one line. Raises ``FormatError``
+    ``one_line`` says of the path of an object or array whether it is kept on one line; ``deepest`` caps how
+    deep they lie in each other. Raises ``FormatError``
     for numbers that are not finite, texts that are no Unicode, keys that are no texts, and foreign types.
     """
     pieces: list[str] = []
+    _check_depth(value, deepest)
     _write(value, (), 0, one_line, pieces.append)
     try:
         return ("".join(pieces) + "\n").encode("utf-8")
@@ -31,12 +35,24 @@ def canonical_bytes(value: object, *, one_line: Callable[[KeyPath], bool] = lamb
         ) from error
 
 
+def _check_depth(value: object, deepest: int) -> None:
+    level, depth = [value], 0
+    while level:
+        if depth > deepest:
+            raise FormatError("objects and arrays lie too deep in each other", allowed=f"{deepest} levels")
+        inside: list[object] = []
+        for entry in level:
+            if isinstance(entry, Mapping):
+                inside += cast("Mapping[object, object]", entry).values()
+            elif isinstance(entry, list | tuple):
+                inside += cast("list[object] | tuple[object, ...]", entry)
+        level, depth = inside, depth + 1
+
+
 def _write(
     value: object, path: KeyPath, depth: int, one_line: Callable[[KeyPath], bool], put: Callable[[str], None]
 ) -> None:
     """Append the text of one value."""
-    if depth > DEEPEST:
-        raise FormatError("objects and arrays lie too deep in each other", allowed=f"{DEEPEST} levels")
     match value:
         case Mapping():
             members = cast("Mapping[object, object]", value)

@@ -13,6 +13,9 @@ one line, a moved block is one line of the layout, and two people who add differ
       "settings": {"stop_time": 10, …}
     }
 
+A block that holds a diagram has it beside its parameters, under ``diagram``, with the same keys, but without
+``format`` and ``robots``, which stand once, and without settings and layout where there is nothing to say.
+
 Keys that armblocks does not know are kept in ``Diagram.extras`` and written again (by another program, or a
 newer armblocks); a key that is nearly a known one, and an unknown parameter, are refused. Infinite parameters
 are the texts ``"inf"`` and ``"-inf"``; NaN has no place in a file. References to robots: see
@@ -53,8 +56,11 @@ from armblocks.robot import Robot
 
 FORMAT_VERSION = 1
 MOST_BYTES = 16 * 2**20
+DEEPEST = 320
+"""Objects and arrays inside each other: a hundred subsystems, and what stands in the innermost."""
 
 _DOCUMENT_KEYS = ("format", "name", "description", "blocks", "connections", "layout", "robots", "settings")
+_INNER_KEYS = ("name", "description", "blocks", "connections", "layout", "settings")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _WIRE = re.compile(r"([^/]+)/([^/\s]+) -> ([^/]+)/([^/\s]+)")
@@ -75,32 +81,11 @@ def diagram_from_bytes(
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, and ``DiagramError`` for a
     diagram that cannot be built. All name the file, and the line where the fault has one.
     """
-    root = read_document(data, name, MOST_BYTES)
-    extras: Extras = {}
-    members = _split(root, _DOCUMENT_KEYS, extras, "")
+    root = read_document(data, name, MOST_BYTES, DEEPEST)
+    members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
-    settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
-    robots = RobotReader(members.get("robots"), folder, resolve_robot)
-    block_nodes = members["blocks"].members() if "blocks" in members else {}
-    blocks = {key: _block(key, node, library, robots, extras) for key, node in block_nodes.items()}
-    placements = _layout(members["layout"], set(blocks), extras) if "layout" in members else {}
-    builder = DiagramBuilder(
-        members["name"].text() if "name" in members else Path(name).stem,
-        settings=settings,
-        extras=extras,
-        description=members["description"].text() if "description" in members else "",
-    )
-    for key, block in blocks.items():
-        with _located(block_nodes[key]):
-            builder.add(key, block)
-    for node in members["connections"].elements() if "connections" in members else []:
-        source, target = _wire(node)
-        with _located(node):
-            builder.connect(source, target)
-    for key, place in placements.items():
-        builder.place(key, place.x, place.y, width=place.width, height=place.height, flipped=place.flipped)
-    with _located(root):
-        return builder.build()
+    reader = _Reader(library, RobotReader(members.get("robots"), folder, resolve_robot))
+    return reader.diagram(root, _DOCUMENT_KEYS, Path(name).stem)
 
 
 def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: Path | None = None) -> bytes:
@@ -109,48 +94,81 @@ def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: P
     A robot is written as the shortest reference that gives an equal one, its path relative to ``folder``.
     Raises ``FormatError`` where a value has no place in JSON.
     """
-    extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
-    block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
+    writer = _Writer(RobotWriter(folder, resolve_robot))
+    document = {"format": FORMAT_VERSION, **writer.diagram(diagram)}
+    if writer.robots.table:
+        document["robots"] = writer.robots.table
+    return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
 
-    robots = RobotWriter(folder, resolve_robot)
 
-    def value_of(rule: Parameter, value: object) -> object:
+class _Writer:
+    """Says the diagrams of one document as plain values."""
+
+    def __init__(self, robots: RobotWriter) -> None:
+        self.robots = robots
+
+    def diagram(self, diagram: Diagram) -> dict[str, object]:
+        """A diagram, and those inside it."""
+        extras = cast("Mapping[str, Mapping[str, object]]", diagram.extras)
+        block_extras, layout_extras = extras.get("blocks", {}), extras.get("layout", {})
+        layout = dict(layout_extras)
+        for key, place in diagram.layout.items():
+            stated = {
+                name: value
+                for name, default in _PLACEMENT.items()
+                if (value := getattr(place, name)) != default
+            }
+            layout[key] = {**_members(layout_extras.get(key)), **stated}
+        settings = {
+            name: value for name in _SETTINGS if (value := getattr(diagram.settings, name)) is not None
+        }
+        return {
+            **extras.get("", {}),
+            "name": diagram.name,
+            **({"description": diagram.description} if diagram.description else {}),
+            "blocks": {
+                key: {**_members(block_extras.get(key)), **self._block(block)}
+                for key, block in diagram.blocks.items()
+            },
+            "connections": [str(wire) for wire in diagram.connections],
+            "layout": layout,
+            "settings": {**extras.get("settings", {}), **settings},
+        }
+
+    def _block(self, block: Block) -> dict[str, object]:
+        """A block; a diagram inside stands beside the parameters, so that depth costs little."""
+        values = {rule: block.parameter_value(rule.name) for rule in block.parameters()}
+        plain = {
+            rule.name: self._value(rule, value) for rule, value in values.items() if not _is_diagram(rule)
+        }
+        inside = {
+            rule.name: self._inside(cast("Diagram", value))
+            for rule, value in values.items()
+            if _is_diagram(rule)
+        }
+        return {"type": block.type_name(), "parameters": plain, **inside}
+
+    def _inside(self, diagram: Diagram) -> dict[str, object]:
+        document = self.diagram(diagram)
+        if diagram.settings == SimulationOptions() and "settings" not in diagram.extras:
+            del document["settings"]
+        if not document["layout"]:
+            del document["layout"]
+        return document
+
+    def _value(self, rule: Parameter, value: object) -> object:
         if isinstance(value, Robot):
-            return robots.reference(value)
+            return self.robots.reference(value)
         return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
 
-    blocks = {
-        key: {
-            **_members(block_extras.get(key)),
-            "type": block.type_name(),
-            "parameters": {
-                rule.name: value_of(rule, block.parameter_value(rule.name)) for rule in block.parameters()
-            },
-        }
-        for key, block in diagram.blocks.items()
-    }
-    layout = dict(layout_extras)
-    for key, place in diagram.layout.items():
-        stated = {
-            name: value for name, default in _PLACEMENT.items() if (value := getattr(place, name)) != default
-        }
-        layout[key] = {**_members(layout_extras.get(key)), **stated}
-    settings = {name: value for name in _SETTINGS if (value := getattr(diagram.settings, name)) is not None}
-    document = {
-        **extras.get("", {}),
-        "format": FORMAT_VERSION,
-        "name": diagram.name,
-        **({"description": diagram.description} if diagram.description else {}),
-        "blocks": blocks,
-        "connections": [str(wire) for wire in diagram.connections],
-        "layout": layout,
-        "settings": {**extras.get("settings", {}), **settings},
-        **({"robots": robots.table} if robots.table else {}),
-    }
-    return canonical_bytes(document, one_line=_is_placement)
+
+def _is_diagram(rule: Parameter) -> bool:
+    return rule.kind is ParameterKind.DIAGRAM
 
 
 def _is_placement(path: KeyPath) -> bool:
+    while len(path) > 3 and path[0] == "blocks" and path[2] == "diagram":
+        path = path[3:]
     return len(path) == 2 and path[0] == "layout"
 
 
@@ -194,6 +212,69 @@ def _joined(node: Node, error: ArmblocksError) -> str:
     return f"{node.where}: {error.where}" if error.where else node.where
 
 
+class _Reader:
+    """Makes the diagrams of one document."""
+
+    def __init__(self, library: BlockLibrary, robots: RobotReader) -> None:
+        self.library = library
+        self.robots = robots
+
+    def diagram(self, node: Node, known: tuple[str, ...], name: str) -> Diagram:
+        """The checked diagram of an object; ``name`` where it says none."""
+        extras: Extras = {}
+        members = _split(node, known, extras, "")
+        settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
+        block_nodes = members["blocks"].members() if "blocks" in members else {}
+        blocks = {key: self._block(key, entry, extras) for key, entry in block_nodes.items()}
+        placements = _layout(members["layout"], set(blocks), extras) if "layout" in members else {}
+        builder = DiagramBuilder(
+            members["name"].text() if "name" in members else name,
+            settings=settings,
+            extras=extras,
+            description=members["description"].text() if "description" in members else "",
+        )
+        for key, block in blocks.items():
+            with _located(block_nodes[key]):
+                builder.add(key, block)
+        for entry in members["connections"].elements() if "connections" in members else []:
+            source, target = _wire(entry)
+            with _located(entry):
+                builder.connect(source, target)
+        for key, place in placements.items():
+            builder.place(
+                key, place.x, place.y, width=place.width, height=place.height, flipped=place.flipped
+            )
+        with _located(node):
+            return builder.build()
+
+    def _block(self, key: str, node: Node, extras: Extras) -> Block:
+        if "type" not in node.members():
+            raise node.error("the key 'type' is missing", allowed="a block type", fix='add "type": "Gain"')
+        with _located(node.members()["type"]):
+            kind = self.library[node.members()["type"].text()]
+        rules = {rule.name: rule for rule in kind.parameters()}
+        inside = [name for name, rule in rules.items() if _is_diagram(rule)]
+        members = _split(node, ("type", "parameters", *inside), extras, "blocks", key)
+        given = members["parameters"].members() if "parameters" in members else {}
+        values: dict[str, object] = {
+            name: self.diagram(members[name], _INNER_KEYS, key) for name in inside if name in members
+        }
+        for name, member in given.items():
+            if name not in rules or name in inside:
+                known = set(rules) - set(inside)
+                raise UnknownNameError(f"parameter of {kind.type_name()}", name, known, where=member.where)
+            values[name] = _parameter(rules[name], member, self.robots)
+        missing = [name for name, rule in rules.items() if rule.required and name not in values]
+        if missing:
+            raise node.error(
+                f"a {kind.type_name()} needs the parameter '{missing[0]}'",
+                allowed=rules[missing[0]].describe(),
+                fix=f"add '{missing[0]}': {rules[missing[0]].doc}",
+            )
+        with _located(node):
+            return kind(**values)
+
+
 def _split(node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = "") -> dict[str, Node]:
     """The known members; the others go to ``extras[place]``, under ``key`` where there is one."""
     members, unknown = split_members(node, known)
@@ -226,30 +307,6 @@ def _settings(node: Node, extras: Extras) -> SimulationOptions:
         else:
             values[name] = None if member.value is None and default is None else member.number()
     return dataclasses.replace(SimulationOptions(), **values)  # pyright: ignore[reportArgumentType]
-
-
-def _block(key: str, node: Node, library: BlockLibrary, robots: RobotReader, extras: Extras) -> Block:
-    members = _split(node, ("type", "parameters"), extras, "blocks", key)
-    if "type" not in members:
-        raise node.error("the key 'type' is missing", allowed="a block type", fix='add "type": "Gain"')
-    with _located(members["type"]):
-        kind = library[members["type"].text()]
-    rules = {rule.name: rule for rule in kind.parameters()}
-    given = members["parameters"].members() if "parameters" in members else {}
-    values: dict[str, object] = {}
-    for name, member in given.items():
-        if name not in rules:
-            raise UnknownNameError(f"parameter of {kind.type_name()}", name, rules, where=member.where)
-        values[name] = _parameter(rules[name], member, robots)
-    missing = [name for name, rule in rules.items() if rule.required and name not in values]
-    if missing:
-        raise node.error(
-            f"a {kind.type_name()} needs the parameter '{missing[0]}'",
-            allowed=rules[missing[0]].describe(),
-            fix=f"add '{missing[0]}': {rules[missing[0]].doc}",
-        )
-    with _located(node):
-        return kind(**values)
 
 
 def _parameter(rule: Parameter, node: Node, robots: RobotReader) -> object:

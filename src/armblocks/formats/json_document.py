@@ -17,7 +17,7 @@ from typing import cast
 from armblocks.errors import FormatError
 
 DEEPEST = 64
-"""Objects and arrays inside each other."""
+"""Objects and arrays inside each other, where a format says nothing else."""
 LONGEST_INTEGER = 18
 """Digits of an integer: they fit into 64 bits."""
 
@@ -109,8 +109,10 @@ class Node:
         return self.error(f"the value is {describe(self.value)}", allowed=wanted)
 
 
-def read_document(data: bytes, name: str, most_bytes: int) -> Node:
+def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPEST) -> Node:
     """The root of a JSON document. ``name`` is what messages call the file.
+
+    ``most_bytes`` and ``deepest`` cap its size and how deep objects and arrays lie in each other.
 
     Raises ``FormatError`` for anything that is not strict JSON, and for what passes the caps.
     """
@@ -124,7 +126,7 @@ def read_document(data: bytes, name: str, most_bytes: int) -> Node:
             "the file is not UTF-8 text", where=f"{name}:{line}", fix="save it as UTF-8"
         ) from error
     document = Document(name, text)
-    _check_depth(document)
+    _check_depth(document, deepest)
     try:
         value = json.loads(
             text,
@@ -254,7 +256,7 @@ def _bounded_integer(text: str) -> int:
 _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}:,]|\n|[^\s\[\]{}:,"]+', re.DOTALL)
 
 
-def _check_depth(document: Document) -> None:
+def _check_depth(document: Document, deepest: int) -> None:
     """Python's parser recurses: refuse before it starts."""
     depth, line = 0, 1
     for found in _TOKEN.finditer(document.text):
@@ -262,11 +264,11 @@ def _check_depth(document: Document) -> None:
         line += token.count("\n")
         if token in "[{":
             depth += 1
-            if depth > DEEPEST:
+            if depth > deepest:
                 raise FormatError(
                     "objects and arrays lie too deep in each other",
                     where=f"{document.name}:{line}",
-                    allowed=f"{DEEPEST} levels",
+                    allowed=f"{deepest} levels",
                 )
         elif token in "]}":
             depth -= 1

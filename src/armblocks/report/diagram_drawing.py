@@ -2,8 +2,22 @@
 
 from __future__ import annotations
 
-from armblocks.diagram import Connection, Diagram, PortRef, ViewKind, infer_shapes
-from armblocks.equations import Shape
+from collections.abc import Mapping
+from enum import IntEnum
+
+from armblocks.diagram import (
+    Bus,
+    Connection,
+    Diagram,
+    FlatForm,
+    PortRef,
+    Shapes,
+    View,
+    ViewKind,
+    diagram_views,
+    flatten_hierarchy,
+    infer_shapes,
+)
 from armblocks.report import block_faces
 from armblocks.report.block_faces import FaceShape, Room, Trend
 from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes
@@ -16,19 +30,29 @@ from armblocks.simulation.result import SimulationResult
 
 _MARGIN = 22.0
 _ROUNDING = 5.0
+_TRENDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
 
 
-def diagram_picture(diagram: Diagram, result: SimulationResult | None = None) -> Picture:
-    """The diagram, its sinks showing what the run gave them if a result is given."""
+def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *, inside: str = "") -> Picture:
+    """The diagram, its sinks showing what the run gave them if a result is given.
+
+    ``inside``: the path of the subsystem that is drawn instead of the top.
+    """
+    form = flatten_hierarchy(diagram)
+    outputs = infer_shapes(form.diagram).outputs
+    views = {name: view for name, view in diagram_views(diagram) if view.kind in _TRENDS}
+    diagram = form.levels[inside]
+    path = f"{inside}/" if inside else ""
     placed = boxes(diagram)
     nets, wires = _nets(diagram, placed)
     routed = route([_obstacle(box) for box in placed.values()], nets)
-    shapes = infer_shapes(diagram)
     marks: list[Mark] = []
     for (source, _), net in zip(wires.items(), routed):
-        marks += _wire(net, shapes.outputs[source.block][source.port], _wire_title(source, wires[source]))
+        kind = _wire_kind(form, outputs, PortRef(path + source.block, source.port))
+        marks += _wire(net, kind, _wire_title(source, wires[source]))
     for name, box in placed.items():
-        marks.append(Group(tuple(_block(box, _trend(name, box, result))), title=_block_title(name, box)))
+        trend = _trend(path + name, views.get(path + name), result)
+        marks.append(Group(tuple(_block(box, trend)), title=_block_title(name, box)))
     left, top, right, bottom = _extent(placed, routed)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
@@ -83,14 +107,12 @@ def _shape(box: Box) -> FaceShape:
     return block_faces.face_size(box.block)[0]
 
 
-def _trend(name: str, box: Box, result: SimulationResult | None) -> Trend | None:
-    wanted = {ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE}
-    view = next((view for view in box.block.views() if view.kind in wanted), None)
+def _trend(path: str, view: View | None, result: SimulationResult | None) -> Trend | None:
     if result is None or view is None:
         return None
     count = len(result.time)
     return Trend(
-        time=result.time, inputs=tuple(result[f"{name}/{s}"].reshape(count, -1) for s in view.signals)
+        time=result.time, inputs=tuple(result[f"{path}/{s}"].reshape(count, -1) for s in view.signals)
     )
 
 
@@ -146,16 +168,35 @@ def _signs(box: Box) -> list[Mark]:
     return marks
 
 
-def _wire(net: RoutedNet, shape: Shape, title: str) -> list[Mark]:
-    """A scalar is a thin line, a vector a heavy one, a matrix (or a stack of them) a double one."""
+class WireKind(IntEnum):
+    """What a wire carries."""
+
+    SCALAR = 0
+    VECTOR = 1
+    MATRIX = 2
+    BUS = 3
+
+
+def _wire_kind(form: FlatForm, outputs: Mapping[str, Shapes], source: PortRef) -> WireKind:
+    carried = form.carried.get(source, source)
+    if isinstance(carried, Bus):
+        return WireKind.BUS
+    return WireKind(min(len(outputs[carried.block][carried.port]), 2))
+
+
+def _wire(net: RoutedNet, kind: WireKind, title: str) -> list[Mark]:
+    """A scalar is a thin line, a vector a heavy one, a matrix a double one, a bus three lines."""
     marks: list[Mark] = []
-    weight = (1.2, 2.3, 3.8)[min(len(shape), 2)]
+    weight = (1.2, 2.3, 3.8, 5.4)[kind]
     lines = [_rounded(_shortened(path, 5.0)) for path in net.paths]
     marks += [Curve(line, stroke=Tone.WIRE, width=weight) for line in lines]
-    if len(shape) >= 2:
+    if kind is WireKind.MATRIX:
         marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
+    if kind is WireKind.BUS:
+        marks += [Curve(line, stroke=Tone.SURFACE, width=3.2) for line in lines]
+        marks += [Curve(line, stroke=Tone.WIRE, width=1.0) for line in lines]
     marks += [_arrow_head(path) for path in net.paths]
-    marks += [Disc(x, y, 2.6 + 0.3 * min(len(shape), 2), fill=Tone.WIRE) for x, y in net.dots]
+    marks += [Disc(x, y, 2.6 + 0.3 * kind, fill=Tone.WIRE) for x, y in net.dots]
     return [Group(tuple(marks), title=title)]
 
 

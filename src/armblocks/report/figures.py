@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.diagram import Diagram, View, ViewKind
+from armblocks.diagram import Diagram, View, ViewKind, diagram_views
 from armblocks.report.arm_picture import moments_picture
 from armblocks.report.charts import Panel, Trace, time_chart
 from armblocks.report.motion import Motion
@@ -71,7 +71,7 @@ def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
 
 def view_figures(diagram: Diagram, result: SimulationResult) -> Iterator[Figure]:
     """A figure for every Scope and XY Graph of the diagram, in the order of their names."""
-    for block, view in diagram.views():
+    for block, view in diagram_views(diagram):
         if view.kind is ViewKind.TRACES:
             yield Figure(
                 name=f"scope-{file_name(block)}",

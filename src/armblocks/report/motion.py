@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.diagram import Block, Diagram, ParameterKind, ViewKind
+from armblocks.diagram import Block, Diagram, ParameterKind, ViewKind, flat_diagram
 from armblocks.robot import Robot
 from armblocks.robot.geometry import link_frames
 from armblocks.simulation.result import SimulationResult
@@ -72,6 +72,7 @@ def motions(diagram: Diagram, result: SimulationResult) -> tuple[Motion, ...]:
 
 def moving_arms(diagram: Diagram, result: SimulationResult) -> tuple[MovingArm, ...]:
     """The arms of a diagram and their signals: the same for every run of it."""
+    diagram = flat_diagram(diagram)
     groups: dict[tuple[Robot, str], list[str]] = {}
     for name, block in diagram.blocks.items():
         robot = robot_of(block)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armblocks.diagram import Diagram, ViewKind
+from armblocks.diagram import Diagram, ViewKind, diagram_views
 from armblocks.report.analysis import MotionSummary
 from armblocks.report.figures import Figure
 from armblocks.report.motion import Motion
@@ -169,7 +169,7 @@ def _displays(contents: ReportContents) -> str:
     """The last value of every signal that a Display shows."""
     result = contents.result
     rows: list[str] = []
-    for block, view in contents.diagram.views():
+    for block, view in diagram_views(contents.diagram):
         if view.kind is not ViewKind.VALUE or result.time.size == 0:
             continue
         for number, signal in enumerate(view.signals):

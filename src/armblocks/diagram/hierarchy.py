@@ -1,0 +1,452 @@
+"""From a diagram with subsystems, tags and buses to a flat one: blocks named by their paths, real wires only.
+
+Flattening changes no signal. A block ``pid`` inside the subsystem ``controller`` becomes the block
+``controller/pid``; what virtual blocks mean is followed back to the output of a real block. A diagram without
+virtual blocks is its own flat form.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.port import PortRef, View
+from armblocks.diagram.structure import Inport, Outport, Subsystem, stated_shape
+from armblocks.diagram.virtual_wiring import (
+    BusAssignment,
+    BusCreator,
+    BusSelector,
+    From,
+    Goto,
+    listed,
+    port_names,
+)
+from armblocks.equations import Shape
+from armblocks.errors import DiagramError, UnknownNameError
+
+DEEPEST = 100
+"""Subsystems inside each other."""
+MOST_LISTED = 20
+"""How many offenders one message lists."""
+
+
+@dataclass(frozen=True)
+class Bus:
+    """What a wire carries that has several named signals on it, in order; a bus may hold buses."""
+
+    elements: Mapping[str, Carried]
+
+    def leaves(self) -> Iterator[tuple[str, PortRef]]:
+        """Path and source of every signal: ``("motor.speed", …)``."""
+        for name, carried in self.elements.items():
+            if isinstance(carried, Bus):
+                yield from ((f"{name}.{path}", source) for path, source in carried.leaves())
+            else:
+                yield name, carried
+
+    def paths(self) -> tuple[str, ...]:
+        """The paths of all elements, buses within this bus included."""
+        found: list[str] = []
+        for name, carried in self.elements.items():
+            found.append(name)
+            if isinstance(carried, Bus):
+                found += [f"{name}.{path}" for path in carried.paths()]
+        return tuple(found)
+
+    def element(self, path: str) -> Carried | None:
+        """The element of this path, if there is one."""
+        name, _, rest = path.partition(".")
+        found = self.elements.get(name)
+        if not rest or found is None:
+            return found
+        return found.element(rest) if isinstance(found, Bus) else None
+
+    def replaced(self, path: str, carried: Carried) -> Bus:
+        """The same bus with another element at a path that exists."""
+        name, _, rest = path.partition(".")
+        inner = self.elements[name]
+        new = inner.replaced(rest, carried) if rest and isinstance(inner, Bus) else carried
+        return Bus({**self.elements, name: new})
+
+
+Carried = PortRef | Bus
+"""What a wire carries: the signal of an output of the flat diagram, or a bus of such."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatForm:
+    """A flat diagram, and how the hierarchy is found in it again. Names are paths from the top.
+
+    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``carried``: what the
+    output ports of the hierarchy carry, where that is not their own signal. ``aliases``: other names of
+    signals, such as a subsystem's ports. ``views``: the pictures that are asked for, by block.
+    ``stated``: ports whose wires have to have a certain shape. All but ``levels`` are empty for a diagram
+    that is flat already.
+    """
+
+    diagram: Diagram
+    levels: Mapping[str, Diagram]
+    carried: Mapping[PortRef, Carried] = field(default_factory=dict[PortRef, Carried])
+    views: tuple[tuple[str, View], ...] = ()
+    aliases: Mapping[str, PortRef] = field(default_factory=dict[str, PortRef])
+    stated: Mapping[PortRef, tuple[PortRef, Shape]] = field(
+        default_factory=dict[PortRef, tuple[PortRef, Shape]]
+    )
+
+
+def flatten_hierarchy(diagram: Diagram) -> FlatForm:
+    """The flat form of a diagram, worked out once for each diagram object.
+
+    Raises ``DiagramError`` for unconnected inputs, tags and buses that lead nowhere, wires that lead in a
+    circle without a block, and subsystems too deep inside each other; ``where`` names the path.
+    """
+    return diagram.keep("flat form", lambda: _flat_form(diagram))
+
+
+def flat_diagram(diagram: Diagram) -> Diagram:
+    """The flat diagram alone; a diagram without virtual blocks itself."""
+    return flatten_hierarchy(diagram).diagram
+
+
+def diagram_views(diagram: Diagram) -> tuple[tuple[str, View], ...]:
+    """Every picture that a diagram and its subsystems ask for, with the path of the block that asks."""
+    form = flatten_hierarchy(diagram)
+    if form.diagram is not diagram:
+        return form.views
+    return tuple((name, view) for name, block in diagram.blocks.items() for view in block.views())
+
+
+def _flat_form(diagram: Diagram) -> FlatForm:
+    if not any(block.virtual for block in diagram.blocks.values()):
+        check_connected({"": diagram})
+        return FlatForm(diagram=diagram, levels={"": diagram})
+    levels = levels_of(diagram)
+    check_connected(levels)
+    return _Flattening(diagram, levels).form()
+
+
+def joined(level: str, name: str) -> str:
+    """The path of a block of a level."""
+    return f"{level}/{name}" if level else name
+
+
+def levels_of(diagram: Diagram) -> dict[str, Diagram]:
+    """All diagrams of a hierarchy by path, those outside first.
+
+    Raises ``DiagramError`` where there is no end of subsystems inside each other.
+    """
+    levels: dict[str, Diagram] = {}
+    pending = [("", diagram, 0)]
+    while pending:
+        path, level, depth = pending.pop()
+        if depth > DEEPEST:
+            raise DiagramError(
+                f"subsystems are more than {DEEPEST} deep inside each other",
+                where=f"block '{'/'.join(path.split('/')[:3])}/…'",
+                allowed=f"at most {DEEPEST}",
+                fix="put some of them side by side",
+            )
+        levels[path] = level
+        for name, block in level.blocks.items():
+            if isinstance(block, Subsystem):
+                pending.append((joined(path, name), block.diagram, depth + 1))
+    return levels
+
+
+def check_connected(levels: Mapping[str, Diagram]) -> None:
+    """Raise ``DiagramError`` that lists the inputs that nothing drives, of all diagrams of a hierarchy."""
+    open_inputs = [
+        f"{joined(level, name)}/{port.name}"
+        for level, diagram in levels.items()
+        for name, block in diagram.blocks.items()
+        for port in block.input_ports()
+        if PortRef(name, port.name) not in diagram.drivers
+    ]
+    if open_inputs:
+        shown = ", ".join(open_inputs[:MOST_LISTED])
+        rest = len(open_inputs) - MOST_LISTED
+        raise DiagramError(
+            f"{len(open_inputs)} unconnected input{'s' * (len(open_inputs) > 1)}: {shown}"
+            + (f" and {rest} more" if rest > 0 else ""),
+            where=f"diagram '{next(iter(levels.values())).name}'",
+            allowed="every input has a driver",
+            fix="connect an output or a Constant to each",
+        )
+
+
+class _Flattening:
+    """Follows the wires of one hierarchy back to real blocks; lives only while it is flattened."""
+
+    def __init__(self, top: Diagram, levels: Mapping[str, Diagram]) -> None:
+        self.top = top
+        self.levels = levels
+        self.where = f"diagram '{top.name}'"
+        self.blocks: dict[str, Block] = {}
+        self.level_of: dict[str, str] = {}
+        self.drivers: dict[PortRef, PortRef] = {}
+        self.carried: dict[PortRef, Carried] = {}
+        for level, diagram in levels.items():
+            for name, block in diagram.blocks.items():
+                path = joined(level, name)
+                self.blocks[path] = block
+                self.level_of[path] = level
+            for wire in diagram.connections:
+                source = PortRef(joined(level, wire.source.block), wire.source.port)
+                self.drivers[PortRef(joined(level, wire.target.block), wire.target.port)] = source
+        self.tags = _Tags(self.blocks, self.level_of, self.where)
+
+    def form(self) -> FlatForm:
+        """The flat diagram and its relation to the hierarchy."""
+        for path, block in self.blocks.items():
+            for port in block.output_ports():
+                self.carry(PortRef(path, port.name))
+        sinks = self._sinks_of_buses()
+        real = {
+            path: block
+            for path, block in self.blocks.items()
+            if path not in sinks and not self.vanishes(path)
+        }
+        connections = [
+            Connection(self._one_signal(PortRef(path, port.name)), PortRef(path, port.name))
+            for path, block in real.items()
+            for port in block.input_ports()
+        ]
+        flat = dataclasses.replace(
+            self.top, blocks=real, connections=tuple(connections), layout={}, extras={}
+        )
+        return FlatForm(
+            diagram=flat,
+            levels=self.levels,
+            carried=self.carried,
+            views=self._views(sinks),
+            aliases=self._aliases(),
+            stated=self._stated(),
+        )
+
+    def vanishes(self, path: str) -> bool:
+        """Whether a block is replaced by wires: virtual ones, and the ends of subsystems."""
+        block = self.blocks[path]
+        return block.virtual or (bool(self.level_of[path]) and isinstance(block, Inport | Outport))
+
+    # -- following wires -----------------------------------------------------------------------------------
+
+    def carry(self, ref: PortRef) -> Carried:
+        """What an output port carries; with a stack of its own, so that ways may be long."""
+        way = {ref: None}
+        while way:
+            last = next(reversed(way))
+            if last in self.carried:
+                del way[last]
+                continue
+            needed = self._needed(last)
+            missing = next((entry for entry in needed if entry not in self.carried), None)
+            if missing is None:
+                self.carried[last] = self._worked_out(last, [self.carried[entry] for entry in needed])
+            elif missing in way:
+                loop = [str(entry) for entry in way][list(way).index(missing) :][::-1]
+                raise DiagramError(
+                    f"wires lead in a circle without a block that works anything out: {' -> '.join(loop)}",
+                    where=self.where,
+                    allowed="every wire begins at a block that gives a signal",
+                    fix="remove one of these connections",
+                )
+            else:
+                way[missing] = None
+        return self.carried[ref]
+
+    def at(self, path: str, port: str) -> Carried:
+        """What an input port is given."""
+        return self.carry(self.drivers[PortRef(path, port)])
+
+    def _needed(self, ref: PortRef) -> list[PortRef]:
+        """The output ports that an output port of a virtual block takes its signal from."""
+        path, block = ref.block, self.blocks[ref.block]
+        if not self.vanishes(path):
+            return []
+        match block:
+            case Inport():
+                level = self.level_of[path]
+                return [self.drivers[PortRef(level, path.rpartition("/")[2])]]
+            case Subsystem():
+                return [self.drivers[PortRef(joined(path, ref.port), "u")]]
+            case From():
+                return [self.drivers[PortRef(self.tags.goto(path, block), "u")]]
+            case _:
+                return [self.drivers[PortRef(path, port.name)] for port in block.input_ports()]
+
+    def _worked_out(self, ref: PortRef, given: list[Carried]) -> Carried:
+        block = self.blocks[ref.block]
+        if not self.vanishes(ref.block):
+            return ref
+        match block:
+            case BusCreator():
+                return Bus(dict(zip(listed(block.names), given)))
+            case BusSelector():
+                paths = listed(block.elements)
+                wanted = paths[port_names(paths).index(ref.port)]
+                return self._element(ref.block, self._bus(ref.block, given[0]), wanted)
+            case BusAssignment():
+                bus = self._bus(ref.block, given[0])
+                for path, carried in zip(listed(block.elements), given[1:]):
+                    self._element(ref.block, bus, path)
+                    bus = bus.replaced(path, carried)
+                return bus
+            case _:
+                return given[0]
+
+    def _bus(self, path: str, carried: Carried) -> Bus:
+        if isinstance(carried, Bus):
+            return carried
+        raise DiagramError(
+            f"the input 'bus' is the single signal '{carried}'",
+            where=f"block '{path}' ({self.blocks[path].title})",
+            allowed="a bus",
+            fix="connect a Bus Creator",
+        )
+
+    def _element(self, path: str, bus: Bus, element: str) -> Carried:
+        found = bus.element(element)
+        if found is None:
+            where = f"block '{path}' ({self.blocks[path].title})"
+            raise UnknownNameError("bus element", element, bus.paths(), where=where)
+        return found
+
+    def _one_signal(self, target: PortRef) -> PortRef:
+        carried = self.at(target.block, target.port)
+        if isinstance(carried, PortRef):
+            return carried
+        raise DiagramError(
+            f"input '{target.port}' is given a bus with the elements {', '.join(carried.elements)}",
+            where=f"block '{target.block}' ({self.blocks[target.block].title})",
+            allowed="a single signal",
+            fix="put a Bus Selector in between",
+        )
+
+    # -- what else is to be known --------------------------------------------------------------------------
+
+    def _sinks_of_buses(self) -> set[str]:
+        """Blocks that only show what they are given, and are given a bus: they show all its signals."""
+        return {
+            path
+            for path, block in self.blocks.items()
+            if block.views()
+            and not (block.virtual or block.output_ports() or block.record_ports())
+            and any(isinstance(self.at(path, port.name), Bus) for port in block.input_ports())
+        }
+
+    def _views(self, sinks: Iterable[str]) -> tuple[tuple[str, View], ...]:
+        chosen = set(sinks)
+        return tuple(
+            (path, self._spread(path, view) if path in chosen else view)
+            for path, block in sorted(self.blocks.items())
+            for view in block.views()
+        )
+
+    def _spread(self, path: str, view: View) -> View:
+        """A view with the signals of a bus in the place of the bus."""
+        signals: list[str] = []
+        labels: list[str] = []
+        given = view.labels or ("",) * len(view.signals)
+        for signal, label in zip(view.signals, given):
+            carried = self.at(path, signal)
+            if isinstance(carried, Bus):
+                signals += [f"{signal}.{element}" for element, _ in carried.leaves()]
+                labels += [f"{label}.{element}" if label else element for element, _ in carried.leaves()]
+            else:
+                signals.append(signal)
+                labels.append(label)
+        return dataclasses.replace(view, signals=tuple(signals), labels=tuple(labels))
+
+    def _aliases(self) -> dict[str, PortRef]:
+        aliases: dict[str, PortRef] = {}
+
+        def add(name: str, carried: Carried) -> None:
+            if isinstance(carried, PortRef):
+                aliases[name] = carried
+            else:
+                aliases.update({f"{name}.{path}": source for path, source in carried.leaves()})
+
+        for path, block in self.blocks.items():
+            for port in block.input_ports():
+                add(f"{path}/{port.name}", self.at(path, port.name))
+            outputs = block.output_ports()
+            if not self.vanishes(path):
+                continue
+            for port in outputs:
+                add(f"{path}/{port.name}", self.carried[PortRef(path, port.name)])
+            if len(outputs) == 1:
+                add(path, self.carried[PortRef(path, outputs[0].name)])
+        for path, block in self.blocks.items():
+            if isinstance(block, Outport):
+                add(path, self.at(path, "u"))
+        return aliases
+
+    def _stated(self) -> dict[PortRef, tuple[PortRef, Shape]]:
+        stated: dict[PortRef, tuple[PortRef, Shape]] = {}
+        for path, block in self.blocks.items():
+            if not isinstance(block, Inport | Outport) or not self.vanishes(path):
+                continue
+            shape = stated_shape(block)
+            if shape is not None:
+                inside = isinstance(block, Inport)
+                target = (
+                    PortRef(self.level_of[path], path.rpartition("/")[2]) if inside else PortRef(path, "u")
+                )
+                stated[target] = (self._one_signal(target), shape)
+        return stated
+
+
+class _Tags:
+    """Finds the Goto that a From means."""
+
+    def __init__(self, blocks: Mapping[str, Block], level_of: Mapping[str, str], where: str) -> None:
+        self._known: dict[tuple[str, str, str], str] = {}
+        self._level_of = level_of
+        for path, block in blocks.items():
+            if not isinstance(block, Goto):
+                continue
+            level = "" if block.visibility == "global" else level_of[path]
+            # Local and scoped tags of one diagram are told apart by nothing that a reader sees.
+            places = [(level, block.tag, block.visibility)]
+            if block.visibility != "global":
+                places.append((level, block.tag, "scoped" if block.visibility == "local" else "local"))
+            for place in places:
+                other = self._known.get(place)
+                if other is not None:
+                    raise DiagramError(
+                        f"the Goto blocks '{other}' and '{path}' both send '{block.tag}'",
+                        where=where,
+                        allowed="one Goto for each tag, wherever the tag is known",
+                        fix="rename the tag of one of them, or make its visibility local",
+                    )
+            self._known[places[0]] = path
+
+    def goto(self, path: str, block: From) -> str:
+        """The path of the Goto that sends to a From: the nearest one that it can see."""
+        level = self._level_of[path]
+        found = self._known.get((level, block.tag, "local"))
+        outer = level
+        while found is None:
+            found = self._known.get((outer, block.tag, "scoped"))
+            if not outer:
+                break
+            outer = outer.rpartition("/")[0]
+        found = found or self._known.get(("", block.tag, "global"))
+        if found is None:
+            visible = sorted({tag for place, tag, sight in self._known if self._sees(level, place, sight)})
+            hidden = [goto for (_, tag, _), goto in self._known.items() if tag == block.tag]
+            raise DiagramError(
+                f"no Goto that it can see sends '{block.tag}'",
+                where=f"block '{path}' (From)",
+                allowed="one of " + ", ".join(visible) if visible else "a tag that a Goto sends",
+                fix=f"make the visibility of '{hidden[0]}' scoped or global" if hidden else "add a Goto",
+            )
+        return found
+
+    def _sees(self, level: str, place: str, visibility: str) -> bool:
+        if visibility == "local":
+            return level == place
+        return visibility == "global" or not place or level == place or level.startswith(place + "/")

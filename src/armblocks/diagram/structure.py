@@ -1,0 +1,181 @@
+"""Blocks that give a diagram its structure: a diagram inside a block, and its ends.
+
+A virtual block stands for wires only. It has no equations, and :mod:`armblocks.diagram.hierarchy` replaces it
+by the wires that it means before a diagram is traced.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.parameter import ParameterKind, parameter
+from armblocks.diagram.port import Port, PortRef
+from armblocks.equations import Shape
+from armblocks.errors import DiagramError, InputError
+
+ANY = -1.0
+"""The dimensions of a port that takes whatever is connected."""
+
+
+def stated_shape(block: Inport | Outport) -> Shape | None:
+    """The shape that an end of a diagram asks for; ``None`` where it takes any."""
+    given = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64)).tolist()
+    if given == [ANY]:
+        return None
+    return () if given == [1.0] else tuple(int(size) for size in given)
+
+
+def _check_dimensions(block: Inport | Outport) -> None:
+    given = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64))
+    whole = bool(np.all((given >= 1.0) & (given == np.floor(given))))
+    if given.tolist() != [ANY] and not (whole and given.size <= 2):
+        raise InputError(
+            f"the dimensions are {given.tolist()}",
+            where=f"{block.type_name()}.dimensions",
+            allowed="-1 (any), 1 (a scalar), n (a vector), or (m, n) (a matrix)",
+            fix="give whole numbers from 1",
+        )
+
+
+_DIMENSIONS = "what passes: 1 a scalar, n a vector, (m, n) a matrix; -1 takes what is connected"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inport(Block):
+    """What enters a subsystem: y = the signal at the subsystem's input of this name.
+
+    At the top of the hierarchy nothing is connected from outside, and it gives ``value``.
+    """
+
+    family: ClassVar[str] = "structure"
+    title: ClassVar[str] = "In"
+
+    port: int = parameter(0, minimum=0, doc="its place among the inputs, from 1; 0 takes the next free one")
+    dimensions: ArrayLike = parameter(
+        ANY, kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc=_DIMENSIONS
+    )
+    unit: str = parameter("", doc="SI unit of the signal, for people")
+    value: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="what it gives where nothing is around the diagram"
+    )
+
+    def check(self) -> None:
+        _check_dimensions(self)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "what enters", self.unit, stated_shape(self)),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        stated = stated_shape(self)
+        return {"y": np.shape(self.value) if stated is None else stated}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        value, stated = p["value"], stated_shape(self)
+        if stated is not None and value.numel() not in (1, math.prod(stated)):
+            raise InputError(
+                f"the value has {value.numel()} entries",
+                where="Inport.value",
+                allowed=f"one, or the dimensions {stated}",
+                fix="change value or dimensions",
+            )
+        return {"y": value}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outport(Block):
+    """What leaves a subsystem: the subsystem's output of this name = u."""
+
+    family: ClassVar[str] = "structure"
+    title: ClassVar[str] = "Out"
+
+    port: int = parameter(0, minimum=0, doc="its place among the outputs, from 1; 0 takes the next free one")
+    dimensions: ArrayLike = parameter(
+        ANY, kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc=_DIMENSIONS
+    )
+    unit: str = parameter("", doc="SI unit of the signal, for people")
+
+    def check(self) -> None:
+        _check_dimensions(self)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what leaves", self.unit, stated_shape(self)),)
+
+
+PASS_THROUGH = Diagram(
+    name="Subsystem",
+    blocks={"In1": Inport(port=1), "Out1": Outport(port=1)},
+    connections=(Connection(PortRef("In1", "y"), PortRef("Out1", "u")),),
+)
+"""What a new subsystem holds: its input is its output."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subsystem(Block):
+    """A diagram inside a block, whose In and Out blocks are the ports; signals are name/block/port."""
+
+    family: ClassVar[str] = "structure"
+    title: ClassVar[str] = "Subsystem"
+    virtual: ClassVar[bool] = True
+
+    diagram: Diagram = parameter(
+        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
+    )
+
+    def check(self) -> None:
+        ends(self.diagram, Inport)
+        ends(self.diagram, Outport)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return inner_inputs(self.diagram)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return inner_outputs(self.diagram)
+
+
+def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[str, Inport | Outport], ...]:
+    """The In or Out blocks of a diagram with their names, in the order of their numbers.
+
+    Raises ``DiagramError`` for a number given twice.
+    """
+    found = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
+    found.sort(key=lambda entry: (entry[1].port or math.inf, entry[0]))
+    for (one, first), (two, second) in pairwise(found):
+        if first.port and first.port == second.port:
+            raise DiagramError(
+                f"'{one}' and '{two}' are both {kind.title} number {first.port}",
+                where=f"diagram '{diagram.name}'",
+                allowed="every number once",
+                fix="give one of them another port number",
+            )
+    return tuple(found)
+
+
+def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
+    """The ports that the In blocks of a diagram are from outside."""
+    return diagram.keep(
+        "inner inputs",
+        lambda: tuple(
+            Port(name, f"In block '{name}'", block.unit, stated_shape(block))
+            for name, block in ends(diagram, Inport)
+        ),
+    )
+
+
+def inner_outputs(diagram: Diagram) -> tuple[Port, ...]:
+    """The ports that the Out blocks of a diagram are from outside."""
+    return diagram.keep(
+        "inner outputs",
+        lambda: tuple(
+            Port(name, f"Out block '{name}'", block.unit, stated_shape(block))
+            for name, block in ends(diagram, Outport)
+        ),
+    )

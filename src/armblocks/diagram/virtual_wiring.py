@@ -1,0 +1,185 @@
+"""Virtual blocks that lead wires: tags, and buses that carry several named signals on one wire."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.parameter import parameter
+from armblocks.diagram.port import Port
+from armblocks.diagram.worked_example import WorkedExample, made
+from armblocks.errors import InputError
+
+_NAMES = "names of letters, digits and _, separated by commas, each once"
+_PATHS = "paths of elements, such as speed or motor.speed, separated by commas, each once"
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """The entries of a list such as ``"speed, torque"``."""
+    return tuple(entry.strip() for entry in text.split(",") if entry.strip())
+
+
+def port_names(paths: tuple[str, ...]) -> tuple[str, ...]:
+    """A port name for each path of a bus element: its last part, or all of them where that is not enough."""
+    last = [path.rpartition(".")[2] for path in paths]
+    return tuple(
+        short if last.count(short) == 1 else path.replace(".", "_") for short, path in zip(last, paths)
+    )
+
+
+def _check_list(text: str, where: str, *, nested: bool) -> None:
+    entries = listed(text)
+    parts = [part for entry in entries for part in (entry.split(".") if nested else [entry])]
+    wrong = [part for part in parts if not part.isidentifier()]
+    twice = [entry for entry in entries if entries.count(entry) > 1]
+    if wrong or twice or not entries:
+        offender = f"'{(wrong or twice)[0]}' stands in '{text}'" if wrong or twice else "the list is empty"
+        raise InputError(offender, where=where, allowed=_PATHS if nested else _NAMES, fix="correct the list")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goto(Block):
+    """Sends a signal, without a wire, to the From blocks with the same tag.
+
+    A local tag is known in this diagram only, a scoped one also in the subsystems below, a global one
+    everywhere.
+    """
+
+    family: ClassVar[str] = "routing"
+    title: ClassVar[str] = "Goto"
+    virtual: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="What a Goto sends, a From with the same tag receives, without a wire.",
+        shown=("u", made("From")),
+    )
+
+    tag: str = parameter("A", doc="the name under which the signal is known")
+    visibility: str = parameter("local", choices=("local", "scoped", "global"), doc="where the tag is known")
+
+    def check(self) -> None:
+        _check_tag(self.tag, "Goto.tag")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is sent"),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class From(Block):
+    """Receives the signal that the Goto with the same tag sends."""
+
+    family: ClassVar[str] = "routing"
+    title: ClassVar[str] = "From"
+    virtual: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="What a Goto sends, a From with the same tag receives, without a wire.",
+        besides=(made("Goto").by(u=made("SineWave")),),
+    )
+
+    tag: str = parameter("A", doc="the name under which the signal is known")
+
+    def check(self) -> None:
+        _check_tag(self.tag, "From.tag")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "what is received"),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BusCreator(Block):
+    """Puts several signals on one wire, each under its name; a bus may be an element of a bus."""
+
+    family: ClassVar[str] = "routing"
+    title: ClassVar[str] = "Bus Creator"
+    virtual: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two signals on one wire: the scope shows both under their names.",
+        parameters={"names": "position, speed"},
+        shown=("bus",),
+    )
+
+    names: str = parameter("a, b", doc="the names of the elements, in order")
+
+    def check(self) -> None:
+        _check_list(self.names, "BusCreator.names", nested=False)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return tuple(Port(name, f"element {name}") for name in listed(self.names))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("bus", "all elements on one wire"),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BusSelector(Block):
+    """Takes elements out of a bus by their paths: speed, or motor.speed of a bus within a bus."""
+
+    family: ClassVar[str] = "routing"
+    title: ClassVar[str] = "Bus Selector"
+    virtual: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The speed is taken out of a bus that holds position and speed.",
+        parameters={"elements": "speed"},
+        inputs={"bus": made("BusCreator", names="position, speed")},
+        shown=("bus", "speed"),
+    )
+
+    elements: str = parameter("a, b", doc="the paths of the elements, in order")
+
+    def check(self) -> None:
+        _check_list(self.elements, "BusSelector.elements", nested=True)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("bus", "the bus"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        paths = listed(self.elements)
+        return tuple(Port(name, f"element {path}") for name, path in zip(port_names(paths), paths))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BusAssignment(Block):
+    """The same bus with other signals for some of its elements."""
+
+    family: ClassVar[str] = "routing"
+    title: ClassVar[str] = "Bus Assignment"
+    virtual: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The speed in the bus is replaced by another signal; the position stays.",
+        parameters={"elements": "speed"},
+        inputs={
+            "bus": made("BusCreator", names="position, speed"),
+            "speed": made("SineWave", frequency=3.0).named("new speed"),
+        },
+        shown=("bus assignment/bus",),
+    )
+
+    elements: str = parameter("a", doc="the paths of the elements that are replaced")
+
+    def check(self) -> None:
+        _check_list(self.elements, "BusAssignment.elements", nested=True)
+        if "bus" in port_names(listed(self.elements)):
+            raise InputError(
+                "an element is named 'bus', as the port of the bus itself is",
+                where="BusAssignment.elements",
+                allowed="other names",
+                fix="rename the element where the bus is made",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        paths = listed(self.elements)
+        assigned = (Port(name, f"the new {path}") for name, path in zip(port_names(paths), paths))
+        return (Port("bus", "the bus"), *assigned)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("bus", "the bus with the new elements"),)
+
+
+def _check_tag(tag: str, where: str) -> None:
+    if not tag.isidentifier():
+        raise InputError(
+            f"the tag is '{tag[:60]}'",
+            where=where,
+            allowed="letters, digits and _, not beginning with a digit",
+            fix="choose another tag",
+        )
