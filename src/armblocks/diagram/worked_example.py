@@ -56,7 +56,8 @@ class WorkedExample:
     ``shows`` one or two sentences on what is to be seen. ``parameters`` of the block where the defaults show
     less (robots by name). ``inputs`` by port; a port that is left out gets a signal that fits it. ``shown``:
     the signals of the scope; left out, what feeds the block and what it gives. ``across`` and ``up``: one
-    signal over another instead. ``besides``: blocks that no wire leads to. ``stop_time`` and ``sample_time`` s, of the run and of the record.
+    signal over another instead. ``besides``: blocks that no wire leads to. ``stop_time`` and ``sample_time``
+    s, of the run and of the record.
     """
 
     shows: str = ""
