@@ -11,11 +11,14 @@ from armblocks.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from armblocks import blocks, errors
+    from armblocks.analysis.linear_system import LinearSystem
+    from armblocks.analysis.operating_point import OperatingPoint
     from armblocks.diagram import Diagram, DiagramBuilder
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
     from armblocks.face.block_examples import block_example
     from armblocks.face.diagrams import list_blocks, list_examples, load_diagram, save_diagram
+    from armblocks.face.linearizing import linearize
     from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
     from armblocks.face.payload import Payload
     from armblocks.face.reporting import write_report
@@ -49,8 +52,10 @@ else:
             "FrictionModel": "armblocks.robot",
             "JointLimits": "armblocks.robot",
             "JointTrajectory": "armblocks.face.trajectory",
+            "LinearSystem": "armblocks.analysis.linear_system",
             "Link": "armblocks.robot",
             "Motor": "armblocks.robot",
+            "OperatingPoint": "armblocks.analysis.operating_point",
             "Payload": "armblocks.face.payload",
             "Prismatic": "armblocks.robot",
             "Revolute": "armblocks.robot",
@@ -63,6 +68,7 @@ else:
             "compile_diagram": "armblocks.face.model",
             "errors": "armblocks.errors",
             "jtraj": "armblocks.face.trajectory",
+            "linearize": "armblocks.face.linearizing",
             "list_blocks": "armblocks.face.diagrams",
             "list_examples": "armblocks.face.diagrams",
             "list_robots": "armblocks.face.robots",
@@ -87,8 +93,10 @@ __all__ = [
     "FrictionModel",
     "JointLimits",
     "JointTrajectory",
+    "LinearSystem",
     "Link",
     "Motor",
+    "OperatingPoint",
     "Payload",
     "Prismatic",
     "Revolute",
@@ -101,6 +109,7 @@ __all__ = [
     "compile_diagram",
     "errors",
     "jtraj",
+    "linearize",
     "list_blocks",
     "list_examples",
     "list_robots",

@@ -34,7 +34,10 @@ def functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]
 
 def public_definitions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.ClassDef]:
     for node in tree.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name.startswith("_"):
+            continue
+        # Of an overloaded function the last one, which is the one that runs, has the docstring.
+        if not any(isinstance(mark, ast.Name) and mark.id == "overload" for mark in node.decorator_list):
             yield node
 
 

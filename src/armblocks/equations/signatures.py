@@ -6,6 +6,7 @@ one after the other, and a matrix lies row by row (C order), so that a NumPy res
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,14 @@ class Slot:
     def size(self) -> int:
         """Count of scalars."""
         return math.prod(self.shape)
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """A name for each scalar, row by row: ``clock/y``; ``rne/tau[0]``, …; ``fkine/T[0,3]``."""
+        if not self.shape:
+            return (self.name,)
+        places = itertools.product(*(range(count) for count in self.shape))
+        return tuple(f"{self.name}[{','.join(map(str, place))}]" for place in places)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -23,11 +22,8 @@ Array = NDArray[np.float64]
 
 
 def element_names(slot: Slot) -> tuple[str, ...]:
-    """A name for each scalar of a quantity, row by row: ``clock/y``; ``rne/tau[0]``, …; ``fkine/T[0,3]``."""
-    if not slot.shape:
-        return (slot.name,)
-    places = itertools.product(*(range(count) for count in slot.shape))
-    return tuple(f"{slot.name}[{','.join(map(str, place))}]" for place in places)
+    """A name for each scalar of a quantity."""
+    return slot.elements
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,1 @@
+"""Linear systems and operating points: what is worked out of a system's equations and their derivatives."""

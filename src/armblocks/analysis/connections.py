@@ -1,0 +1,119 @@
+"""Linear systems put together: one after the other, side by side, in a loop."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+
+def _together(first: LinearSystem, second: LinearSystem) -> float:
+    if first.dt != second.dt:
+        raise InputError(
+            f"systems with the sample times {first.dt:g} s and {second.dt:g} s are put together",
+            allowed="one sample time, or continuous systems only",
+            fix="linearize the whole diagram instead",
+        )
+    return first.dt
+
+
+def _refuse_sizes(what: str, found: object, wanted: object) -> InputError:
+    return InputError(f"{what} does not fit: {found}", allowed=f"{wanted}", fix="choose ends with select()")
+
+
+def _states(first: LinearSystem, second: LinearSystem) -> dict[str, tuple[str, ...]]:
+    """All states' names, if no two are alike."""
+    names = (*first.states, *second.states)
+    units = (*first.state_units, *second.state_units)
+    return {"states": names if len(set(names)) == len(names) else (), "state_units": units}
+
+
+def series(second: LinearSystem, first: LinearSystem) -> LinearSystem:
+    """``second`` behind ``first``. Raises ``InputError`` where the widths differ."""
+    dt = _together(first, second)
+    if second.D.shape[1] != first.D.shape[0]:
+        raise _refuse_sizes("a series", f"{first.D.shape[0]} into {second.D.shape[1]}", "equal widths")
+    corner = np.zeros((first.order, second.order))
+    return dataclasses.replace(
+        second,
+        A=np.block([[first.A, corner], [second.B @ first.C, second.A]]),
+        B=np.vstack([first.B, second.B @ first.D]),
+        C=np.hstack([second.D @ first.C, second.C]),
+        D=second.D @ first.D,
+        dt=dt,
+        inputs=first.inputs,
+        input_units=first.input_units,
+        point=None,
+        **_states(first, second),
+    )
+
+
+def parallel(first: LinearSystem, second: LinearSystem) -> LinearSystem:
+    """The sum of the outputs for the same inputs. Raises ``InputError`` where the widths differ."""
+    dt = _together(first, second)
+    if first.D.shape != second.D.shape:
+        raise _refuse_sizes("a sum", f"shapes {first.D.shape} and {second.D.shape}", "equal shapes")
+    corner = np.zeros((first.order, second.order))
+    return dataclasses.replace(
+        first,
+        A=np.block([[first.A, corner], [corner.T, second.A]]),
+        B=np.vstack([first.B, second.B]),
+        C=np.hstack([first.C, second.C]),
+        D=first.D + second.D,
+        dt=dt,
+        point=None,
+        **_states(first, second),
+    )
+
+
+def feedback(forward: LinearSystem, back: LinearSystem | float, sign: int) -> LinearSystem:
+    """``forward`` with ``back`` (a system, or a factor for each output) from its outputs to its inputs.
+
+    Raises ``InputError`` where widths differ or the loop has no solution at all (``I - sign D D`` singular).
+    """
+    ny, nu = forward.D.shape
+    if isinstance(back, int | float):
+        if ny != nu:
+            raise _refuse_sizes("a loop", f"{ny} outputs to {nu} inputs", "as many outputs as inputs")
+        empty = np.zeros((0, 0))
+        back = dataclasses.replace(
+            forward,
+            A=empty,
+            B=np.zeros((0, ny)),
+            C=np.zeros((nu, 0)),
+            D=float(back) * np.eye(ny),
+            states=(),
+            state_units=(),
+            inputs=(),
+            outputs=(),
+            input_units=(),
+            output_units=(),
+        )
+    dt = _together(forward, back)
+    if back.D.shape != (nu, ny):
+        raise _refuse_sizes("a loop", f"the way back has shape {back.D.shape}", f"shape {(nu, ny)}")
+    loop = np.eye(nu) - sign * back.D @ forward.D
+    if np.linalg.cond(loop) > 1e14:
+        raise InputError(
+            "the loop of direct ways is singular", allowed="1 + D not 0", fix="change a gain in the loop"
+        )
+    # u = loop^-1 (v + sign (C2 x2 + D2 C1 x1))
+    inverse = np.linalg.inv(loop)
+    u1, u2 = sign * inverse @ back.D @ forward.C, sign * inverse @ back.C
+    y1, y2, yv = forward.C + forward.D @ u1, forward.D @ u2, forward.D @ inverse
+    return dataclasses.replace(
+        forward,
+        A=np.block([[forward.A + forward.B @ u1, forward.B @ u2], [back.B @ y1, back.A + back.B @ y2]]),
+        B=np.vstack([forward.B @ inverse, back.B @ yv]),
+        C=np.hstack([y1, y2]),
+        D=yv,
+        dt=dt,
+        point=None,
+        **_states(forward, back),
+    )

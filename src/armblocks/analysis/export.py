@@ -1,0 +1,104 @@
+"""Linear systems for other programs: files, and python-control."""
+
+from __future__ import annotations
+
+import io
+import json
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.files import write_atomically
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+FORMAT = "armblocks linear system 1"
+
+
+def to_control(system: LinearSystem) -> Any:
+    """A ``control.StateSpace`` with the same matrices and names.
+
+    Raises ``InputError`` where python-control is not installed.
+    """
+    import importlib
+
+    try:
+        control: Any = importlib.import_module("control")
+    except ImportError:
+        raise InputError(
+            "python-control is not installed",
+            allowed="an environment that has the package 'control'",
+            fix="pip install control",
+        ) from None
+
+    def plain(names: tuple[str, ...]) -> list[str]:
+        # python-control gives dots and brackets in names a meaning of their own.
+        return [name.replace(".", "_").replace("[", "_").replace("]", "").replace(",", "_") for name in names]
+
+    return control.StateSpace(
+        system.A,
+        system.B,
+        system.C,
+        system.D,
+        system.dt,
+        states=plain(system.states),
+        inputs=plain(system.inputs),
+        outputs=plain(system.outputs),
+        remove_useless_states=False,
+    )
+
+
+def save(system: LinearSystem, path: str | PathLike[str]) -> None:
+    """Write a file by its suffix. Raises ``UnknownNameError`` for another suffix, ``FormatError`` where the
+    file cannot be written."""
+    target = Path(path)
+    writers = {".json": _json, ".npz": _npz, ".mat": _mat}
+    if target.suffix not in writers:
+        raise UnknownNameError("file format", target.suffix, writers, where=str(path))
+    write_atomically(target, writers[target.suffix](system))
+
+
+def _description(system: LinearSystem) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "name": system.name,
+        "dt": system.dt,
+        "time": None if system.point is None else system.point.time,
+        "states": list(system.states),
+        "inputs": list(system.inputs),
+        "outputs": list(system.outputs),
+        "state_units": list(system.state_units),
+        "input_units": list(system.input_units),
+        "output_units": list(system.output_units),
+    }
+
+
+def _json(system: LinearSystem) -> bytes:
+    document = {**_description(system), **{letter: getattr(system, letter).tolist() for letter in "ABCD"}}
+    return (json.dumps(document, indent=1) + "\n").encode()
+
+
+def _npz(system: LinearSystem) -> bytes:
+    import numpy as np
+
+    buffer = io.BytesIO()
+    arrays: dict[str, Any] = {letter: getattr(system, letter) for letter in "ABCD"}
+    arrays["description"] = np.array(json.dumps(_description(system)))
+    np.savez(buffer, allow_pickle=False, **arrays)
+    return buffer.getvalue()
+
+
+def _mat(system: LinearSystem) -> bytes:
+    """As MATLAB's ``ss(A, B, C, D, Ts)`` takes them."""
+    import numpy as np
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    content: dict[str, Any] = {letter: getattr(system, letter) for letter in "ABCD"}
+    content["Ts"] = system.dt
+    for kind in ("states", "inputs", "outputs"):
+        content[kind] = np.array(getattr(system, kind), dtype=object)
+    savemat(buffer, content, oned_as="column")
+    return buffer.getvalue()

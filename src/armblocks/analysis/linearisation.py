@@ -1,0 +1,249 @@
+"""The exact linear system of a hybrid system at an operating point.
+
+Between ticks the implicit function theorem takes the unknowns out::
+
+    dw = -r_w^-1 (r_x dx + r_z dz + r_p du)        dx' = A dx + Z dz + B du       dy = C dx + E dz + D du
+
+Without clocks ``dz = 0``: modes keep the value that they have. With clocks the system is looked at once a
+period, which is the least common multiple of all clocks' periods; its state is ``x`` and what the clocks
+move of ``z``, just before the first tick of the period. The inputs are held over the period. Each tick
+multiplies by the slopes of ``update`` and each time between ticks by a matrix exponential, so that the map
+over one period is exact (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 4.3, for one
+clock).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.operating_point import OperatingPoint
+from armblocks.equations import HybridSystem, Signature
+from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
+from armblocks.errors import InputError, SimulationError, UnknownNameError
+
+Array = NDArray[np.float64]
+
+MOST_TICKS = 100_000
+"""Of one period: beyond that, the clocks have next to no common multiple."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ends:
+    """What a linear system is seen through: names and units of the scalars that go in and come out."""
+
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+
+
+def linearise(
+    evaluated: EvaluatedSystem, point: Point, ends: Ends, known: OperatingPoint | None = None
+) -> LinearSystem:
+    """The linear system about a point, whose implicit equations are solved there.
+
+    ``evaluated`` states the parameters that are the inputs and the signals that are the outputs; ``known``
+    is kept with the result. Raises ``SimulationError`` where a slope is not finite or the implicit equations
+    are singular, and ``InputError`` for clocks without a usable common period.
+    """
+    system = evaluated.system
+    unknowns = _unknowns(evaluated, point)
+    flow = _without(evaluated.derivative_slopes(point), unknowns)
+    seen = _without(evaluated.signal_slopes(point), unknowns)
+    names, units = _elements(system.states)
+    _check_finite(system, names, flow, "the rate of state")
+    _check_finite(system, ends.outputs, seen, "the output")
+    if not system.clocks:
+        matrices = (flow.x, flow.p, seen.x, seen.p)
+        dt = 0.0
+    else:
+        moved = np.flatnonzero(evaluated.sampled)
+        matrices, dt = _over_a_period(evaluated, point, unknowns, flow, seen, moved)
+        discrete_names, discrete_units = _elements(system.discrete)
+        names += tuple(discrete_names[k] for k in moved.tolist())
+        units += tuple(discrete_units[k] for k in moved.tolist())
+        keep: list[int] = _kept(system, matrices, moved).tolist()
+        a, b, c, d = matrices
+        matrices = (a[np.ix_(keep, keep)], b[keep], c[:, keep], d)
+        names = tuple(names[k] for k in keep)
+        units = tuple(units[k] for k in keep)
+    return LinearSystem(
+        *matrices,
+        dt=dt,
+        states=names,
+        inputs=ends.inputs,
+        outputs=ends.outputs,
+        state_units=units,
+        input_units=ends.input_units,
+        output_units=ends.output_units,
+        name=system.name,
+        point=known,
+    )
+
+
+def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Name and unit of every scalar."""
+    pairs = [(name, slot.unit) for slot in layout for name in slot.elements]
+    return tuple(name for name, _ in pairs), tuple(unit for _, unit in pairs)
+
+
+def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
+    """How the unknowns of the implicit equations follow everything else."""
+    system = evaluated.system
+    if not system.algebraic.size:
+        return None
+    slopes = evaluated.residual_slopes(point)
+    matrix = slopes.w
+    if not np.isfinite(matrix).all() or np.linalg.cond(matrix) > 1e14:
+        raise SimulationError(
+            f"the implicit equations of '{', '.join(system.algebraic.names)}' are singular at this point",
+            where=system.name,
+            allowed="points at which the unknowns follow smoothly from everything else",
+            fix="linearize at another point, or change the loop",
+        )
+
+    def follow(right: Array) -> Array:
+        return np.asarray(-np.linalg.solve(matrix, right), dtype=np.float64)
+
+    return Slopes(t=follow(slopes.t), x=follow(slopes.x), z=follow(slopes.z), w=matrix, p=follow(slopes.p))
+
+
+def _without(slopes: Slopes, unknowns: Slopes | None) -> Slopes:
+    """Total derivatives: with the unknowns following."""
+    if unknowns is None:
+        return slopes
+    return Slopes(
+        t=slopes.t + slopes.w @ unknowns.t,
+        x=slopes.x + slopes.w @ unknowns.x,
+        z=slopes.z + slopes.w @ unknowns.z,
+        w=slopes.w,
+        p=slopes.p + slopes.w @ unknowns.p,
+    )
+
+
+def _check_finite(system: HybridSystem, names: Sequence[str], slopes: Slopes, what: str) -> None:
+    for row, name in enumerate(names):
+        if not all(np.isfinite(part[row]).all() for part in (slopes.x, slopes.z, slopes.p)):
+            raise SimulationError(
+                f"the slope of {what} '{name}' is not finite",
+                where=system.name,
+                allowed="points at which all equations are smooth",
+                fix="linearize at another operating point",
+            )
+
+
+def _over_a_period(
+    evaluated: EvaluatedSystem,
+    point: Point,
+    unknowns: Slopes | None,
+    flow: Slopes,
+    seen: Slopes,
+    moved: NDArray[np.intp],
+) -> tuple[tuple[Array, Array, Array, Array], float]:
+    """The map of ``[x; z]`` over one period, and the output right after its first tick."""
+    from scipy.linalg import expm
+
+    system = evaluated.system
+    n, m, k = system.states.size, moved.size, flow.p.shape[1]
+    period, instants = common_period(system)
+    generator = np.zeros((n + m + k, n + m + k))
+    generator[:n] = np.hstack([flow.x, flow.z[:, moved], flow.p])
+    flows: dict[Fraction, Array] = {}
+    ticks: dict[tuple[int, ...], Array] = {}
+    whole = np.eye(n + m + k)
+    output = np.hstack([seen.x, seen.z[:, moved], seen.p])
+    times = [time for time, _ in instants]
+    for index, (time, ticking) in enumerate(instants):
+        if ticking not in ticks:
+            slopes = _without(evaluated.update_slopes(point, np.array(ticking, dtype=np.float64)), unknowns)
+            jump = np.eye(n + m + k)
+            jump[n : n + m] = np.hstack([slopes.x[moved], slopes.z[np.ix_(moved, moved)], slopes.p[moved]])
+            _check_finite(system, _elements(system.discrete)[0], slopes, "the discrete variable")
+            ticks[ticking] = jump
+        whole = ticks[ticking] @ whole
+        if index == 0:
+            output = output @ whole
+        gap = (times[index + 1] if index + 1 < len(times) else times[0] + period) - time
+        if gap not in flows:
+            flows[gap] = expm(generator * float(gap))
+        whole = flows[gap] @ whole
+    size = n + m
+    a, b = whole[:size, :size], whole[:size, size:]
+    return (a, b, output[:, :size], output[:, size:]), float(period)
+
+
+def common_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fraction, tuple[int, ...]]]]:
+    """The least common multiple of all periods (s), and every instant of one period with who ticks then.
+
+    Sample times are taken as the decimal numbers that a person wrote. Raises ``InputError`` where one period
+    has more than ``MOST_TICKS`` ticks.
+    """
+    periods = [Fraction(repr(clock.period)) for clock in system.clocks]
+    offsets = [Fraction(repr(clock.offset)) for clock in system.clocks]
+    below = math.lcm(*(period.denominator for period in periods))
+    period = Fraction(math.lcm(*(int(period * below) for period in periods)), below)
+    count = sum(int(period / own) for own in periods)
+    if count > MOST_TICKS:
+        listed = ", ".join(f"{float(own):g} s" for own in periods)
+        raise InputError(
+            f"the clocks ({listed}) have the common period {float(period):g} s with {count} ticks",
+            where=system.name,
+            allowed=f"{MOST_TICKS} ticks in the least common multiple of the sample times",
+            fix="choose sample times that are multiples of one another",
+        )
+    ticking: dict[Fraction, list[int]] = {}
+    for clock, (own, offset) in enumerate(zip(periods, offsets)):
+        for tick in range(int(period / own)):
+            ticking.setdefault(offset + tick * own, [0] * len(periods))[clock] = 1
+    return period, [(time, tuple(who)) for time, who in sorted(ticking.items())]
+
+
+def _kept(
+    system: HybridSystem, matrices: tuple[Array, Array, Array, Array], moved: NDArray[np.intp]
+) -> NDArray[np.intp]:
+    """All states but held outputs that are worked out anew before anybody looks at them."""
+    a, _, c, _ = matrices
+    n = system.states.size
+    held = np.zeros(n + moved.size, dtype=np.bool_)
+    names = [slot.name for slot in system.discrete for _ in range(slot.size)]
+    held[n:] = [names[k] in system.signals_layout.ranges for k in moved]
+    idle = ~(a.any(axis=0) | c.any(axis=0))
+    return np.flatnonzero(~(held & idle))
+
+
+def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], tuple[str, ...]]:
+    """Places in ``p`` and names of the scalars of some parameters, given as name for people to path."""
+    places: list[int] = []
+    names: list[str] = []
+    for name, path in paths.items():
+        slot = system.parameters[path]
+        places += range(*system.parameters.ranges[path].indices(system.parameters.size))
+        names += [name + element.removeprefix(path) for element in slot.elements]
+    return places, tuple(names)
+
+
+def output_ends(system: HybridSystem, wanted: Sequence[str]) -> tuple[list[int], Ends]:
+    """Rows of ``y``, names and units of the scalars of some signals; the inputs are still empty.
+
+    Raises ``UnknownNameError``.
+    """
+    rows: list[int] = []
+    names: list[str] = []
+    units: list[str] = []
+    for name in wanted:
+        path = system.aliases.get(name, name)
+        if path not in system.signals_layout.ranges:
+            known = [*system.signals_layout.names, *system.aliases]
+            raise UnknownNameError("signal", name, known, where=system.name)
+        slot = system.signals_layout[path]
+        rows += range(*system.signals_layout.ranges[path].indices(system.signals_layout.size))
+        names += [name + element.removeprefix(path) for element in slot.elements]
+        units += [slot.unit] * slot.size
+    return rows, Ends(inputs=(), input_units=(), outputs=tuple(names), output_units=tuple(units))

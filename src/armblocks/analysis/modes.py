@@ -1,0 +1,63 @@
+"""Poles, and what each says of the motion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode:
+    """One pole. ``frequency`` rad/s is the natural one, ``|s|``; ``damping`` the ratio ``-Re s / |s|`` (1 for
+    a pole at rest, ``s = 0``, by custom); ``time_constant`` s of its decay, ``-1 / Re s``: infinite on the
+    imaginary axis, negative where it grows. For a discrete system ``s = log(z) / dt``."""
+
+    pole: complex
+    frequency: float
+    damping: float
+    time_constant: float
+
+
+def poles(system: LinearSystem) -> Complex:
+    """Eigenvalues of A, slowest first, conjugates side by side with the positive one first."""
+    from scipy.linalg import eigvals
+
+    if not system.order:
+        return np.empty(0, dtype=np.complex128)
+    return in_order(eigvals(system.A), discrete=system.is_discrete)
+
+
+def in_order(roots: Complex, *, discrete: bool = False) -> Complex:
+    """By distance from rest, then conjugates side by side."""
+    origin = 1.0 if discrete else 0.0
+    distance = np.abs(roots - origin)
+    # Conjugates have the same distance but for rounding, which must not decide who is first.
+    rounded = [float(f"{value:.9e}") for value in distance.tolist()]
+    real = [float(f"{value:.9e}") for value in roots.real.tolist()]
+    order = sorted(range(len(roots)), key=lambda k: (rounded[k], real[k], -float(roots[k].imag)))
+    return roots[order]
+
+
+def modes(system: LinearSystem) -> tuple[Mode, ...]:
+    """One for each pole, in the order of ``poles``."""
+    return tuple(mode_of(complex(pole), system.dt) for pole in poles(system))
+
+
+def mode_of(pole: complex, dt: float = 0.0) -> Mode:
+    """What one pole says."""
+    s = pole
+    if dt > 0.0:
+        s = complex(np.log(pole)) / dt if pole != 0.0 else complex(-math.inf, 0.0)
+    frequency = abs(s)
+    damping = 1.0 if frequency == 0.0 or math.isinf(frequency) else -s.real / frequency
+    time_constant = math.inf if s.real == 0.0 else -1.0 / s.real
+    return Mode(pole=pole, frequency=frequency, damping=damping + 0.0, time_constant=time_constant)

@@ -1,0 +1,145 @@
+"""Operating points: all that a system has to know of a moment, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.equations import Signature
+from armblocks.equations.evaluation import EvaluatedSystem, Point
+from armblocks.errors import SimulationError
+
+Array = NDArray[np.float64]
+
+MOST_ITERATIONS = 60
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OperatingPoint:
+    """The moment ``time`` (s) of a system: states, discrete variables (modes among them), unknowns of
+    implicit equations, tunable parameters and signals, each by its path and in its shape."""
+
+    name: str
+    time: float
+    states: Mapping[str, Array]
+    discrete: Mapping[str, Array]
+    algebraic: Mapping[str, Array]
+    parameters: Mapping[str, Array]
+    signals: Mapping[str, Array]
+
+    def __repr__(self) -> str:
+        head = f"<OperatingPoint of {self.name} at {self.time:g} s>"
+        parts = (*self.states.items(), *self.discrete.items())
+        width = max((len(name) for name, _ in parts), default=0)
+        lines = [f"  {name:<{width}}  {np.array2string(value, precision=6)}" for name, value in parts]
+        return "\n".join([head, *lines])
+
+
+def operating_point(evaluated: EvaluatedSystem, point: Point) -> OperatingPoint:
+    """A point with its signals, by name. ``evaluated`` must work out all signals."""
+    system = evaluated.system
+    return OperatingPoint(
+        name=system.name,
+        time=point.t,
+        states=system.states.unpack(point.x),
+        discrete=system.discrete.unpack(point.z),
+        algebraic=system.algebraic.unpack(point.w),
+        parameters=system.parameters.unpack(point.p),
+        signals=system.signals_layout.unpack(evaluated.signals(point)),
+    )
+
+
+def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
+    """Where a run begins: after the first ticks, with all modes settled and all implicit equations solved.
+
+    Raises ``SimulationError`` where those have no solution near their first guess.
+    """
+    system = evaluated.system
+    x, z, w = evaluated.start(p)
+    point = solved(evaluated, Point(t=0.0, x=x, z=z, w=w, p=p))
+    if system.clocks:
+        ticking = np.array([float(clock.offset == 0.0) for clock in system.clocks])
+        z = evaluated.update(point, ticking)
+        point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
+    if system.discrete.size:
+        z = evaluated.settled(point)
+        point = solved(evaluated, Point(t=0.0, x=x, z=z, w=point.w, p=p))
+    return point
+
+
+def placed(evaluated: EvaluatedSystem, known: OperatingPoint, parameters: Mapping[str, Array]) -> Point:
+    """The same moment in a system that has more parameters, and perhaps other unknowns.
+
+    ``parameters`` gives the values of those that ``known`` does not have. An unknown stands for a signal, so
+    that its value is known too, up to the last Newton step.
+    """
+    system = evaluated.system
+    guess = system.initial_algebraic(system.parameter_values)[0].copy()
+    for name, place in system.algebraic.ranges.items():
+        value = known.algebraic.get(name, _signal_entry(known.signals, name))
+        if value is not None:
+            guess[place] = value
+    point = Point(
+        t=known.time,
+        x=_packed(system.states, known.states),
+        z=_packed(system.discrete, known.discrete),
+        w=guess,
+        p=_packed(system.parameters, {**known.parameters, **parameters}),
+    )
+    return solved(evaluated, point)
+
+
+def _packed(layout: Signature, values: Mapping[str, Array]) -> Array:
+    return layout.pack({name: values[name] for name in layout.names})
+
+
+def _signal_entry(signals: Mapping[str, Array], unknown: str) -> Array | None:
+    """The value of the signal that an unknown stands for: ``sum/y``, or ``sum/y[2]``."""
+    if unknown in signals:
+        return signals[unknown].ravel()
+    path, bracket, index = unknown.rpartition("[")
+    if bracket and path in signals:
+        return signals[path].ravel()[int(index.removesuffix("]"))]
+    return None
+
+
+def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
+    """The point with ``w`` such that the implicit equations hold (Newton, halved where it does not help).
+
+    Raises ``SimulationError``.
+    """
+    system = evaluated.system
+    if not system.algebraic.size:
+        return point
+    w = point.w
+
+    def at(values: Array) -> Point:
+        return Point(t=point.t, x=point.x, z=point.z, w=values, p=point.p)
+
+    residual = evaluated.residual(point)
+    for _ in range(MOST_ITERATIONS):
+        slopes = evaluated.residual_slopes(at(w)).w
+        step = np.linalg.lstsq(slopes, -residual, rcond=None)[0]
+        if np.isfinite(step).all() and np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(w).max())):
+            w = w + step
+            break
+        share = 1.0
+        trial = evaluated.residual(at(w + step))
+        while not np.linalg.norm(trial) < np.linalg.norm(residual) and share > 1e-6:
+            share /= 2.0
+            trial = evaluated.residual(at(w + share * step))
+        if share <= 1e-6:
+            break
+        w, residual = w + share * step, trial
+    if np.abs(residual).max() <= 1e-9 * max(1.0, float(np.abs(w).max())):
+        return at(w)
+    worst = system.algebraic.names[int(np.argmax(np.abs(residual)))]
+    raise SimulationError(
+        f"the implicit equation of '{worst}' has no solution near where it was sought",
+        where=system.name,
+        allowed="points at which every algebraic loop has a solution",
+        fix="start from another operating point",
+    )

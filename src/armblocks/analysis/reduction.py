@@ -1,0 +1,112 @@
+"""Which states inputs reach and outputs follow from, and systems without the others."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.scaling import balanced
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+Array = NDArray[np.float64]
+
+
+def staircase(A: Array, B: Array) -> tuple[Array, int]:
+    """An orthogonal basis (n, n) whose first ``k`` columns span what the inputs reach, and ``k``.
+
+    The staircase algorithm (Van Dooren, IEEE Trans. Automatic Control 26, 1981, 111-129): rank decisions on
+    blocks instead of on the powers of the controllability matrix.
+    """
+    n = A.shape[0]
+    basis = np.eye(n)
+    if not n or not B.size:
+        return basis, 0
+    scale = float(np.linalg.norm(A)) + float(np.linalg.norm(B))
+    tolerance = 10.0 * n * np.finfo(np.float64).eps * scale
+    reached, block = 0, B
+    while True:
+        left, sizes, _ = np.linalg.svd(block)
+        rank = int((sizes > tolerance).sum())
+        if not rank:
+            return basis, reached
+        basis[:, reached:] = basis[:, reached:] @ left
+        turned = basis.T @ A @ basis
+        before, reached = reached, reached + rank
+        if reached == n:
+            return basis, n
+        block = turned[reached:, before:reached]
+
+
+def reachable_dimensions(A: Array, B: Array) -> int:
+    """Dimension of what the inputs reach; with ``A.T`` and ``C.T`` of what the outputs tell apart."""
+    a, b, _ = balanced(A, B, np.zeros((0, A.shape[0])))
+    return staircase(a, b)[1]
+
+
+def minimal(system: LinearSystem) -> LinearSystem:
+    """Without the unreachable, then without the unobservable; unchanged where nothing is to be taken off."""
+    a, b, c = balanced(system.A, system.B, system.C)
+    basis, reached = staircase(a, b)
+    basis = basis[:, :reached]
+    a, b, c = basis.T @ a @ basis, basis.T @ b, c @ basis
+    basis, seen = staircase(a.T, c.T)
+    if seen == system.order:
+        return system
+    basis = basis[:, :seen]
+    return dataclasses.replace(
+        system,
+        A=basis.T @ a @ basis,
+        B=basis.T @ b,
+        C=c @ basis,
+        states=(),
+        state_units=(),
+    )
+
+
+def on_path(system: LinearSystem) -> LinearSystem:
+    """Keep the states on a way from some input to some output, by which entries are not zero."""
+    links = system.A != 0.0
+
+    def spread(begin: NDArray[np.bool_], matrix: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        found = begin
+        while True:
+            more = found | (matrix @ found)
+            if (more == found).all():
+                return found
+            found = more
+
+    reached = (system.B != 0.0).astype(np.intp).sum(axis=1) > 0
+    seen = (system.C != 0.0).astype(np.intp).sum(axis=0) > 0
+    kept = spread(reached, links) & spread(seen, links.T)
+    places = np.flatnonzero(kept)
+    return dataclasses.replace(
+        system,
+        A=system.A[np.ix_(places, places)],
+        B=system.B[places],
+        C=system.C[:, places],
+        states=tuple(system.states[k] for k in places),
+        state_units=tuple(system.state_units[k] for k in places),
+    )
+
+
+def gramians(system: LinearSystem) -> tuple[Array, Array]:
+    """Solutions of the Lyapunov equations of a stable system."""
+    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
+
+    if not system.is_stable:
+        raise InputError(
+            "gramians of a system that is not stable are asked for",
+            where=system.name,
+            allowed="stable systems: elsewhere the integrals grow without end",
+            fix="ask for controllability() and observability()",
+        )
+    inputs, outputs = system.B @ system.B.T, system.C.T @ system.C
+    if system.is_discrete:
+        return solve_discrete_lyapunov(system.A, inputs), solve_discrete_lyapunov(system.A.T, outputs)
+    return solve_continuous_lyapunov(system.A, -inputs), solve_continuous_lyapunov(system.A.T, -outputs)

@@ -1,0 +1,146 @@
+"""A linear system as text and as a notebook shows it."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+Array = NDArray[np.float64]
+
+MOST_SHOWN = 12
+"""Rows and columns of a matrix that is written out."""
+
+STYLE = """
+.ab-linear{font:13px/1.45 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif;color:inherit;max-width:1120px}
+.ab-linear h3{font-size:15px;margin:0 0 2px;font-weight:600}
+.ab-linear p{margin:0 0 8px;opacity:.78}
+.ab-linear table{border-collapse:collapse;margin:0 0 10px;font-variant-numeric:tabular-nums}
+.ab-linear caption{text-align:left;font-weight:600}
+.ab-linear th,.ab-linear td{padding:1px 9px;text-align:right;border:0;background:none;color:inherit}
+.ab-linear th{font-weight:500;opacity:.75}
+"""
+
+
+def number(value: float, digits: int = 5) -> str:
+    """A number of a matrix: no trailing zeros, ``0`` for zero."""
+    return f"{value + 0.0:.{digits}g}"
+
+
+def complex_number(value: complex, digits: int = 5) -> str:
+    """``-1.5``, or ``-0.5 + 2j``."""
+    if value.imag == 0.0:
+        return number(value.real, digits)
+    sign = "+" if value.imag >= 0 else "-"
+    return f"{number(value.real, digits)} {sign} {number(abs(value.imag), digits)}j"
+
+
+def heading(system: LinearSystem) -> str:
+    """What it is, in one line."""
+    kind = f"sampled every {system.dt:g} s" if system.is_discrete else "continuous"
+    counts = ", ".join(
+        f"{count} {word}{'' if count == 1 else 's'}"
+        for count, word in (
+            (system.order, "state"),
+            (len(system.inputs), "input"),
+            (len(system.outputs), "output"),
+        )
+    )
+    when = f" at {system.point.time:g} s" if system.point is not None else ""
+    return f"{system.name or 'linear system'}{when}: {kind}, {counts}, {stability(system)}"
+
+
+def stability(system: LinearSystem) -> str:
+    """In words; a pole on the edge is neither stable nor growing."""
+    poles = system.poles()
+    growth = np.abs(poles) - 1.0 if system.is_discrete else poles.real
+    if (growth < 0.0).all():
+        return "stable"
+    size = max(1.0, float(np.abs(poles).max(initial=0.0)))
+    return "on the edge of stability" if growth.max() <= 1e-9 * size else "unstable"
+
+
+def matrix_lines(matrix: Array, rows: tuple[str, ...], columns: tuple[str, ...]) -> list[str]:
+    """A matrix with names, in columns; the middle of a large one is left out."""
+    chosen_rows, chosen_columns = _shown(len(rows)), _shown(len(columns))
+    table = [["", *("…" if k is None else columns[k] for k in chosen_columns)]]
+    for i in chosen_rows:
+        cells = ["…" if i is None or k is None else number(float(matrix[i, k])) for k in chosen_columns]
+        table.append(["…" if i is None else rows[i], *cells])
+    widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+    return [
+        "  ".join(
+            [row[0].ljust(widths[0]), *(cell.rjust(w) for cell, w in zip(row[1:], widths[1:]))]
+        ).rstrip()
+        for row in table
+    ]
+
+
+def _shown(count: int) -> list[int | None]:
+    if count <= MOST_SHOWN:
+        return list(range(count))
+    half = MOST_SHOWN // 2
+    return [*range(half), None, *range(count - half, count)]
+
+
+def matrices(system: LinearSystem) -> list[tuple[str, Array, tuple[str, ...], tuple[str, ...]]]:
+    """Letter, matrix, names of rows and of columns; only those that have entries."""
+    all_four = [
+        ("A", system.A, system.states, system.states),
+        ("B", system.B, system.states, system.inputs),
+        ("C", system.C, system.outputs, system.states),
+        ("D", system.D, system.outputs, system.inputs),
+    ]
+    return [entry for entry in all_four if entry[1].size]
+
+
+def system_text(system: LinearSystem) -> str:
+    """Heading, matrices, poles."""
+    lines = [f"<LinearSystem {heading(system)}>"]
+    for letter, matrix, rows, columns in matrices(system):
+        lines.append(f"  {letter}")
+        lines += [f"    {line}" for line in matrix_lines(matrix, rows, columns)]
+    if system.order:
+        lines.append("  poles: " + ", ".join(complex_number(pole) for pole in system.poles().tolist()[:30]))
+    return "\n".join(lines)
+
+
+def system_html(system: LinearSystem) -> str:
+    """Heading, matrices and a table of the poles, as one self-contained piece of HTML."""
+    parts = [
+        f'<div class="ab-linear"><style>{STYLE}</style><h3>Linear system</h3><p>{escape(heading(system))}</p>'
+    ]
+    for letter, matrix, rows, columns in matrices(system):
+        chosen_rows, chosen_columns = _shown(len(rows)), _shown(len(columns))
+        head = "".join(f"<th>{'…' if k is None else escape(columns[k])}</th>" for k in chosen_columns)
+        body = "".join(
+            f"<tr><th>{'…' if i is None else escape(rows[i])}</th>"
+            + "".join(
+                f"<td>{'…' if i is None or k is None else number(float(matrix[i, k]))}</td>"
+                for k in chosen_columns
+            )
+            + "</tr>"
+            for i in chosen_rows
+        )
+        parts.append(f"<table><caption>{letter}</caption><tr><th></th>{head}</tr>{body}</table>")
+    if system.order:
+        rows_html = "".join(
+            f"<tr><td>{complex_number(mode.pole)}</td><td>{number(mode.frequency)}</td>"
+            f"<td>{number(mode.damping)}</td><td>{_time(mode.time_constant)}</td></tr>"
+            for mode in system.damp()
+        )
+        parts.append(
+            "<table><caption>Poles</caption><tr><th>pole</th><th>frequency, rad/s</th><th>damping</th>"
+            f"<th>time constant, s</th></tr>{rows_html}</table>"
+        )
+    return "".join(parts) + "</div>"
+
+
+def _time(value: float) -> str:
+    return "∞" if math.isinf(value) else number(value)

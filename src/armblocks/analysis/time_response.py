@@ -1,0 +1,251 @@
+"""Step, impulse and forced responses, exact at every instant: matrix exponentials instead of steps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+Array = NDArray[np.float64]
+
+MOST_INSTANTS = 20_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepMeasures:
+    """What a step response is judged by (all times in s, ``nan`` where there is no such thing).
+
+    ``final``: the value at rest; ``rise_time`` from 10 to 90 per cent of it; ``settling_time`` after which it
+    stays within 2 per cent; ``overshoot`` and ``undershoot`` per cent of it; ``peak`` the largest value in
+    its direction and ``peak_time`` when.
+    """
+
+    final: float
+    rise_time: float
+    settling_time: float
+    overshoot: float
+    undershoot: float
+    peak: float
+    peak_time: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TimeResponse:
+    """``values`` (N, ny, nu): every output for every input by itself, at ``time`` (N,) s.
+
+    A forced response has one column for all inputs together. ``states`` (N, nx, nu) likewise.
+    """
+
+    system: LinearSystem
+    kind: str
+    time: Array
+    values: Array
+    states: Array
+
+    def measures(self, output: int = 0, column: int = 0) -> StepMeasures:
+        """Rise, settling and overshoot of one step response."""
+        final = float(self.system.dcgain()[output, column]) if self.system.is_stable else math.nan
+        return step_measures(self.time, self.values[:, output, column], final)
+
+
+def natural_times(system: LinearSystem) -> tuple[float, float]:
+    """How long the slowest motion takes to die away (or to show how it grows), and the fastest time, s."""
+    small = system.minimal()
+    poles = small.poles()
+    if small.is_discrete:
+        poles = np.log(poles[np.abs(poles) > 1e-6]) / small.dt
+    sizes = np.abs(poles)
+    largest = float(sizes.max(initial=0.0))
+    moving = poles[sizes > 1e-9 * largest] if largest > 0.0 else poles[:0]
+    if not moving.size:
+        return (100.0 * system.dt if system.is_discrete else 1.0), 1.0
+    fastest = 1.0 / largest
+    spans: list[float] = []
+    for pole in moving.tolist():
+        decay = abs(pole.real)
+        turns = 2.0 * math.pi / abs(pole.imag) if pole.imag else math.inf
+        if decay < 1e-3 * abs(pole):
+            spans.append(10.0 * turns)  # hardly damped: ten turns show it
+        elif pole.real < 0.0:
+            spans.append(min(7.0 / decay, 25.0 * turns))
+        else:
+            spans.append(4.0 / decay)
+    span = max(spans) if all(pole.real <= 0.0 for pole in moving.tolist()) else min(spans)
+    return span, fastest
+
+
+def _instants(system: LinearSystem, stop_time: float | None, points: int) -> Array:
+    span, fastest = natural_times(system)
+    end = span if stop_time is None else float(stop_time)
+    if not (math.isfinite(end) and end > 0.0):
+        raise InputError(f"the stop time is {stop_time}", allowed="a finite time > 0 s")
+    if system.is_discrete:
+        count = max(round(end / system.dt), 1)
+        return system.dt * np.arange(min(count, MOST_INSTANTS) + 1, dtype=np.float64)
+    if stop_time is None:
+        end = _rounded_up(end)
+    # Enough for the fastest motion that a person can see on the whole.
+    count = int(min(max(points, 8.0 * end / fastest), 4000.0))
+    return np.linspace(0.0, end, count + 1, dtype=np.float64)
+
+
+def _rounded_up(span: float) -> float:
+    power = 10.0 ** math.floor(math.log10(span))
+    return next(
+        f * power for f in (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0) if f * power >= span * 0.999
+    )
+
+
+def _powers(transition: Array, start: Array, count: int) -> Array:
+    """``start, transition start, …`` (count, rows, columns)."""
+    states = np.empty((count, *start.shape))
+    states[0] = start
+    for k in range(1, count):
+        states[k] = transition @ states[k - 1]
+    return states
+
+
+def step_response(system: LinearSystem, stop_time: float | None, points: int) -> TimeResponse:
+    """Of every output to every input; ``stop_time`` s, or long enough for the slowest motion."""
+    time = _instants(system, stop_time, points)
+    n, nu = system.B.shape
+    # Inputs that stand still are states with no rate of their own.
+    transition = _held(system, float(time[1]))
+    start = np.vstack([np.zeros((n, nu)), np.eye(nu)])
+    states = _powers(transition, start, time.size)[:, :n]
+    return TimeResponse(
+        system=system, kind="step", time=time, values=system.C @ states + system.D, states=states
+    )
+
+
+def impulse_response(system: LinearSystem, stop_time: float | None, points: int) -> TimeResponse:
+    """Of every output to every input. The jump of a direct way at time 0 is not shown: it has no height."""
+    time = _instants(system, stop_time, points)
+    n = system.order
+    transition = _held(system, float(time[1]))[:n, :n]
+    if system.is_discrete:
+        later = _powers(transition, system.B, time.size - 1)
+        states = np.concatenate([np.zeros((1, *system.B.shape)), later])
+        values = system.C @ states
+        values[0] += system.D
+    else:
+        states = _powers(transition, system.B, time.size)
+        values = system.C @ states
+    return TimeResponse(system=system, kind="impulse", time=time, values=values, states=states)
+
+
+def _held(system: LinearSystem, step: float) -> Array:
+    """The map of ``[x; u]`` over a step with the inputs held."""
+    from scipy.linalg import expm
+
+    n, nu = system.B.shape
+    whole = np.zeros((n + nu, n + nu))
+    whole[:n] = np.hstack([system.A, system.B])
+    if system.is_discrete:
+        whole[n:, n:] = np.eye(nu)
+        return whole
+    return expm(whole * step)
+
+
+def forced_response(
+    system: LinearSystem, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None
+) -> TimeResponse:
+    """See :meth:`LinearSystem.response`. Raises ``InputError`` for shapes and instants that do not fit."""
+    from scipy.linalg import expm
+
+    instants = np.asarray(time, dtype=np.float64)
+    given = np.asarray(inputs, dtype=np.float64)
+    n, nu = system.B.shape
+    given = given[:, None] if given.ndim == 1 and nu == 1 else given
+    steps = np.diff(instants)
+    if instants.ndim != 1 or instants.size < 2 or not (steps > 0.0).all():
+        raise InputError("the instants do not rise", allowed="two or more instants, each after the last, s")
+    if given.shape != (instants.size, nu):
+        raise InputError(
+            f"the inputs have shape {given.shape}", allowed=f"shape {(instants.size, nu)}: instants, inputs"
+        )
+    if system.is_discrete and not np.allclose(steps, system.dt, rtol=1e-9, atol=0.0):
+        raise InputError(
+            f"the instants are not {system.dt:g} s apart", allowed="the sample times of the system"
+        )
+    x = np.zeros(n) if start is None else np.asarray(start, dtype=np.float64)
+    if x.shape != (n,):
+        raise InputError(f"the start has shape {x.shape}", allowed=f"shape {(n,)}, one for each state")
+    states = np.empty((instants.size, n))
+    states[0] = x
+    maps: dict[float, Array] = {}
+    for k, step in enumerate(steps.tolist()):
+        if system.is_discrete:
+            states[k + 1] = system.A @ states[k] + system.B @ given[k]
+            continue
+        key = float(f"{step:.12e}")
+        if key not in maps:
+            # Inputs that rise straight: their slopes are states too (Van Loan, 1978).
+            whole = np.zeros((n + 2 * nu, n + 2 * nu))
+            whole[:n, : n + nu] = np.hstack([system.A, system.B])
+            whole[n : n + nu, n + nu :] = np.eye(nu)
+            maps[key] = expm(whole * step)[:n]
+        slope = (given[k + 1] - given[k]) / step
+        states[k + 1] = maps[key] @ np.concatenate([states[k], given[k], slope])
+    values = states @ system.C.T + given @ system.D.T
+    return TimeResponse(
+        system=system, kind="forced", time=instants, values=values[:, :, None], states=states[:, :, None]
+    )
+
+
+def step_measures(time: Array, values: Array, final: float) -> StepMeasures:
+    """Measures of one curve that ends at ``final``; between instants the curve is taken as straight."""
+    if not math.isfinite(final) or final == 0.0:
+        k = int(np.argmax(np.abs(values)))
+        nan = math.nan
+        return StepMeasures(
+            final=final,
+            rise_time=nan,
+            settling_time=nan,
+            overshoot=nan,
+            undershoot=nan,
+            peak=float(values[k]),
+            peak_time=float(time[k]),
+        )
+    shares = values / final
+    k = int(np.argmax(shares))
+    begin, end = _first_above(time, shares, 0.1), _first_above(time, shares, 0.9)
+    return StepMeasures(
+        final=final,
+        rise_time=end - begin,
+        settling_time=_settled_after(time, shares, 0.02),
+        overshoot=max(0.0, 100.0 * (float(shares[k]) - 1.0)),
+        undershoot=max(0.0, -100.0 * float(shares.min())),
+        peak=float(values[k]),
+        peak_time=float(time[k]),
+    )
+
+
+def _first_above(time: Array, shares: Array, level: float) -> float:
+    above = shares >= level
+    if not above.any():
+        return math.nan
+    k = int(np.argmax(above))
+    if k == 0:
+        return float(time[0])
+    part = (level - shares[k - 1]) / (shares[k] - shares[k - 1])
+    return float(time[k - 1] + part * (time[k] - time[k - 1]))
+
+
+def _settled_after(time: Array, shares: Array, band: float) -> float:
+    outside = np.flatnonzero(np.abs(shares - 1.0) > band)
+    if not outside.size:
+        return 0.0
+    k = int(outside[-1])
+    if k == time.size - 1:
+        return math.nan
+    off, on = abs(shares[k] - 1.0), abs(shares[k + 1] - 1.0)
+    return float(time[k] + (off - band) / (off - on) * (time[k + 1] - time[k]))

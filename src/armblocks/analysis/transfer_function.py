@@ -1,0 +1,94 @@
+"""One output over one input as zeros, poles and gain, from which the polynomials follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TransferFunction:
+    """``gain prod(s - zeros) / prod(s - poles)``, in ``z`` where ``dt`` is not 0.
+
+    The roots are the exact description; the polynomials are multiplied out from them.
+    """
+
+    zeros: Complex
+    poles: Complex
+    gain: float
+    dt: float = 0.0
+
+    @property
+    def numerator(self) -> Array:
+        """Coefficients, highest power first."""
+        return self.gain * _multiplied_out(self.zeros)
+
+    @property
+    def denominator(self) -> Array:
+        """Coefficients, highest power first; the first is 1."""
+        return _multiplied_out(self.poles)
+
+    def __call__(self, s: complex) -> complex:
+        """The value at one complex number."""
+        return complex(self.gain * np.prod(s - self.zeros) / np.prod(s - self.poles))
+
+    def __repr__(self) -> str:
+        letter = "z" if self.dt else "s"
+        above, below = polynomial(self.numerator, letter), polynomial(self.denominator, letter)
+        width = max(len(above), len(below))
+        return f"{above.center(width).rstrip()}\n{'-' * width}\n{below.center(width).rstrip()}"
+
+
+def transfer_function(system: LinearSystem) -> TransferFunction:
+    """Of a system with one input and one output; roots that stand in both are taken off."""
+    if not system.is_siso:
+        raise InputError(
+            f"the system has {system.D.shape[1]} inputs and {system.D.shape[0]} outputs",
+            where=system.name,
+            allowed="one of each",
+            fix="choose with system.select(output, input)",
+        )
+    small = system.minimal()
+    zeros, poles = small.zeros(), small.poles()
+    # The gain from the value at a place far from all roots, where no factor is small.
+    far = 2.0 * max(1e-300, float(np.abs(np.concatenate([zeros, poles])).max(initial=0.0))) or 1.0
+    far = far if len(zeros) + len(poles) else 1.0
+    value = complex(small.at(far)[0, 0])
+    # Factor by factor in pairs, so that nothing overflows.
+    gain = value
+    for k in range(max(len(zeros), len(poles))):
+        gain *= (far - poles[k]) if k < len(poles) else 1.0
+        gain /= (far - zeros[k]) if k < len(zeros) else 1.0
+    return TransferFunction(zeros=zeros, poles=poles, gain=float(np.real(gain)), dt=system.dt)
+
+
+def _multiplied_out(roots: Complex) -> Array:
+    """Coefficients of ``prod(s - roots)``; the roots come in conjugate pairs."""
+    return np.atleast_1d(np.poly(roots)).real.astype(np.float64)
+
+
+def polynomial(coefficients: Array, letter: str) -> str:
+    """``3 s^2 + s - 2``: six digits; what is rounding beside the largest coefficient is left out."""
+    size = float(np.abs(coefficients).max(initial=0.0))
+    parts: list[str] = []
+    for place, value in enumerate(coefficients.tolist()):
+        power = len(coefficients) - 1 - place
+        if abs(value) <= 1e-14 * size:
+            continue
+        number = f"{abs(value):.6g}"
+        unit = "" if power == 0 else letter if power == 1 else f"{letter}^{power}"
+        text = unit if unit and number == "1" else " ".join(part for part in (number, unit) if part)
+        sign = ("-" if value < 0 else "") if not parts else (" - " if value < 0 else " + ")
+        parts.append(sign + text)
+    return "".join(parts) or "0"

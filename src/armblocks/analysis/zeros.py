@@ -1,0 +1,78 @@
+"""Invariant zeros of a state-space system, also with several inputs and outputs.
+
+The algorithm of Emami-Naeini and Van Dooren (Automatica 18, 1982, 415-430): the system is reduced, by
+orthogonal transformations only, to one with an invertible ``D`` and the same finite zeros. Infinite zeros are
+taken off by rank decisions and do not spoil the finite ones, as they do in the plain generalised eigenvalue
+problem.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.modes import in_order
+from armblocks.analysis.scaling import balanced
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def invariant_zeros(A: Array, B: Array, C: Array, D: Array) -> Complex:
+    """The finite numbers at which ``[[A - s I, B], [C, D]]`` has less than its usual rank."""
+    from scipy.linalg import eigvals
+
+    nothing = np.empty(0, dtype=np.complex128)
+    if not A.size or not B.size or not C.size:
+        return nothing
+    a, b, c = balanced(A, B, C)
+    # Inputs and outputs are scaled to one size: this moves no zero.
+    b, d = _columns_scaled(b, D)
+    c, d = (part.T for part in _columns_scaled(c.T, d.T))
+    whole = np.block([[a, b], [c, d]])
+    tolerance = 10.0 * max(whole.shape) * np.finfo(np.float64).eps * float(np.linalg.norm(whole))
+    a, b, c, d = _reduced(a, b, c, d, tolerance)
+    if a.size:
+        # The same of the dual system, whose inputs are the outputs.
+        a, c, b, d = (part.T for part in _reduced(a.T, c.T, b.T, d.T, tolerance))
+    n = a.shape[0]
+    if not n:
+        return nothing
+    if not d.size:
+        return in_order(eigvals(a))
+    # [C D] W = [0 *] takes the inputs out without dividing by D.
+    _, _, right = np.linalg.svd(np.hstack([c, d]))
+    free = right[d.shape[0] :].T
+    return in_order(eigvals(np.hstack([a, b]) @ free, free[:n]))
+
+
+def _columns_scaled(upper: Array, lower: Array) -> tuple[Array, Array]:
+    sizes = np.sqrt((upper**2).sum(axis=0) + (lower**2).sum(axis=0))
+    factors = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
+    return upper * factors, lower * factors
+
+
+def _rank(values: Array, tolerance: float) -> int:
+    return int((values > tolerance).sum())
+
+
+def _reduced(a: Array, b: Array, c: Array, d: Array, tolerance: float) -> tuple[Array, Array, Array, Array]:
+    """A system with the same finite zeros whose ``D`` has full row rank."""
+    while a.shape[0] and d.shape[0]:
+        left, sizes, _ = np.linalg.svd(d)
+        rank = _rank(sizes, tolerance)
+        if rank == d.shape[0]:
+            break
+        c, d = left.T @ c, left.T @ d
+        plain = c[rank:]  # outputs without a direct way from the inputs
+        c, d = c[:rank], d[:rank]
+        _, sizes, right = np.linalg.svd(plain)
+        seen = _rank(sizes, tolerance)
+        if not seen:
+            break
+        turn = np.vstack([right[seen:], right[:seen]]).T  # first the states that these outputs do not see
+        a, b, c = turn.T @ a @ turn, turn.T @ b, c @ turn
+        rest = a.shape[0] - seen
+        c, d = np.vstack([c[:, :rest], a[rest:, :rest]]), np.vstack([d, b[rest:]])
+        a, b = a[:rest, :rest], b[:rest]
+    return a, b, c, d

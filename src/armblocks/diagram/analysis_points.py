@@ -1,0 +1,195 @@
+"""Points of a diagram at which it is linearised: signals that are moved a little, and wires that are cut.
+
+Both are ordinary blocks put into the wires, so that nothing else has to know about them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    Connection,
+    Diagram,
+    ParameterKind,
+    Port,
+    PortRef,
+    Signals,
+    infer_shapes,
+    parameter,
+    shape_of,
+)
+from armblocks.equations import Shape
+from armblocks.errors import InputError, UnknownNameError
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputPoint(Block):
+    """A small change is added to a signal: y = u + offset."""
+
+    family: ClassVar[str] = "analysis"
+    title: ClassVar[str] = "Input Point"
+
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal", shape=shape_of(self.offset)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the signal with the change", shape=shape_of(self.offset)),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] + p["offset"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopOpening(Block):
+    """What arrives goes no further; a fixed level comes out: y = level + offset."""
+
+    family: ClassVar[str] = "analysis"
+    title: ClassVar[str] = "Loop Opening"
+
+    level: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the signal at the operating point")
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal", shape=shape_of(self.level)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the level with the change", shape=shape_of(self.level)),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["level"] + p["offset"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PreparedDiagram:
+    """A diagram with its points in place.
+
+    ``inputs``: for every input that was asked for the path of the parameter that moves it. ``levels``: for
+    every opened wire the parameter that holds its signal, and the path of the signal in the first diagram.
+    """
+
+    diagram: Diagram
+    inputs: Mapping[str, str]
+    levels: Mapping[str, str]
+
+
+def with_analysis_points(
+    diagram: Diagram, inputs: Sequence[str] = (), openings: Sequence[str] = ()
+) -> PreparedDiagram:
+    """Put the points of a linearisation into a diagram.
+
+    An input or opening is an output port ``block/port`` (all wires that leave it), an input port (that one
+    wire), or a block with a single output. An input may also be a tunable parameter, ``block.parameter``.
+    Where a signal is both, the change comes in behind the cut. Raises ``UnknownNameError`` and ``InputError``
+    for names that mean nothing of the kind or stand twice.
+    """
+    parameters: dict[str, str] = {}
+    moved: dict[PortRef, str] = {}
+    for name in _once(inputs, "input"):
+        path = _parameter(diagram, name)
+        if path is None:
+            moved[_port(diagram, name, "input")] = name
+        else:
+            parameters[name] = path
+    opened = {_port(diagram, name, "opening") for name in _once(openings, "opening")}
+    shapes = infer_shapes(diagram)
+    blocks, wires = dict(diagram.blocks), list(diagram.connections)
+    levels: dict[str, str] = {}
+    chosen = {*moved, *opened}
+    # Output ports first: a point at an input port then stands behind that of its driver.
+    for ref in sorted(chosen, key=lambda ref: (not _is_output(diagram, ref), ref)):
+        source = ref if _is_output(diagram, ref) else diagram.drivers[ref]
+        name = _new_name(ref, blocks)
+        shape = shapes.outputs[source.block][source.port]
+        blocks[name] = _point(shape, ref in opened)
+        if ref in opened:
+            levels[f"{name}.level"] = str(source)
+        if ref in moved:
+            parameters[moved[ref]] = f"{name}.offset"
+        wires = _rewired(wires, ref, name, source)
+    prepared = dataclasses.replace(diagram, blocks=blocks, connections=tuple(wires))
+    return PreparedDiagram(
+        diagram=prepared, inputs={name: parameters[name] for name in inputs}, levels=levels
+    )
+
+
+def _once(names: Sequence[str], kind: str) -> Sequence[str]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise InputError(f"the {kind} '{name}' is given twice", allowed="every point once")
+    return names
+
+
+def _parameter(diagram: Diagram, name: str) -> str | None:
+    """The path of a tunable parameter, or ``None`` where the name is no parameter's."""
+    if "/" in name or "." not in name:
+        return None
+    block, _, parameter_name = name.rpartition(".")
+    known = [rule.name for rule in diagram.block(block).parameters() if rule.tunable]
+    if parameter_name not in known:
+        raise UnknownNameError("tunable parameter", parameter_name, known, where=f"block '{block}'")
+    return name
+
+
+def _port(diagram: Diagram, name: str, kind: str) -> PortRef:
+    block_name, _, port = name.rpartition("/") if "/" in name else (name, "", "")
+    block = diagram.block(block_name)
+    outputs = [entry.name for entry in block.output_ports()]
+    if port:
+        known = [*outputs, *(entry.name for entry in block.input_ports())]
+        if port not in known:
+            raise UnknownNameError("port", port, known, where=f"block '{block_name}'")
+        return PortRef(block_name, port)
+    if len(outputs) != 1:
+        raise InputError(
+            f"the {kind} '{name}' is a block with {len(outputs)} outputs",
+            allowed=", ".join(
+                f"{name}/{entry.name}" for entry in (*block.output_ports(), *block.input_ports())
+            ),
+            fix="name the port",
+        )
+    return PortRef(block_name, outputs[0])
+
+
+def _is_output(diagram: Diagram, ref: PortRef) -> bool:
+    return any(port.name == ref.port for port in diagram.blocks[ref.block].output_ports())
+
+
+def _point(shape: Shape, opened: bool) -> Block:
+    nothing = np.zeros(shape)
+    return LoopOpening(level=nothing, offset=nothing) if opened else InputPoint(offset=nothing)
+
+
+def _new_name(ref: PortRef, taken: Mapping[str, Block]) -> str:
+    name = f"{ref.block}:{ref.port}"
+    while name in taken:
+        name += "'"
+    return name
+
+
+def _rewired(wires: Sequence[Connection], ref: PortRef, point: str, source: PortRef) -> list[Connection]:
+    """The wires with a point in those that leave or reach a port."""
+    entry, way_out = PortRef(point, "u"), PortRef(point, "y")
+    if ref == source:
+        changed = [
+            dataclasses.replace(wire, source=way_out) if wire.source == ref else wire for wire in wires
+        ]
+        return [*changed, Connection(source, entry)]
+    before = next(wire for wire in wires if wire.target == ref)
+    others = [wire for wire in wires if wire.target != ref]
+    return [*others, Connection(before.source, entry), Connection(way_out, ref)]

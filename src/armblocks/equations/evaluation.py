@@ -1,0 +1,154 @@
+"""Values and exact slopes of a system at single points, by CasADi's own interpreter.
+
+For the few evaluations of an analysis this is faster than native code, which would first have to be made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from casadi import SX, Function, jacobian, jacobian_sparsity, vertcat
+from numpy.typing import NDArray
+
+from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.traced_function import TracedFunction
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Point:
+    """Where a system is evaluated: time (s) and the flat vectors of the system's layouts."""
+
+    t: float
+    x: Array
+    z: Array
+    w: Array
+    p: Array
+
+    @property
+    def ends(self) -> list[Array]:
+        """The five arguments in the order of the system's functions."""
+        return [np.array([self.t]), self.x, self.z, self.w, self.p]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slopes:
+    """Derivatives of one function: by the time (m, 1), the states (m, nx), the discrete variables (m, nz),
+    the unknowns (m, nw), and those parameters that were asked for (m, k)."""
+
+    t: Array
+    x: Array
+    z: Array
+    w: Array
+    p: Array
+
+
+class EvaluatedSystem:
+    """A system's functions and their derivatives as numbers.
+
+    ``parameters``: indices into ``p`` of those that derivatives are taken by; ``signals``: the rows of ``y``
+    that are worked out (``None``: all). Every function is prepared when first used.
+    """
+
+    def __init__(
+        self, system: HybridSystem, parameters: Sequence[int] = (), signals: Sequence[int] | None = None
+    ) -> None:
+        self.system = system
+        self._parameters = list(parameters)
+        self._signals = None if signals is None else list(signals)
+        self._functions: dict[str, Function] = {}
+        self._slopes: dict[str, Function] = {}
+
+    def _rows(self, traced: TracedFunction) -> SX:
+        chosen = self._signals if traced is self.system.signals else None
+        result = vertcat(*traced.results, SX(0, 1))
+        return result if chosen is None else result[chosen]
+
+    def _call(self, traced: TracedFunction, arguments: Sequence[Array]) -> Array:
+        if traced.name not in self._functions:
+            self._functions[traced.name] = Function(
+                "f", list(traced.arguments), [self._rows(traced)], {"cse": True}
+            )
+        (value,) = self._functions[traced.name].call(list(arguments))
+        return np.asarray(value.full(), dtype=np.float64).reshape(-1)
+
+    def _differentiate(self, traced: TracedFunction, arguments: Sequence[Array]) -> Slopes:
+        t, x, z, w, p = traced.arguments[:5]
+        if traced.name not in self._slopes:
+            chosen = p[self._parameters] if self._parameters else SX(0, 1)
+            by = vertcat(t, x, z, w, chosen)
+            slopes = jacobian(self._rows(traced), by)
+            self._slopes[traced.name] = Function("j", list(traced.arguments), [slopes], {"cse": True})
+        (value,) = self._slopes[traced.name].call(list(arguments))
+        whole = np.asarray(value.full(), dtype=np.float64)
+        ends = np.cumsum([1, x.numel(), z.numel(), w.numel()]).tolist()
+        by_t, by_x, by_z, by_w, by_p = np.split(whole, ends, axis=1)
+        return Slopes(t=by_t, x=by_x, z=by_z, w=by_w, p=by_p)
+
+    # Values.
+
+    def derivative(self, point: Point) -> Array:
+        """``x'`` (nx,)."""
+        return self._call(self.system.derivative, point.ends)
+
+    def signals(self, point: Point) -> Array:
+        """The chosen rows of ``y``."""
+        return self._call(self.system.signals, point.ends)
+
+    def residual(self, point: Point) -> Array:
+        """``r`` (nw,)."""
+        return self._call(self.system.residual, point.ends)
+
+    def guards(self, point: Point) -> Array:
+        """``g`` (ng,)."""
+        return self._call(self.system.guards, point.ends)
+
+    def update(self, point: Point, ticking: Array) -> Array:
+        """``z`` (nz,) after the clocks with ``ticking[k] = 1`` have ticked."""
+        return self._call(self.system.update, [*point.ends, ticking])
+
+    def settled(self, point: Point) -> Array:
+        """``z`` (nz,) with all modes as the values of the moment want them."""
+        events = np.zeros(len(self.system.guard_directions))
+        reset = self._call(self.system.reset, [*point.ends, events])
+        return reset[self.system.states.size :]
+
+    def start(self, p: Array) -> tuple[Array, Array, Array]:
+        """``x(0)``, ``z(0)`` before the first ticks, and the first guess of ``w``."""
+        system = self.system
+        x, z, w = (
+            self._call(traced, [p])
+            for traced in (system.initial_states, system.initial_discrete, system.initial_algebraic)
+        )
+        return x, z, w
+
+    # Slopes.
+
+    def derivative_slopes(self, point: Point) -> Slopes:
+        """Derivatives of ``x'``."""
+        return self._differentiate(self.system.derivative, point.ends)
+
+    def signal_slopes(self, point: Point) -> Slopes:
+        """Derivatives of the chosen signals."""
+        return self._differentiate(self.system.signals, point.ends)
+
+    def residual_slopes(self, point: Point) -> Slopes:
+        """Derivatives of ``r``."""
+        return self._differentiate(self.system.residual, point.ends)
+
+    def update_slopes(self, point: Point, ticking: Array) -> Slopes:
+        """Derivatives of what ``z`` becomes at a tick."""
+        return self._differentiate(self.system.update, [*point.ends, ticking])
+
+    @cached_property
+    def sampled(self) -> NDArray[np.bool_]:
+        """Which entries of ``z`` some clock moves (nz,); the others are modes and wait for events."""
+        update = self.system.update
+        moved = np.zeros(self.system.discrete.size, dtype=np.bool_)
+        if self.system.clocks:
+            moved[jacobian_sparsity(update.results[0], update.arguments[5]).row()] = True
+        return moved

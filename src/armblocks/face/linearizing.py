@@ -1,0 +1,206 @@
+"""Linearising a diagram: which signals go in and come out, where, and with which loops cut."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, overload
+
+import numpy as np
+
+from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.linearisation import input_ends, linearise, output_ends
+from armblocks.analysis.operating_point import OperatingPoint, initial_point, operating_point, placed
+from armblocks.diagram import Diagram, trace_diagram, with_parameters
+from armblocks.diagram.analysis_points import PreparedDiagram, with_analysis_points
+from armblocks.equations import HybridSystem
+from armblocks.equations.evaluation import EvaluatedSystem, Point
+from armblocks.errors import InputError
+from armblocks.face.diagrams import load_diagram
+from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
+from armblocks.simulation import RunState
+
+Where = float | RunState | OperatingPoint
+"""A time of a run from the diagram's start (s), where a run ended, or an operating point."""
+
+
+@overload
+def linearize(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    inputs: str | Sequence[str] = (),
+    outputs: str | Sequence[str] = (),
+    *,
+    at: Where = 0.0,
+    open: str | Sequence[str] = (),
+    parameters: Mapping[str, object] | None = None,
+    **settings: Any,
+) -> LinearSystem: ...
+
+
+@overload
+def linearize(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    inputs: str | Sequence[str] = (),
+    outputs: str | Sequence[str] = (),
+    *,
+    at: Sequence[float],
+    open: str | Sequence[str] = (),
+    parameters: Mapping[str, object] | None = None,
+    **settings: Any,
+) -> tuple[LinearSystem, ...]: ...
+
+
+def linearize(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    inputs: str | Sequence[str] = (),
+    outputs: str | Sequence[str] = (),
+    *,
+    at: Where | Sequence[float] = 0.0,
+    open: str | Sequence[str] = (),
+    parameters: Mapping[str, object] | None = None,
+    **settings: Any,
+) -> LinearSystem | tuple[LinearSystem, ...]:
+    """The exact linear system of a diagram about an operating point, by differentiating its equations.
+
+    ``inputs``: signals that are moved. ``"step"`` or ``"step/y"`` adds a small change to that output;
+    ``"plant/u"`` to what reaches that input only; ``"const.value"`` moves a tunable parameter. ``outputs``:
+    signals that are looked at, by the names that a result knows. An output port shows the signal before a
+    change that is added to it, an input port what arrives. ``open``: signals that are cut; what comes
+    behind the cut stays as it is at the operating point, but for the change of an input at the same place.
+    So ``inputs="e", outputs="e", open="e"`` is the loop transfer function, signs included.
+
+    ``at``: a time of a run (0: the start), several times (one system each), where a run ended
+    (``result.final_state``) or the point that ``trim`` found. ``parameters`` other values of parameters,
+    ``settings`` those of the run to ``at``, as in :func:`simulate`.
+
+    Modes (a limiter at its limit) stay as they are at the point. A diagram with sample times gives a
+    discrete system with the common period of all clocks, inputs held in between. The time stands still.
+
+    Raises ``UnknownNameError`` and ``InputError`` for names, ``SimulationError`` where the run, or a slope,
+    has no finite value.
+    """
+    described = _diagram(diagram, parameters)
+    wanted, seen, opened = _names(inputs), _names(outputs), _names(open)
+    if isinstance(at, float | int | RunState | OperatingPoint):
+        return _linearized(described, wanted, seen, opened, operating_point_at(described, at, **settings))
+    points = operating_points_at(described, at, **settings)
+    prepared = _Prepared(described, wanted, seen, opened)
+    return tuple(prepared.at(point) for point in points)
+
+
+def _diagram(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str], parameters: Mapping[str, object] | None
+) -> Diagram:
+    if isinstance(diagram, CompiledDiagram):
+        diagram = diagram.diagram
+    elif not isinstance(diagram, Diagram):
+        diagram = load_diagram(diagram)
+    return with_parameters(diagram, parameters) if parameters else diagram
+
+
+def _names(given: str | Sequence[str]) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else tuple(given)
+
+
+def _linearized(
+    diagram: Diagram,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    opened: tuple[str, ...],
+    point: OperatingPoint,
+) -> LinearSystem:
+    return _Prepared(diagram, inputs, outputs, opened).at(point)
+
+
+class _Prepared:
+    """A diagram with its points, traced; linearised as often as wanted."""
+
+    def __init__(
+        self,
+        diagram: Diagram,
+        inputs: tuple[str, ...],
+        outputs: tuple[str, ...],
+        opened: tuple[str, ...],
+    ) -> None:
+        self.points: PreparedDiagram = with_analysis_points(diagram, inputs, opened)
+        system = (
+            compile_diagram(diagram).system
+            if self.points.diagram is diagram
+            else trace_diagram(self.points.diagram)
+        )
+        places, names = input_ends(system, self.points.inputs)
+        rows, ends = output_ends(system, outputs)
+        units = tuple(unit for path in self.points.inputs.values() for unit in _units(system, path))
+        self.ends = dataclasses.replace(ends, inputs=names, input_units=units)
+        self.evaluated = EvaluatedSystem(system, places, rows)
+        self.system = system
+
+    def at(self, known: OperatingPoint) -> LinearSystem:
+        """The linear system about a point of the diagram without points."""
+        layout = self.system.parameters
+        levels = {
+            path: known.signals[signal].reshape(layout[path].shape)
+            for path, signal in self.points.levels.items()
+        }
+        still = {slot.name: np.zeros(slot.shape) for slot in layout if slot.name not in known.parameters}
+        point = placed(self.evaluated, known, still | levels)
+        return linearise(self.evaluated, point, self.ends, known)
+
+
+def _units(system: HybridSystem, path: str) -> tuple[str, ...]:
+    """Units of the scalars of an input: those of the signal that it is added to, or the parameter's own."""
+    slot = system.parameters[path]
+    point, _, name = path.rpartition(".")
+    signal = f"{point}/y"
+    added = name == "offset" and signal in system.signals_layout.ranges
+    return (system.signals_layout[signal].unit if added else slot.unit,) * slot.size
+
+
+def operating_point_at(diagram: Diagram, at: Where, **settings: Any) -> OperatingPoint:
+    """The operating point of a diagram at a time of a run, or where a run ended."""
+    if isinstance(at, OperatingPoint):
+        return at
+    if isinstance(at, float | int):
+        return operating_points_at(diagram, [float(at)], **settings)[0]
+    evaluated = EvaluatedSystem(compile_diagram(diagram).system)
+    return _of_state(evaluated, at)
+
+
+def operating_points_at(diagram: Diagram, times: Sequence[float], **settings: Any) -> list[OperatingPoint]:
+    """Operating points at times of one run, in the order given. Raises ``InputError`` for a negative time."""
+    if not all(np.isfinite(time) and time >= 0.0 for time in times):
+        raise InputError(
+            f"the times to linearize at are {list(times)}", allowed="finite times >= 0 s", fix="change them"
+        )
+    compiled = compile_diagram(diagram)
+    evaluated = EvaluatedSystem(compiled.system)
+    found: dict[float, OperatingPoint] = {}
+    state: RunState | None = None
+    for time in sorted(set(times)):
+        if time == 0.0:
+            point = initial_point(evaluated, compiled.system.parameter_values)
+            found[time] = operating_point(evaluated, point)
+            continue
+        run: dict[str, Any] = {**settings, "stop_time": time}
+        result = simulate(compiled, initial_state=state, **run)
+        state = result.final_state
+        assert state is not None  # a run that fails raises
+        found[time] = _of_state(evaluated, state)
+    return [found[time] for time in times]
+
+
+def _of_state(evaluated: EvaluatedSystem, state: RunState) -> OperatingPoint:
+    system = evaluated.system
+    layouts = (system.states, system.discrete, system.algebraic)
+    if state.names != tuple(layout.names for layout in layouts):
+        raise InputError(
+            f"the state of '{state.name}' at {state.time:g} s has other variables",
+            where=system.name,
+            allowed="a state of the same diagram",
+            fix="run the diagram anew",
+        )
+    point = Point(
+        t=state.time, x=state.states, z=state.discrete, w=state.algebraic, p=system.parameter_values
+    )
+    return operating_point(evaluated, point)

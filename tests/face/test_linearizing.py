@@ -1,0 +1,260 @@
+"""Exact linear systems of diagrams, against what is known of them without the tracing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import armblocks as ab
+from armblocks.blocks import (
+    Constant,
+    Expression,
+    Gain,
+    Integrator,
+    Saturation,
+    Sum,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.errors import InputError, SimulationError, UnknownNameError
+
+
+def oscillator(mass: float = 2.0, damping: float = 0.4, stiffness: float = 8.0) -> ab.Diagram:
+    """m x'' = force - c x' - k x."""
+    builder = ab.DiagramBuilder("oscillator")
+    force = builder.add("force", Constant(value=3.0))
+    total = builder.add("sum", Sum(signs="+--"), force)
+    rate = builder.add("mass", Gain(gain=1.0 / mass), total)
+    speed = builder.add("v", Integrator(), rate)
+    place = builder.add("x", Integrator(), speed)
+    builder.connect(builder.add("c", Gain(gain=damping), speed), total["u2"])
+    builder.connect(builder.add("k", Gain(gain=stiffness), place), total["u3"])
+    return builder.build()
+
+
+def test_an_oscillator_has_the_matrices_of_the_textbook() -> None:
+    system = ab.linearize(oscillator(), "force", ["x", "v"])
+    assert system.states == ("v/x", "x/x")
+    assert np.array_equal(system.A, [[-0.2, -4.0], [1.0, 0.0]])
+    assert np.array_equal(system.B, [[0.5], [0.0]])
+    assert np.array_equal(system.C, [[0.0, 1.0], [1.0, 0.0]])
+    assert np.array_equal(system.D, np.zeros((2, 1)))
+
+
+def test_a_parameter_is_an_input_like_the_signal_that_it_makes() -> None:
+    signal, value = (ab.linearize(oscillator(), name, "x") for name in ("force", "force.value"))
+    assert np.array_equal(signal.B, value.B)
+    stiffness = ab.linearize(oscillator(), "k.gain", "x", at=5.0)
+    assert stiffness.point is not None
+    # d(v')/dk = -x / m
+    assert stiffness.B[0, 0] == pytest.approx(-float(stiffness.point.signals["x/y"]) / 2.0, rel=1e-12)
+
+
+def test_an_opened_loop_is_cut_and_its_signal_stands_still() -> None:
+    loop = ab.linearize(oscillator(), "sum", "sum", open="sum")
+    # The sum is cut: the way around is -(c s + k) / (m s^2).
+    s = 0.7 + 1.3j
+    assert loop.at(s)[0, 0] == pytest.approx(-(0.4 * s + 8.0) / (2.0 * s**2), rel=1e-12)
+    closed = ab.linearize(oscillator(), "sum", "sum")
+    assert closed.at(s)[0, 0] == pytest.approx(loop.at(s)[0, 0] / (1.0 - loop.at(s)[0, 0]), rel=1e-12)
+
+
+def test_an_input_port_is_one_wire_and_an_output_port_all() -> None:
+    one = ab.linearize(oscillator(), "c/u", ["v", "c/u"])
+    assert np.array_equal(one.B[:, 0], [-0.2, 0.0])
+    assert np.array_equal(one.D[:, 0], [0.0, 1.0])  # before and behind the point
+    both = ab.linearize(oscillator(), "v", "v")
+    assert np.array_equal(both.B[:, 0], [-0.2, 1.0])
+
+
+def pendulum() -> ab.Diagram:
+    """qdd = torque - sin(q), starting at 0.5 rad."""
+    builder = ab.DiagramBuilder("pendulum")
+    torque = builder.add("torque", Constant(value=0.0))
+    total = builder.add("sum", Sum(signs="+-"), torque)
+    speed = builder.add("qd", Integrator(initial=0.2), total)
+    angle = builder.add("q", Integrator(initial=0.5), speed)
+    builder.connect(builder.add("sine", Expression(formula="sin(u)"), angle), total["u2"])
+    return builder.build()
+
+
+def test_times_of_a_run_give_one_system_each() -> None:
+    diagram = pendulum()
+    systems = ab.linearize(diagram, "torque", "q", at=[2.0, 0.0, 1.0], rtol=1e-10, atol=1e-12)
+    result = ab.simulate(diagram, stop_time=2.0, sample_time=1.0, rtol=1e-10, atol=1e-12)
+    for system, k in zip(systems, (2, 0, 1)):
+        slope = system.A[system.states.index("qd/x"), system.states.index("q/x")]
+        assert slope == pytest.approx(-np.cos(float(result["q"][k])), abs=1e-9)
+    again = ab.linearize(diagram, "torque", "q", at=result.final_state)
+    assert np.allclose(again.A, systems[0].A, atol=1e-9, rtol=0.0)
+
+
+def test_a_limiter_at_its_limit_lets_nothing_through() -> None:
+    def through(value: float) -> float:
+        builder = ab.DiagramBuilder("limiter")
+        source = builder.add("u", Constant(value=value))
+        builder.add("limit", Saturation(lower=-1.0, upper=1.0), source)
+        return float(ab.linearize(builder.build(), "u", "limit").D[0, 0])
+
+    assert through(0.5) == 1.0
+    assert through(2.0) == 0.0
+
+
+def sampled_servo(period: float) -> ab.Diagram:
+    """x' = -x + hold(gain (1 - x)), the hold every period."""
+    builder = ab.DiagramBuilder("servo")
+    wanted = builder.add("wanted", Constant(value=1.0))
+    error = builder.add("error", Sum(signs="+-"), wanted)
+    held = builder.add("hold", ZeroOrderHold(sample_time=period), builder.add("gain", Gain(gain=2.0), error))
+    rate = builder.add("rate", Sum(signs="+-"), held)
+    state = builder.add("x", Integrator(), rate)
+    builder.connect(state, rate["u2"])
+    builder.connect(state, error["u2"])
+    return builder.build()
+
+
+def test_a_sampled_loop_has_the_map_of_one_period() -> None:
+    period = 0.3
+    system = ab.linearize(sampled_servo(period), "wanted", "x")
+    decay = np.exp(-period)
+    assert system.dt == period
+    assert system.states == ("x/x",)  # the held output is worked out anew at every tick
+    assert system.A[0, 0] == pytest.approx(decay - 2.0 * (1.0 - decay), rel=1e-14)
+    assert system.B[0, 0] == pytest.approx(2.0 * (1.0 - decay), rel=1e-14)
+    assert np.array_equal(system.C, [[1.0]])
+
+
+def test_a_sampled_loop_moves_as_its_linear_system() -> None:
+    diagram, period = sampled_servo(0.3), 0.3
+    system = ab.linearize(diagram, "wanted", "x")
+    result = ab.simulate(diagram, stop_time=6.0, sample_time=period, rtol=1e-11, atol=1e-13)
+    answer = system.step_response(6.0)
+    assert np.allclose(answer.values[:, 0, 0], result["x"], atol=1e-9)
+
+
+def test_clocks_of_several_rates_give_the_map_of_their_common_period() -> None:
+    builder = ab.DiagramBuilder("two rates")
+    source = builder.add("u", Constant(value=0.0))
+    total = builder.add("sum", Sum(signs="+-"), source)
+    fast = builder.add("fast", ZeroOrderHold(sample_time=0.2), total)
+    state = builder.add("x", Integrator(), fast)
+    builder.connect(builder.add("slow", ZeroOrderHold(sample_time=0.3), state), total["u2"])
+    system = ab.linearize(builder.build(), "u", "x")
+    assert system.dt == pytest.approx(0.6, rel=1e-15)
+
+    # By hand: slow takes x at 0 and 0.3, fast takes u - slow at 0, 0.2, 0.4.
+    def period(x: float, slow: float, u: float) -> float:
+        fast_value = 0.0
+        for k in range(6):
+            if k % 3 == 0:
+                slow = x
+            if k % 2 == 0:
+                fast_value = u - slow
+            x += 0.1 * fast_value
+        return x
+
+    assert system.A[0, 0] == pytest.approx(period(1.0, 0.0, 0.0), rel=1e-13)
+    assert system.B[0, 0] == pytest.approx(period(0.0, 0.0, 1.0), rel=1e-13)
+
+
+def test_a_delay_line_is_a_shift() -> None:
+    builder = ab.DiagramBuilder("delays")
+    source = builder.add("u", Constant(value=0.0))
+    first = builder.add("first", UnitDelay(sample_time=0.1), source)
+    builder.add("second", UnitDelay(sample_time=0.1), first)
+    system = ab.linearize(builder.build(), "u", "second")
+    z = 1.3 + 0.4j
+    assert system.at(z)[0, 0] == pytest.approx(z**-2, rel=1e-14)
+
+
+def test_an_implicit_equation_is_taken_out_exactly() -> None:
+    builder = ab.DiagramBuilder("implicit")
+    state = builder.add("x", Integrator(initial=0.7))
+    total = builder.add("sum", Sum(signs="+-"), state)
+    cube = builder.add("cube", Expression(formula="u^3"), total)
+    builder.connect(cube, total["u2"])
+    builder.connect(builder.add("back", Gain(gain=-1.0), total), state["u"])
+    system = ab.linearize(builder.build(), "x", "sum")
+    assert system.point is not None
+    y = float(system.point.signals["sum/y"])  # y + y^3 = x
+    assert y + y**3 == pytest.approx(0.7, rel=1e-14)
+    assert system.D[0, 0] == pytest.approx(1.0 / (1.0 + 3.0 * y**2), rel=1e-13)
+    assert system.A[0, 0] == pytest.approx(-1.0 / (1.0 + 3.0 * y**2), rel=1e-13)
+
+
+def test_a_discrete_hold_of_a_matrix_plant_is_its_exponential() -> None:
+    A = np.array([[0.0, 1.0], [-4.0, -0.2]])
+    builder = ab.DiagramBuilder("plant")
+    source = builder.add("u", Constant(value=0.0))
+    held = builder.add("hold", ZeroOrderHold(sample_time=0.25), source)
+    total = builder.add("sum", Sum(signs="+--"), held)
+    speed = builder.add("v", Integrator(), total)
+    place = builder.add("q", Integrator(), speed)
+    builder.connect(builder.add("c", Gain(gain=0.2), speed), total["u2"])
+    builder.connect(builder.add("k", Gain(gain=4.0), place), total["u3"])
+    system = ab.linearize(builder.build(), "u", "q")
+    assert system.states == ("q/x", "v/x")
+    assert np.allclose(system.A, expm(A * 0.25), rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ab.list_examples())
+def test_every_shipped_example_is_linearised(name: str) -> None:
+    system = ab.linearize(name)
+    assert np.isfinite(system.A).all()
+
+
+def test_names_that_mean_nothing_are_refused() -> None:
+    diagram = oscillator()
+    with pytest.raises(UnknownNameError, match="there is no block named 'forse'"):
+        ab.linearize(diagram, "forse")
+    with pytest.raises(UnknownNameError, match="there is no port named 'z'"):
+        ab.linearize(diagram, "sum/z")
+    with pytest.raises(UnknownNameError, match="there is no tunable parameter named 'gian'"):
+        ab.linearize(diagram, "k.gian")
+    with pytest.raises(UnknownNameError, match="there is no signal named 'y'"):
+        ab.linearize(diagram, "force", "y")
+    with pytest.raises(InputError, match="the input 'force' is given twice"):
+        ab.linearize(diagram, ["force", "force"])
+    with pytest.raises(InputError, match="the times to linearize at are"):
+        ab.linearize(diagram, at=[-1.0])
+    with pytest.raises(InputError, match="the state of 'pendulum' at 1 s has other variables"):
+        ab.linearize(diagram, at=ab.simulate(pendulum(), stop_time=1.0).final_state)
+
+
+def test_a_block_with_several_outputs_needs_the_port() -> None:
+    with pytest.raises(InputError, match=r"is a block with 3 outputs.*Fix: name the port"):
+        ab.linearize("puma560_computed_torque", "arm")
+
+
+def test_clocks_without_a_common_period_are_refused() -> None:
+    builder = ab.DiagramBuilder("odd clocks")
+    source = builder.add("u", Constant(value=0.0))
+    builder.add("a", ZeroOrderHold(sample_time=0.001), source)
+    builder.add("b", ZeroOrderHold(sample_time=0.99999), source)
+    with pytest.raises(InputError, match=r"the clocks .* have the common period 99.999 s with 100099 ticks"):
+        ab.linearize(builder.build())
+
+
+def test_a_slope_that_is_not_finite_is_refused() -> None:
+    builder = ab.DiagramBuilder("root")
+    state = builder.add("x", Integrator(initial=0.0))
+    builder.connect(builder.add("root", Expression(formula="sqrt(u)"), state), state["u"])
+    with pytest.raises(SimulationError, match="the slope of the rate of state 'x/x' is not finite"):
+        ab.linearize(builder.build())
+
+
+def implicit(value: float, formula: str) -> ab.Diagram:
+    """w = formula(w, value)."""
+    builder = ab.DiagramBuilder("implicit")
+    source = builder.add("u", Constant(value=value))
+    answer = builder.add("answer", Expression(formula=formula, inputs=2), source)
+    builder.connect(answer, answer["u2"])
+    return builder.build()
+
+
+def test_implicit_equations_without_a_solution_are_refused() -> None:
+    with pytest.raises(SimulationError, match="has no solution near where it was sought"):
+        ab.linearize(implicit(1.0, "u2 + u2^2 + u1"))
+    with pytest.raises(SimulationError, match="are singular at this point"):
+        ab.linearize(implicit(0.0, "u2 + u2^3 + u1"))
