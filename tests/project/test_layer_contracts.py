@@ -21,7 +21,7 @@ VIOLATIONS = {
     ),
     "typer and rich have one door: cli": ("report/__init__.py", "from rich.table import Table"),
     "matplotlib has one door: report": ("face/__init__.py", "import matplotlib.pyplot"),
-    "pandas and pyarrow have one door, simulation.export; scipy has that and analysis": (
+    "pandas, pyarrow and scipy have their doors: export, analysis": (
         "simulation/__init__.py",
         "def late():\n    from scipy.io import savemat",
     ),
