@@ -19,7 +19,10 @@ exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "armblocks"
 html_show_sourcelink = False
+html_static_path = ["reference/static"]
+html_css_files = ["pictures.css"]
 
+smartquotes = False  # formulas hold straight quotes and double signs
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
@@ -30,6 +33,5 @@ autodoc_default_options = {"members": True, "show-inheritance": False}
 add_module_names = False
 
 
-def setup(app: object) -> None:
-    """Write the generated pages before Sphinx looks for sources."""
-    write_generated_pages(HERE / "reference")
+# Before Sphinx looks for sources and static files.
+write_generated_pages(HERE / "reference")

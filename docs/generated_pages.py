@@ -2,69 +2,29 @@
 
 from __future__ import annotations
 
-import inspect
-import re
 import warnings
 from pathlib import Path
 
+from block_pages import block_pages, style_sheet
+
 import armblocks as ab
-from armblocks.blocks import BLOCKS
 from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.diagram import Block, Parameter
 from armblocks.simulation.tableaux import TABLEAUX
 
 
 def write_generated_pages(folder: Path) -> None:
     """Write the pages into ``folder``; a page whose text is unchanged is left alone."""
-    folder.mkdir(exist_ok=True)
-    pages = {"blocks.md": blocks_page(), "shipped.md": shipped_page(), "solver-table.txt": solver_table()}
+    pages = {
+        "shipped.md": shipped_page(),
+        "solver-table.txt": solver_table(),
+        "static/pictures.css": style_sheet(),
+        **dict(block_pages()),
+    }
     for name, text in pages.items():
         path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
-
-
-def blocks_page() -> str:
-    """Every block of the library by family: what it does and what its parameters mean."""
-    lines = [
-        "# Blocks",
-        "",
-        f"The library has {len(BLOCKS)} blocks. A parameter marked *tunable* can be given another value for",
-        "each run without compiling again.",
-    ]
-    for family, kinds in BLOCKS.by_family().items():
-        lines += ["", f"## {family.capitalize()}"]
-        for kind in kinds:
-            lines += block_section(kind)
-    return "\n".join(lines) + "\n"
-
-
-def block_section(kind: type[Block]) -> list[str]:
-    """Heading, docstring and parameter table of one block."""
-    title = kind.type_name() if kind.title == kind.type_name() else f"{kind.type_name()} ({kind.title})"
-    lines = ["", f"### {title}", "", prose(inspect.cleandoc(kind.__doc__ or ""))]
-    if kind.parameters():
-        lines += ["", "| parameter | unit | default | tunable | meaning |", "|---|---|---|---|---|"]
-        lines += [parameter_row(rule) for rule in kind.parameters()]
-    return lines
-
-
-def prose(docstring: str) -> str:
-    """A docstring as Markdown: code stays code, and all else, formulas with stars included, is plain text."""
-    parts = re.split(r"(?::\w+:)?(`+)(.+?)\1", docstring)
-    text = [
-        re.sub(r"([*_\[\]|$<>#])", r"\\\1", plain) + (f"`{code}`" if code else "")
-        for plain, code in zip(parts[::3], [*parts[2::3], ""])
-    ]
-    return "".join(text)
-
-
-def parameter_row(rule: Parameter) -> str:
-    """One row of a block's parameter table."""
-    default = "" if rule.required else f"`{rule.default}`"
-    meaning = f"{rule.doc}: {rule.describe()}" if rule.choices else rule.doc
-    cells = (f"`{rule.name}`", rule.unit, default, "yes" if rule.tunable else "", prose(meaning))
-    return "| " + " | ".join(cells) + " |"
 
 
 def shipped_page() -> str:

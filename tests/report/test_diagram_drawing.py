@@ -28,11 +28,13 @@ from armblocks.blocks import (
     TransferFunction,
     Trigonometry,
 )
-from armblocks.diagram import Diagram, DiagramBuilder, PortRef
+from armblocks.diagram import Block, Diagram, DiagramBuilder, PortRef
+from armblocks.face.block_examples import example_block
 from armblocks.report.block_faces import face_size
-from armblocks.report.diagram_drawing import _nets, _obstacle, diagram_picture, diagram_svg
+from armblocks.report.diagram_drawing import _nets, _obstacle, block_picture, diagram_picture, diagram_svg
 from armblocks.report.diagram_layout import boxes
-from armblocks.report.picture import text_marks
+from armblocks.report.face_symbols import CURVES, TEXTS
+from armblocks.report.picture import Curve, text_marks
 from armblocks.report.wire_routing import Net, Obstacle, RoutedNet, WireEnd, route
 
 EXAMPLES = ("kr180model", "falling_pendulum", "puma560_computed_torque", "van_der_pol_pid")
@@ -171,6 +173,22 @@ def test_every_shipped_block_has_a_face_of_sensible_size() -> None:
             continue
         _, width, height = face_size(kind())
         assert 5 <= width <= 160 and 20 <= height <= 160
+
+
+@pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+def test_a_block_alone_is_drawn_within_its_picture(kind: type[Block]) -> None:
+    block = example_block(kind)
+    picture = block_picture(block)
+    ports = len(block.input_ports()) + len(block.output_ports())
+    assert picture.title == f"Symbol of {block.title}"
+    assert sum(isinstance(mark, Curve) for mark in picture.marks) >= ports
+    for mark in text_marks(picture):
+        assert -1 <= mark.x <= picture.width + 1
+        assert 0 <= mark.y <= picture.height
+
+
+def test_signs_and_curves_stand_for_blocks_that_exist() -> None:
+    assert {*CURVES, *TEXTS} <= set(BLOCKS)
 
 
 def test_a_run_shows_on_the_sinks_faces() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import ClassVar
 
 from casadi import SX, atan2, ceil, cos, fabs, floor, fmod, hypot, if_else, logic_and, sign, sin, sqrt
@@ -57,6 +58,9 @@ class Abs(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Abs"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The lower half of the sine, turned up.",
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -80,6 +84,10 @@ class Bias(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Bias"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine, 1 higher.",
+        parameters={"bias": 1.0},
+    )
 
     bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
 
@@ -105,6 +113,9 @@ class UnaryMinus(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Unary Minus"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine, upside down.",
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -128,6 +139,9 @@ class Sign(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Sign"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is positive, -1 while it is negative.",
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -176,6 +190,10 @@ class Rounding(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Rounding Function"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The greatest integer that is not above the signal.",
+        inputs={"u": made("SineWave", amplitude=3.0)},
+    )
 
     function: str = parameter("floor", choices=tuple(_ROUNDINGS), doc="which way")
 
@@ -204,6 +222,10 @@ class Modulo(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Modulo"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A straight rise modulo 3: it starts again from 0 each time it reaches 3.",
+        inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},
+    )
 
     function: str = parameter("mod", choices=("mod", "rem"), doc="whose sign the result has")
 
@@ -229,6 +251,12 @@ class Hypot(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Hypot"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The longest side of a right triangle with one side of 3 and one that grows: it meets 5 at 4 s."
+        ),
+        inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "one leg"), Port("v", "the other leg"))
@@ -279,6 +307,13 @@ class Polynomial(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Polynomial"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The parabola u^2 - 1, over u.",
+        parameters={"coefficients": (1.0, 0.0, -1.0)},
+        inputs={"u": made("Ramp", slope=0.4, initial=-2.0)},
+        across="u",
+        up="y",
+    )
 
     coefficients: ArrayLike = parameter((1.0, 0.0), dimensions=(1,), doc="c1 … c(n+1), highest power first")
 
@@ -305,6 +340,11 @@ class DegreesToRadians(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Degrees to Radians"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An angle from 0 to 360 degrees, in radians from 0 to 2 pi.",
+        inputs={"u": made("Ramp", slope=36.0)},
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "angle in degrees", "deg"),)
@@ -325,6 +365,11 @@ class RadiansToDegrees(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Radians to Degrees"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An angle from 0 to 10 radians, in degrees.",
+        inputs={"u": made("Ramp")},
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "angle in radians", "rad"),)
@@ -345,6 +390,13 @@ class CartesianToPolar(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Cartesian to Polar"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which "
+            "wraps at pi."
+        ),
+        inputs={"x": made("SineWave", amplitude=2.0, phase=pi / 2), "y": made("SineWave")},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("x", "coordinate along x"), Port("y", "coordinate along y"))
@@ -368,6 +420,15 @@ class PolarToCartesian(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Polar to Cartesian"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Distance and angle grow evenly: the point runs along a spiral of Archimedes.",
+        inputs={
+            "r": made("Ramp", slope=0.1).named("distance"),
+            "angle": made("Ramp", slope=2.0).named("angle"),
+        },
+        across="x",
+        up="y",
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("r", "distance from the origin"), Port("angle", "angle from the x axis", "rad"))
@@ -391,6 +452,10 @@ class AngleDifference(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "angdiff"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="How far an angle that grows evenly is from 1 rad, the shorter way around.",
+        inputs={"a": made("Ramp"), "b": made("Constant")},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("a", "one angle", "rad"), Port("b", "the angle that is taken away", "rad"))

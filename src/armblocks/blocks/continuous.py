@@ -17,8 +17,10 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
     integral_unit,
+    made,
     parameter,
     rate_unit,
     shape_of,
@@ -33,6 +35,9 @@ class Integrator(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Integrator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The integral of a sine that starts at 0: 1 - cos t.",
+    )
 
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
 
@@ -74,6 +79,9 @@ class Derivative(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Derivative"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The slope of a sine: a cosine, exactly, from the first instant on.",
+    )
     time_derivatives: ClassVar[Mapping[str, str]] = {"y": "u"}
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -99,6 +107,22 @@ class PID(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "PID Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A closed loop: the controller brings a second-order plant to 1, and its integral action "
+            "leaves no error."
+        ),
+        parameters={"P": 4.0, "I": 2.0, "D": 2.0, "N": 20.0},
+        inputs={
+            "u": made("Sum", signs="+-")
+            .named("error")
+            .by(
+                u1=made("Step").named("wanted"),
+                u2=made("TransferFunction", denominator=(1.0, 1.0, 1.0)).named("plant").by(u="y"),
+            )
+        },
+        shown=("wanted/y", "plant/y"),
+    )
 
     P: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="proportional gain")
     I: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="integral gain", unit="1/s")  # noqa: E741
@@ -150,6 +174,16 @@ class StateSpace(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "State-Space"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A mass on a spring with a damper, pushed from 1 s on: it swings in.",
+        parameters={
+            "A": ((0.0, 1.0), (-4.0, -0.8)),
+            "B": ((0.0,), (4.0,)),
+            "C": ((1.0, 0.0),),
+            "D": ((0.0,),),
+        },
+        inputs={"u": made("Step")},
+    )
 
     A: ArrayLike = parameter(((-1.0,),), dimensions=(2,), doc="the system matrix (n, n)", unit="1/s")
     B: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the input matrix (n, m)")
@@ -203,6 +237,11 @@ class TransferFunction(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Transfer Fcn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of 4 / (s^2 + 0.8 s + 4): damping 0.2, natural frequency 2 rad/s.",
+        parameters={"numerator": (4.0,), "denominator": (1.0, 0.8, 4.0)},
+        inputs={"u": made("Step")},
+    )
 
     numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, highest power first")
     denominator: ArrayLike = parameter((1.0, 1.0), dimensions=(1,), doc="a0 … an, highest power first")

@@ -19,7 +19,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -36,6 +38,9 @@ class UnitDelay(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Unit Delay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine as it was one tick ago, held until the next.",
+    )
     sampled: ClassVar[bool] = True
 
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at the first tick")
@@ -75,6 +80,9 @@ class Delay(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Delay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine as it was two ticks ago.",
+    )
     sampled: ClassVar[bool] = True
 
     length: int = parameter(2, minimum=1, doc="by how many ticks")
@@ -117,6 +125,9 @@ class TappedDelay(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Tapped Delay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The last four samples of the sine, side by side.",
+    )
     sampled: ClassVar[bool] = True
 
     length: int = parameter(4, minimum=1, doc="how many inputs are kept")
@@ -151,6 +162,9 @@ class ZeroOrderHold(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Zero-Order Hold"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine as it was at the last tick.",
+    )
     sampled: ClassVar[bool] = True
 
     sample_time: ArrayLike = sample_time_parameter()
@@ -177,6 +191,10 @@ class RateTransition(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Rate Transition"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A signal of ticks every 0.2 s, handed to a part that ticks every second.",
+        inputs={"u": made("ZeroOrderHold", sample_time=0.2).by(u=made("SineWave"))},
+    )
     sampled: ClassVar[bool] = True
 
     sample_time: ArrayLike = sample_time_parameter(1.0)

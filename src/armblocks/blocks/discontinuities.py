@@ -18,7 +18,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     shape_of,
 )
@@ -30,6 +32,11 @@ class Saturation(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Saturation"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The crests of the sine are cut off at 1.5, its troughs at -0.5.",
+        parameters={"lower": -0.5, "upper": 1.5},
+        inputs={"u": made("SineWave", amplitude=2.0)},
+    )
 
     lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
     upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
@@ -76,6 +83,9 @@ class DeadZone(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Dead Zone"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Between -0.5 and 0.5 nothing comes through, outside what exceeds the zone.",
+    )
 
     start: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, doc="where the zone begins")
     end: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, doc="where the zone ends")
@@ -125,6 +135,9 @@ class Relay(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Relay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="It switches on as the sine rises through 0.5 and off as it falls through -0.5, not before.",
+    )
 
     on_point: float = parameter(0.5, doc="where it switches on")
     off_point: float = parameter(-0.5, doc="where it switches off, at most on_point")
@@ -176,6 +189,10 @@ class Quantizer(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Quantizer"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine in steps of 0.5.",
+        inputs={"u": made("SineWave", amplitude=2.0)},
+    )
 
     interval: float = parameter(0.5, above=0.0, doc="the height of a step")
 
@@ -221,6 +238,15 @@ class Switch(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Switch"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A fast sine while the control is at least 0.5, a constant else.",
+        parameters={"threshold": 0.5},
+        inputs={
+            "u1": made("SineWave", frequency=5.0),
+            "u2": made("PulseGenerator", period=5.0),
+            "u3": made("Constant", value=-0.5),
+        },
+    )
 
     criterion: str = parameter(">=", choices=(">=", ">"), doc="how the control compares with the threshold")
     threshold: float = parameter(0.0, doc="what the control is compared with")
@@ -268,6 +294,10 @@ class PulseGenerator(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Pulse Generator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="High for the first 30 % of every two seconds.",
+        parameters={"width": 30.0},
+    )
 
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the height of the pulses")
     period: float = parameter(2.0, above=0.0, doc="from one pulse to the next", unit="s")

@@ -19,7 +19,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -41,6 +43,9 @@ class DiscreteIntegrator(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete-Time Integrator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The integral of a sine by the rule of Euler: rectangles, one a tick.",
+    )
     sampled: ClassVar[bool] = True
 
     method: str = parameter("forward_euler", choices=_METHODS, doc="the rule of integration")
@@ -91,6 +96,9 @@ class Difference(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Difference"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="What the sine has gained since the last tick.",
+    )
     sampled: ClassVar[bool] = True
 
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
@@ -124,6 +132,9 @@ class DiscreteDerivative(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete Derivative"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The slope of the sine as two samples tell it: half a tick late.",
+    )
     sampled: ClassVar[bool] = True
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
@@ -164,6 +175,19 @@ class DiscretePID(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete PID Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A closed loop with a plant that flows: the controller acts every 0.1 s.",
+        parameters={"P": 3.0, "I": 2.0, "sample_time": 0.1},
+        inputs={
+            "u": made("Sum", signs="+-")
+            .named("error")
+            .by(
+                u1=made("Step").named("wanted"),
+                u2=made("TransferFunction", denominator=(1.0, 1.0)).named("plant").by(u="y"),
+            )
+        },
+        shown=("wanted/y", "plant/y"),
+    )
     sampled: ClassVar[bool] = True
 
     P: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="proportional gain")
@@ -233,6 +257,11 @@ class RateLimiter(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Rate Limiter"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Pulses whose edges may not be steeper than 1 a second upwards and 2 downwards.",
+        parameters={"falling": -2.0, "sample_time": 0.05},
+        inputs={"u": made("PulseGenerator", period=5.0, delay=0.5)},
+    )
     sampled: ClassVar[bool] = True
 
     rising: ArrayLike = parameter(
@@ -277,6 +306,10 @@ class CounterLimited(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Counter Limited"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Counts 0, 1, 2, 3 at its ticks and starts again.",
+        parameters={"upper": 3, "sample_time": 0.5},
+    )
     sampled: ClassVar[bool] = True
 
     upper: int = parameter(7, minimum=0, doc="the greatest count")
@@ -304,6 +337,11 @@ class DigitalClock(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Digital Clock"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The time of the last tick, beside the time itself.",
+        inputs={},
+        shown=("y", made("Clock")),
+    )
     sampled: ClassVar[bool] = True
 
     sample_time: ArrayLike = sample_time_parameter(1.0)

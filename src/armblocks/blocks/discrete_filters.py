@@ -19,6 +19,8 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
+    made,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -44,6 +46,10 @@ class DiscreteStateSpace(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete State-Space"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of x(k+1) = 0.5 x + u: it goes to 2, half of the way with every tick.",
+        inputs={"u": made("Step")},
+    )
     sampled: ClassVar[bool] = True
 
     A: ArrayLike = parameter(((0.5,),), dimensions=(2,), doc="the system matrix (n, n)")
@@ -99,6 +105,11 @@ class DiscreteTransferFunction(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete Transfer Fcn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of z / (z - 0.5): each tick halves the way to 2.",
+        parameters={"numerator": (1.0, 0.0), "denominator": (1.0, -0.5)},
+        inputs={"u": made("Step")},
+    )
     sampled: ClassVar[bool] = True
 
     numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, highest power first")
@@ -144,6 +155,11 @@ class DiscreteFilter(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete Filter"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A low-pass: pulses come out smoothed.",
+        parameters={"numerator": (0.2,), "denominator": (1.0, -0.8), "sample_time": 0.1},
+        inputs={"u": made("PulseGenerator", period=4.0)},
+    )
     sampled: ClassVar[bool] = True
 
     numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, rising powers of 1/z")
@@ -196,6 +212,11 @@ class DiscreteFir(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete FIR Filter"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The mean of the last four samples of pulses: edges become slopes.",
+        parameters={"coefficients": (0.25, 0.25, 0.25, 0.25), "sample_time": 0.2},
+        inputs={"u": made("PulseGenerator", period=4.0)},
+    )
     sampled: ClassVar[bool] = True
 
     coefficients: ArrayLike = parameter((0.5, 0.5), dimensions=(1,), doc="b0 … bm")

@@ -18,7 +18,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     shape_of,
 )
@@ -30,6 +32,11 @@ class CoulombFriction(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Coulomb and Viscous Friction"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Friction of a speed that swings: it jumps where the speed changes its sign.",
+        parameters={"gain": 0.5},
+        inputs={"u": made("SineWave")},
+    )
 
     offset: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="Coulomb friction")
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="viscous friction")
@@ -75,6 +82,13 @@ class Backlash(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Backlash"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A gear with play 1: the output follows with half of it missing, and stands still while "
+            "the play is taken up."
+        ),
+        inputs={"u": made("SineWave", amplitude=2.0)},
+    )
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
 
     width: float = parameter(1.0, minimum=0.0, doc="the width of the play")
@@ -145,6 +159,13 @@ class StickSlipFriction(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Stick-Slip Friction"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The force grows evenly. The mass rests, and friction holds the force, until it breaks "
+            "away at 1.2 N; then 1 N remains."
+        ),
+        inputs={"F": made("Ramp", slope=0.2)},
+    )
 
     mass: float = parameter(1.0, above=0.0, doc="the mass", unit="kg")
     coulomb: float = parameter(1.0, minimum=0.0, doc="friction in motion", unit="N")

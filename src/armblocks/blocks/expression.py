@@ -11,7 +11,17 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.expression_language import CONSTANTS, FUNCTIONS, Formula
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
 from armblocks.errors import InputError, UnknownNameError
 
 
@@ -28,6 +38,12 @@ class Expression(Block):
 
     family: ClassVar[str] = "functions"
     title: ClassVar[str] = "Fcn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A formula of the input: a decaying swing, over a straight rise.",
+        parameters={"formula": "sin(3 * u) * exp(-k * u)", "names": "k", "values": (0.3,)},
+        inputs={"u": made("Ramp")},
+        shown=("y",),
+    )
 
     formula: str = parameter("u", doc="what comes out")
     inputs: int = parameter(1, minimum=0, maximum=100, doc="how many inputs")

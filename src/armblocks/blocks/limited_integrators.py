@@ -18,7 +18,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     shape_of,
 )
@@ -37,6 +39,10 @@ class ResettableIntegrator(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Integrator with Reset"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The integral of 1, set back to 0 by every rising edge.",
+        inputs={"u": made("Constant"), "reset": made("PulseGenerator", period=3.0, delay=1.0)},
+    )
 
     external_reset: str = parameter("rising", choices=tuple(_TRIGGERS), doc="when the trigger fires")
     initial_condition_source: str = parameter(
@@ -90,6 +96,12 @@ class IntegratorLimited(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Integrator Limited"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The integral of a sine would reach 2; it stays at the limit 1 and leaves it as soon as "
+            "the sine turns."
+        ),
+    )
 
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0, within the limits"

@@ -16,7 +16,18 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.selection import choose
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
 from armblocks.errors import InputError
 
 _RELATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
@@ -43,6 +54,10 @@ class RelationalOperator(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Relational Operator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is at most 0.5.",
+        inputs={"u1": made("SineWave"), "u2": made("Constant", value=0.5)},
+    )
 
     relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
 
@@ -68,6 +83,13 @@ class LogicalOperator(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Logical Operator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while both pulses are there.",
+        inputs={
+            "u1": made("PulseGenerator", period=4.0).named("slow"),
+            "u2": made("PulseGenerator", period=1.0).named("fast"),
+        },
+    )
 
     operator: str = parameter("AND", choices=(*_GATES, "NOT"), doc="the gate")
     inputs: int = parameter(2, minimum=1, doc="how many inputs; NOT always has one")
@@ -96,6 +118,10 @@ class CompareToConstant(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Compare To Constant"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is above 0.5.",
+        parameters={"relation": ">", "constant": 0.5},
+    )
 
     relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
     constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
@@ -119,6 +145,9 @@ class CompareToZero(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Compare To Zero"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is not above 0.",
+    )
 
     relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
 
@@ -144,6 +173,9 @@ class IntervalTest(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Interval Test"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is between -0.5 and 0.5.",
+    )
 
     lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the lower end")
     upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the upper end")
@@ -169,6 +201,14 @@ class IntervalTestDynamic(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Interval Test Dynamic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is between two limits, of which the upper one rises.",
+        inputs={
+            "upper": made("Ramp", slope=0.1),
+            "u": made("SineWave"),
+            "lower": made("Constant", value=-0.5),
+        },
+    )
 
     lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
     upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
@@ -196,6 +236,16 @@ class CombinatorialLogic(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Combinatorial Logic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The truth table of exclusive or: 1 while just one of the two pulses is there.",
+        parameters={"table": ((0.0,), (1.0,), (1.0,), (0.0,))},
+        inputs={
+            "u": made("Mux").by(
+                u1=made("PulseGenerator", period=4.0).named("slow"),
+                u2=made("PulseGenerator", period=1.0).named("fast"),
+            )
+        },
+    )
 
     table: ArrayLike = parameter(
         ((0.0,), (0.0,), (0.0,), (1.0,)), dimensions=(2,), doc="one row for each combination of conditions"

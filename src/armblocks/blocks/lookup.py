@@ -21,7 +21,17 @@ from armblocks.blocks.interpolation import (
     linear_weights,
     weights,
 )
-from armblocks.diagram import Block, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -64,6 +74,11 @@ class LookupTable1D(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "1-D Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A curve through five points: straight between them, held beyond the ends.",
+        parameters={"positions": (1.0, 3.0, 5.0, 6.0, 8.0), "table": (0.0, 2.0, 1.0, 1.5, 0.0)},
+        inputs={"u": made("Ramp")},
+    )
 
     positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
     table: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), doc="values there (n,)")
@@ -93,6 +108,15 @@ class LookupTable2D(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "2-D Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The table is crossed along its first axis while the second swings.",
+        parameters={
+            "positions1": (0.0, 5.0, 10.0),
+            "positions2": (-1.0, 1.0),
+            "table": ((0.0, 1.0), (2.0, 4.0), (1.0, 3.0)),
+        },
+        inputs={"u1": made("Ramp"), "u2": made("SineWave", frequency=2.0)},
+    )
 
     positions1: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions of rows")
     positions2: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="and of columns")
@@ -130,6 +154,15 @@ class LookupTableND(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "n-D Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A table of two axes, smooth by cubic splines, crossed along the first.",
+        parameters={
+            "positions": (0.0, 3.0, 6.0, 10.0, 0.0, 1.0, 2.0, 3.0),
+            "table": ((0.0, 1.0, 1.0, 0.0), (2.0, 3.0, 3.0, 2.0), (1.0, 2.0, 2.0, 1.0), (0.0, 1.0, 1.0, 0.0)),
+            "method": "cubic",
+        },
+        inputs={"u1": made("Ramp"), "u2": made("Constant", value=1.5)},
+    )
 
     positions: ArrayLike = parameter(
         (0.0, 1.0, 0.0, 1.0), dimensions=(1,), tunable=False, doc="positions, axis after axis, rising in each"
@@ -177,6 +210,11 @@ class DirectLookup(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "Direct Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A counter reads the table entry by entry.",
+        parameters={"table": (0.5, 2.0, 1.0, -1.0)},
+        inputs={"u": made("CounterLimited", upper=3)},
+    )
 
     table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="the entries")
 
@@ -209,6 +247,12 @@ class Prelookup(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "Prelookup"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="In which interval of the positions the input lies, and which part of it has been passed.",
+        parameters={"positions": (0.0, 2.0, 5.0, 10.0)},
+        inputs={"u": made("Ramp")},
+        shown=("k", "f"),
+    )
 
     positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
     extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
@@ -252,6 +296,17 @@ class InterpolationUsingPrelookup(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "Interpolation Using Prelookup"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The curve whose interval and fraction a Prelookup has found.",
+        parameters={"table": (0.0, 3.0, 1.0, 2.0)},
+        inputs={
+            "k1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0))
+            .named("prelookup")
+            .by(u=made("Ramp"))
+            .at("k"),
+            "f1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0)).named("prelookup").at("f"),
+        },
+    )
 
     table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="values, two or more an axis")
 
@@ -297,6 +352,15 @@ class LookupTableDynamic(Block):
 
     family: ClassVar[str] = "lookup"
     title: ClassVar[str] = "Lookup Table Dynamic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A curve whose values grow while it is read.",
+        inputs={
+            "u": made("SineWave", bias=1.0),
+            "positions": made("Constant", value=(0.0, 1.0, 2.0)),
+            "values": made("Ramp", slope=(0.0, 0.2, 0.1)),
+        },
+        shown=("u", "y"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
+from math import pi
 from typing import ClassVar
 
 import casadi
@@ -34,6 +35,11 @@ class Gain(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Gain"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Half the sine.",
+        parameters={"gain": 0.5},
+        inputs={"u": made("SineWave")},
+    )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
 
@@ -56,6 +62,14 @@ class MatrixGain(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Matrix Gain"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A matrix that turns by 90 degrees: the first output is minus the second input, the "
+            "second the first."
+        ),
+        parameters={"gain": ((0.0, -1.0), (1.0, 0.0))},
+        inputs={"u": made("SineWave", amplitude=(1.0, 0.5))},
+    )
 
     gain: ArrayLike = parameter(((1.0,),), kind=ParameterKind.ARRAY, dimensions=(2,), doc="the matrix (m, n)")
 
@@ -75,6 +89,11 @@ class Sum(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Sum"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="What is left of a step when a sine is taken away.",
+        parameters={"signs": "+-"},
+        inputs={"u1": made("Step"), "u2": made("SineWave")},
+    )
 
     signs: str = parameter("++", doc="one + or - for each input, such as +-")
 
@@ -107,6 +126,13 @@ class Product(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Product"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A fast sine times a slow one: its amplitude swells and fades.",
+        inputs={
+            "u1": made("SineWave", frequency=8.0).named("fast"),
+            "u2": made("SineWave", frequency=0.6).named("slow"),
+        },
+    )
 
     operators: str = parameter("**", doc="one * or / for each input, such as */")
 
@@ -139,6 +165,14 @@ class MatrixProduct(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Matrix Multiply"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A shear of the vector (1, sin t): the second element is added to the first.",
+        inputs={
+            "A": made("Constant", value=((1.0, 1.0), (0.0, 1.0))),
+            "B": made("SineWave", amplitude=(0.0, 1.0), bias=(1.0, 0.0)),
+        },
+        shown=("B", "y"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("A", "the left matrix"), Port("B", "the right matrix or vector"))
@@ -205,6 +239,9 @@ class MathFunction(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Math Function"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The exponential of a sine, between 1/e and e.",
+    )
 
     function: str = parameter("exp", choices=tuple(_FUNCTIONS), doc="the function f")
 
@@ -227,6 +264,10 @@ class Trigonometry(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Trigonometric Function"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine of an angle that grows evenly.",
+        inputs={"u": made("Ramp")},
+    )
 
     function: str = parameter("sin", choices=tuple(_TRIGONOMETRY), doc="the function f")
 
@@ -249,6 +290,13 @@ class Atan2(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Atan2"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The angle of a point that runs around a circle: it jumps from pi to -pi where it crosses "
+            "the negative x axis."
+        ),
+        inputs={"y": made("SineWave").named("sine"), "x": made("SineWave", phase=pi / 2).named("cosine")},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("y", "coordinate along y"), Port("x", "coordinate along x"))
@@ -293,6 +341,9 @@ class MinMax(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "MinMax"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The lesser of two sines, at every moment.",
+    )
 
     function: str = parameter("min", choices=("min", "max"), doc="which one")
     inputs: int = parameter(2, minimum=1, doc="how many inputs")

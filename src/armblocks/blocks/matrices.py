@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi
 from typing import ClassVar
 
 from casadi import SX, cross, diag, horzcat, mtimes, reshape, trace, vertcat
@@ -31,6 +32,14 @@ class CrossProduct(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Cross Product"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A vector that turns in the plane, crossed with z: it runs a quarter turn behind.",
+        inputs={
+            "u": made("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
+            "v": made("Constant", value=(0.0, 0.0, 1.0)),
+        },
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the left vector", shape=(3,)), Port("v", "the right vector", shape=(3,)))
@@ -48,6 +57,10 @@ class Transpose(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Transpose"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The two entries off the diagonal change places.",
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the matrix"),)
@@ -132,6 +145,10 @@ class Determinant(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Determinant"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The determinant of [1 a; a 1] while a swings: 1 - a^2.",
+        inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (1.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the matrix (n, n)"),)
@@ -153,6 +170,17 @@ class Trace(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Trace"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sum of the diagonal: one entry swings about 1, the other about 2.",
+        inputs={
+            "u": made(
+                "SineWave",
+                amplitude=((1.0, 0.0), (0.0, 0.5)),
+                bias=((1.0, 0.0), (0.0, 2.0)),
+                frequency=((1.0, 1.0), (1.0, 3.0)),
+            )
+        },
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the matrix (n, n)"),)
@@ -177,6 +205,10 @@ class MatrixPower(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Matrix Power"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The square of [1 a; 0 1] is [1 2a; 0 1].",
+        inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (0.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
+    )
 
     exponent: int = parameter(2, minimum=-100, maximum=100, doc="how many factors")
 
@@ -209,6 +241,10 @@ class Reshape(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Reshape"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A matrix as a vector, column by column.",
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
 
     output: str = parameter("vector", choices=("vector", "column", "row", "matrix"), doc="the new shape")
     rows: int = parameter(1, minimum=1, doc="how many rows a matrix gets")
@@ -248,6 +284,10 @@ class MatrixConcatenate(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Matrix Concatenate"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two vectors side by side are the columns of a matrix.",
+        inputs={"u1": made("SineWave", amplitude=(1.0, 2.0)), "u2": made("Constant", value=(-1.0, 1.0))},
+    )
 
     inputs: int = parameter(2, minimum=1, doc="how many inputs")
     direction: str = parameter("horizontal", choices=("horizontal", "vertical"), doc="beside or under")
@@ -285,6 +325,10 @@ class DiagonalMatrix(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Create Diagonal Matrix"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two numbers on the diagonal, zeros elsewhere.",
+        inputs={"u": made("SineWave", amplitude=(1.0, 2.0))},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the diagonal (n,)"),)
@@ -307,6 +351,10 @@ class ExtractDiagonal(Block):
 
     family: ClassVar[str] = "matrices"
     title: ClassVar[str] = "Extract Diagonal"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The diagonal of a matrix.",
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the matrix (n, n)"),)

@@ -11,7 +11,8 @@ from typing import ClassVar
 
 from casadi import SX, dot, horzcat, sqrt, vertcat
 
-from armblocks.diagram import Block, Port, Signals, parameter
+from armblocks.blocks.example_signals import HALF_ANGLE, SPINNING_POSE, ZERO, corner_of
+from armblocks.diagram import Block, Port, Signals, WorkedExample, made, parameter
 from armblocks.spatial import orientation
 
 _T = Port("T", "the pose", shape=(4, 4))
@@ -39,6 +40,11 @@ class Rpy2T(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "rpy2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A pose that only yaws: the corner of its rotation holds cosines and sines of the angle.",
+        inputs={"roll": ZERO, "pitch": ZERO, "yaw": made("Ramp").named("yaw")},
+        shown=(corner_of("T"),),
+    )
 
     convention: str = parameter("zyx", choices=_CONVENTIONS, doc="order of the axes, or toolbox release")
 
@@ -62,6 +68,17 @@ class T2rpy(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "T2rpy"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The three angles of a pose that was made of them come back; yaw wraps at pi.",
+        inputs={
+            "T": made("Rpy2T").by(
+                roll=made("SineWave", amplitude=0.5).named("roll"),
+                pitch=made("SineWave", amplitude=0.8, frequency=2.0).named("pitch"),
+                yaw=made("Ramp").named("yaw"),
+            )
+        },
+        shown=("roll", "pitch", "yaw"),
+    )
 
     convention: str = parameter("zyx", choices=_CONVENTIONS, doc="order of the axes, or toolbox release")
 
@@ -82,6 +99,13 @@ class Eul2T(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "eul2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A pose that turns about z only: the corner of its rotation holds cosines and sines of the angle."
+        ),
+        inputs={"phi": made("Ramp").named("phi"), "theta": ZERO, "psi": ZERO},
+        shown=(corner_of("T"),),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return _angles("phi", "theta", "psi")
@@ -103,6 +127,17 @@ class T2eul(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "T2eul"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The three angles of a pose that was made of them come back; phi wraps at pi.",
+        inputs={
+            "T": made("Eul2T").by(
+                phi=made("Ramp").named("phi"),
+                theta=made("SineWave", amplitude=0.5, bias=1.0).named("theta"),
+                psi=made("SineWave", frequency=2.0).named("psi"),
+            )
+        },
+        shown=("phi", "theta", "psi"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (_T,)
@@ -120,6 +155,11 @@ class Quaternion2T(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Quaternion to Pose"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A quaternion (cos t/2, 0, 0, sin t/2) is a turn by t about z.",
+        inputs={"u": HALF_ANGLE},
+        shown=(corner_of("T"),),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", f"the quaternion, {_QUATERNION}", shape=(4,)),)
@@ -140,6 +180,11 @@ class T2Quaternion(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Pose to Quaternion"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The quaternion of a pose that turns about z: cosine and sine of half the angle.",
+        inputs={"T": SPINNING_POSE},
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (_T,)
@@ -157,6 +202,14 @@ class AngleAxis2T(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "angvec2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A turn about the axis z: the corner of its rotation holds cosines and sines of the angle.",
+        inputs={
+            "angle": made("Ramp").named("angle"),
+            "axis": made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
+        },
+        shown=(corner_of("T"),),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("angle", "the angle", "rad", ()), Port("axis", "the axis, not zero", shape=(3,)))
@@ -174,6 +227,11 @@ class T2AngleAxis(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "T2angvec"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Angle and axis of a pose that turns about z: beyond pi the shorter turn is about -z.",
+        inputs={"T": SPINNING_POSE},
+        shown=("angle", "axis"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (_T,)
@@ -192,6 +250,16 @@ class QuaternionProduct(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Quaternion Multiplication"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A turn about z after a quarter turn about x.",
+        inputs={
+            "u": HALF_ANGLE,
+            "v": made("Constant", value=(0.7071067811865476, 0.7071067811865476, 0.0, 0.0)).named(
+                "quarter turn"
+            ),
+        },
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return tuple(Port(name, f"a quaternion, {_QUATERNION}", shape=(4,)) for name in "uv")
@@ -209,6 +277,10 @@ class QuaternionInverse(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Quaternion Inverse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The turn back: the vector part changes its sign.",
+        inputs={"u": HALF_ANGLE},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", f"a quaternion, {_QUATERNION}", shape=(4,)),)
@@ -227,6 +299,12 @@ class QuaternionNormalize(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Quaternion Normalize"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A quaternion that grows, brought to length 1.",
+        inputs={
+            "u": made("Ramp", slope=(0.1, 0.0, 0.0, 0.3), initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion")
+        },
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", f"a quaternion, {_QUATERNION}", shape=(4,)),)
@@ -244,6 +322,16 @@ class QuaternionRate(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Quaternion Rate"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "Integrated at a steady angular velocity about z: the quaternion goes around with half the angle."
+        ),
+        inputs={
+            "u": made("Integrator", initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion").by(u="y"),
+            "w": made("Constant", value=(0.0, 0.0, 1.0)).named("angular velocity"),
+        },
+        shown=("u",),
+    )
 
     axes: str = parameter("body", choices=("body", "world"), doc="the axes of the angular velocity")
 

@@ -8,8 +8,17 @@ from typing import ClassVar
 
 from casadi import SX, cross, mtimes, skew, vertcat
 
+from armblocks.blocks.example_signals import (
+    HELIX_POSE,
+    SPINNING_POSE,
+    ZERO,
+    corner_of,
+    last_column_of,
+    pose_along_x,
+    position_of,
+)
 from armblocks.blocks.orientations import pose
-from armblocks.diagram import Block, Port, Signals, parameter
+from armblocks.diagram import Block, Port, Signals, WorkedExample, made, parameter
 
 _FRAMES = ("body", "world")
 
@@ -26,6 +35,12 @@ class PoseProduct(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Pose Product"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A frame that turns, and 1 m along its x axis a second one: its origin runs around a circle.",
+        inputs={"T1": SPINNING_POSE, "T2": pose_along_x(made("Constant").named("one"))},
+        across=position_of("T")[0],
+        up=position_of("T")[1],
+    )
 
     inputs: int = parameter(2, minimum=1, doc="how many poses")
 
@@ -45,6 +60,15 @@ class PoseInverse(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Pose Inverse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A pose that moves along x, and how the old frame is seen from it: it moves along -x.",
+        inputs={
+            "T": made("Xyz2T").by(
+                x=made("Ramp").named("x"), y=made("Constant").named("y"), z=made("Ground").named("z")
+            )
+        },
+        shown=position_of("Ti"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("T", "pose of frame b in frame a", shape=(4, 4)),)
@@ -62,6 +86,14 @@ class Rp2T(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "rt2tr"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A fixed rotation and a position that swings make a pose; its upper rows are [R p].",
+        inputs={
+            "R": made("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
+            "p": made("SineWave", amplitude=(0.5, 1.0, 1.5)),
+        },
+        shown=(last_column_of("T"),),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("R", "the rotation", shape=(3, 3)), Port("p", "the position", "m", (3,)))
@@ -79,6 +111,11 @@ class T2Rp(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "tr2rt"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The position of a pose as a vector; the rotation is the other output.",
+        inputs={"T": HELIX_POSE},
+        shown=("p",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("T", "the pose", shape=(4, 4)),)
@@ -96,6 +133,11 @@ class TransformPoint(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Transform Point"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The point (1, 0, 0) of a frame that turns about z, seen from outside.",
+        inputs={"T": SPINNING_POSE, "p": made("Constant", value=(1.0, 0.0, 0.0)).named("point")},
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("p", "point in b", "m", (3,)))
@@ -116,6 +158,14 @@ class TransformTwist(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "Transform Twist"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A speed of 1 m/s along x of a frame that turns about z, told in the axes outside.",
+        inputs={
+            "T": SPINNING_POSE,
+            "V": made("Constant", value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).named("twist"),
+        },
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("T", "pose of frame b in frame a", shape=(4, 4)), Port("V", "(v; w) in b", shape=(6,)))
@@ -135,6 +185,13 @@ class Skew(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "skew"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The nine entries of the matrix: each element of the vector stands there twice, with both signs."
+        ),
+        inputs={"u": made("SineWave", amplitude=(1.0, 2.0, 3.0))},
+        shown=("S",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the vector", shape=(3,)),)
@@ -157,6 +214,17 @@ class Tr2Delta(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "tr2delta"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step from a fixed pose to one that moves along x and turns about z by t / 10: (d; r).",
+        inputs={
+            "T1": pose_along_x(ZERO).named("start"),
+            "T2": made("AngleAxis2T").by(
+                angle=made("Ramp", slope=0.1).named("angle"),
+                axis=made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
+            ),
+        },
+        shown=("dx",),
+    )
 
     frame: str = parameter("body", choices=_FRAMES, doc="body (release 10) or world (up to release 9)")
 
@@ -189,6 +257,11 @@ class Delta2Tr(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "delta2tr"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A step that grows evenly, as a pose: its corner is [1 -rz; rz 1].",
+        inputs={"dx": made("Ramp", slope=(0.1, 0.0, 0.0, 0.0, 0.0, 0.02))},
+        shown=(corner_of("T"),),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("dx", "step (dx, dy, dz, rx, ry, rz)", shape=(6,)),)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
+from math import pi
 from typing import ClassVar
 
 from casadi import SX, dot, fabs, fmax, if_else, sqrt, vertcat
 
-from armblocks.diagram import Block, Port, Shapes, Signals, parameter
+from armblocks.blocks.example_signals import CIRCLING, THREE_PHASES
+from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, made, parameter
 from armblocks.errors import InputError
 
 
@@ -24,6 +26,10 @@ class SumOfElements(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Sum of Elements"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Three phases, 120 degrees apart: their sum is 0.",
+        inputs={"u": THREE_PHASES},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -44,6 +50,10 @@ class ProductOfElements(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Product of Elements"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The product of three sines, 120 degrees apart, is a sine of three times their frequency.",
+        inputs={"u": THREE_PHASES},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -64,6 +74,11 @@ class Extremum(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "MinMax of Elements"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The greatest of three phases, and which one it is.",
+        parameters={"function": "max"},
+        inputs={"u": THREE_PHASES},
+    )
 
     function: str = parameter("min", choices=("min", "max"), doc="which one")
 
@@ -93,6 +108,11 @@ class CumulativeSum(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Cumulative Sum"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Each output adds one more element of the vector: the partial sums of a square wave.",
+        inputs={"u": made("SineWave", amplitude=(1.0, 0.3333, 0.2), frequency=(1.0, 3.0, 5.0))},
+        shown=("y",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "vector or matrix"),)
@@ -119,6 +139,10 @@ class DotProduct(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Dot Product"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="How far a turning vector points along a fixed one.",
+        inputs={"u": CIRCLING, "v": made("Constant", value=(1.0, 1.0))},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "one vector"), Port("v", "the other vector"))
@@ -149,6 +173,10 @@ class Norm(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Norm"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The length of a vector that runs around an ellipse.",
+        inputs={"u": made("SineWave", amplitude=(2.0, 1.0), phase=(pi / 2, 0.0))},
+    )
 
     norm: str = parameter("2", choices=("2", "1", "inf", "fro"), doc="which norm")
 

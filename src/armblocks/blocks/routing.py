@@ -10,7 +10,8 @@ from typing import ClassVar
 from casadi import SX, vertcat
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
-from armblocks.diagram import Block, Port, Shapes, Signals, parameter
+from armblocks.blocks.example_signals import CIRCLING
+from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, parameter
 from armblocks.errors import InputError
 
 
@@ -20,6 +21,10 @@ class Mux(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Mux"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two scalars become one vector.",
+        shown=("y",),
+    )
 
     inputs: int = parameter(2, minimum=1, doc="how many inputs")
 
@@ -48,6 +53,11 @@ class Demux(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Demux"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The elements of a vector, one by one.",
+        inputs={"u": CIRCLING},
+        shown=("y1", "y2"),
+    )
 
     parts: int = parameter(2, minimum=1, doc="how many outputs")
 

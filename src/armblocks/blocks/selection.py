@@ -13,7 +13,18 @@ from casadi import SX, floor, fmax, fmin, if_else, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter
+from armblocks.blocks.example_signals import THREE_PHASES
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+)
 from armblocks.errors import InputError
 
 _COUNTING = ("one-based", "zero-based")
@@ -62,6 +73,11 @@ class Selector(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Selector"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The third and the first element of three phases.",
+        parameters={"indices": (3.0, 1.0)},
+        inputs={"u": THREE_PHASES},
+    )
 
     indices: ArrayLike = parameter(
         (1.0,), kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc="which elements"
@@ -99,6 +115,11 @@ class SubMatrix(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Submatrix"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The second row of a matrix.",
+        parameters={"first_row": 2},
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
 
     first_row: int = parameter(1, minimum=1, doc="the first row")
     last_row: int = parameter(0, minimum=0, doc="the last row, 0 for the end")
@@ -138,6 +159,11 @@ class Assignment(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Assignment"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The second element of a vector of zeros is replaced by a sine.",
+        parameters={"indices": (2.0,)},
+        inputs={"y0": made("Constant", value=(1.0, 0.0, -1.0)), "u": made("SineWave")},
+    )
 
     indices: ArrayLike = parameter(
         (1.0,), kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc="which elements are replaced"
@@ -185,6 +211,11 @@ class IndexVector(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Index Vector"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A counter picks one of three numbers after the other.",
+        inputs={"index": made("CounterLimited", upper=2), "u": made("Constant", value=(0.5, 2.0, 1.0))},
+        shown=("index", "y"),
+    )
 
     counting: str = parameter("zero-based", choices=_COUNTING[::-1], doc="whether the first index is 1 or 0")
 
@@ -216,6 +247,16 @@ class MultiportSwitch(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Multiport Switch"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A counter picks one input after the other.",
+        parameters={"counting": "zero-based"},
+        inputs={
+            "index": made("CounterLimited", upper=2),
+            "u1": made("SineWave"),
+            "u2": made("Constant", value=2.0),
+            "u3": made("Ramp", slope=-0.2),
+        },
+    )
 
     inputs: int = parameter(3, minimum=1, doc="how many inputs there are to choose from")
     counting: str = parameter("one-based", choices=_COUNTING, doc="whether the first index is 1 or 0")
@@ -248,6 +289,12 @@ class ManualSwitch(Block):
 
     family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Manual Switch"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The first of two signals passes; the position is a parameter and can be changed during a "
+            "session."
+        ),
+    )
 
     position: float = parameter(1.0, minimum=1.0, maximum=2.0, doc="1 or 2")
 

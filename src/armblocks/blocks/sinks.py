@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from armblocks.blocks.elementwise import numbered_ports
-from armblocks.diagram import Block, Port, View, ViewKind, parameter
+from armblocks.diagram import Block, Port, View, ViewKind, WorkedExample, made, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,6 +15,11 @@ class Scope(Block):
 
     family: ClassVar[str] = "sinks"
     title: ClassVar[str] = "Scope"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two signals of one unit, in one panel.",
+        parameters={"inputs": 2},
+        inputs={"u1": made("SineWave"), "u2": made("PulseGenerator")},
+    )
 
     inputs: int = parameter(1, minimum=1, doc="how many inputs")
 
@@ -31,6 +36,10 @@ class XYGraph(Block):
 
     family: ClassVar[str] = "sinks"
     title: ClassVar[str] = "XY Graph"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A figure of Lissajous: two sines of different frequency, one over the other.",
+        inputs={"x": made("SineWave", frequency=2.0), "y": made("SineWave", frequency=3.0)},
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("x", "along the horizontal axis"), Port("y", "along the vertical axis"))
@@ -45,6 +54,10 @@ class Display(Block):
 
     family: ClassVar[str] = "sinks"
     title: ClassVar[str] = "Display"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The number as it stands at the end of the run.",
+        inputs={"u": made("Ramp", slope=0.5)},
+    )
 
     inputs: int = parameter(1, minimum=1, doc="how many inputs")
 
@@ -61,6 +74,11 @@ class ToWorkspace(Block):
 
     family: ClassVar[str] = "sinks"
     title: ClassVar[str] = "To Workspace"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The signal is kept under the name that is given; a scope shows it here.",
+        inputs={"u": made("SineWave")},
+        shown=("u",),
+    )
 
     variable: str = parameter("simout", doc="the name of the variable")
 
@@ -77,6 +95,11 @@ class Terminator(Block):
 
     family: ClassVar[str] = "sinks"
     title: ClassVar[str] = "Terminator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Nothing is done with the signal; a scope shows it here.",
+        inputs={"u": made("SineWave")},
+        shown=("u",),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "what is not needed"),)

@@ -9,7 +9,7 @@ from casadi import SX, fmax, if_else, sin
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, parameter, shape_of
+from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, WorkedExample, parameter, shape_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +18,10 @@ class Constant(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Constant"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The same value at all times.",
+        parameters={"value": 2.0},
+    )
 
     value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="what comes out")
 
@@ -37,6 +41,9 @@ class Clock(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Clock"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The time itself: a slope of 1.",
+    )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "time since the start", "s", shape=()),)
@@ -54,6 +61,10 @@ class Step(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Step"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="From 0 to 1 at 2 s.",
+        parameters={"time": 2.0},
+    )
 
     time: float = parameter(1.0, doc="when it jumps", unit="s")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the value before")
@@ -81,6 +92,10 @@ class Ramp(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Ramp"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Level until 2 s, then a rise of 0.5 a second.",
+        parameters={"slope": 0.5, "start": 2.0},
+    )
 
     slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="rise per second", unit="1/s")
     start: float = parameter(0.0, doc="when the rise begins", unit="s")
@@ -108,6 +123,10 @@ class SineWave(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Sine Wave"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two radians a second, about the bias 1.",
+        parameters={"amplitude": 2.0, "frequency": 2.0, "bias": 1.0},
+    )
 
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the way from peak to peak")
     frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="angular frequency", unit="rad/s")

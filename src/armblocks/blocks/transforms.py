@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 from typing import ClassVar
 
 from casadi import SX, horzcat, vertcat
 
-from armblocks.diagram import Block, Port, Signals
+from armblocks.blocks.example_signals import HELIX_POSE, last_column_of
+from armblocks.diagram import Block, Port, Signals, WorkedExample, made
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,6 +18,11 @@ class T2xyz(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "T2xyz"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The position of a pose that moves along a circle.",
+        inputs={"T": HELIX_POSE},
+        shown=("x", "y", "z"),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("T", "the pose", shape=(4, 4)),)
@@ -33,6 +40,11 @@ class Xyz2T(Block):
 
     family: ClassVar[str] = "transforms"
     title: ClassVar[str] = "xyz2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The last column of the pose is the position.",
+        inputs={"x": made("SineWave", phase=pi / 2), "y": made("SineWave"), "z": made("Ramp", slope=0.1)},
+        shown=(last_column_of("T"),),
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return tuple(Port(axis, f"position along {axis}", "m", shape=()) for axis in "xyz")

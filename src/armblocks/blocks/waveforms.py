@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.interpolation import weights
 from armblocks.blocks.lookup import rising
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, parameter, shape_of
+from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, WorkedExample, parameter, shape_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +22,9 @@ class Ground(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Ground"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Nothing: zero at all times.",
+    )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "zero", shape=()),)
@@ -36,6 +39,10 @@ class Pulse(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Pulse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="One pulse from 2 s to 5 s.",
+        parameters={"start": 2.0, "width": 3.0},
+    )
 
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the value during the pulse")
     start: float = parameter(1.0, doc="when it begins", unit="s")
@@ -65,6 +72,10 @@ class Chirp(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Chirp Signal"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The frequency rises from 0.1 Hz to 1 Hz within ten seconds.",
+        parameters={"target_time": 10.0},
+    )
 
     initial_frequency: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, doc="f1, at t = 0", unit="Hz")
     final_frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="f2, at T", unit="Hz")
@@ -95,6 +106,10 @@ class FromTable(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "From Workspace"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A smooth curve through four points; after the last one its value is held.",
+        parameters={"times": (0.0, 2.0, 5.0, 8.0), "values": (0.0, 1.0, -1.0, 0.5), "method": "cubic"},
+    )
 
     times: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="instants (n,)", unit="s")
     values: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2), doc="values there, (n,) or (n, m)")

@@ -14,6 +14,7 @@ from armblocks import blocks as kinds
 from armblocks.diagram import Block
 from armblocks.report.camera import Camera
 from armblocks.report.charts import thin_out
+from armblocks.report.face_symbols import CURVES, TEXTS
 from armblocks.report.numbers import axis_number
 from armblocks.report.picture import Curve, Disc, Mark, Polyline, Rectangle, Text
 from armblocks.report.style import Tone, trace_tone
@@ -142,10 +143,14 @@ def face(block: Block, room: Room, trend: Trend | None) -> list[Mark]:
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
             return _robot(room, block.robot, caption)
         case _:
-            curve = _CURVES.get(type(block))
+            curve = CURVES.get(block.type_name())
             if curve is not None:
                 return _curve(room, curve)
-            text = _FACE_TEXT.get(type(block), block.title)
+            text = TEXTS.get(block.type_name(), block.title)
+            words = text.split()
+            if len(words) > 1 and text_width(text, 10.5) > room.width - 6:
+                half = (len(words) + 1) // 2
+                return _lines(room, [" ".join(words[:half]), " ".join(words[half:])], size=9.5)
             return _words(room, text, size=13 if len(text) < 8 else 10.5)
 
 
@@ -163,32 +168,6 @@ def port_labels(block: Block) -> tuple[tuple[str, ...], tuple[str, ...]]:
             return into if len(into) > 1 else (), out if len(out) > 1 else ()
 
 
-def _s_curve() -> list[tuple[float, float]]:
-    s = [k / 20 for k in range(21)]
-    return [(u, 10 * u**3 - 15 * u**4 + 6 * u**5) for u in s]
-
-
-_CURVES: dict[type[Block], list[tuple[float, float]]] = {
-    kinds.JTraj: _s_curve(),
-    kinds.Step: [(0, 0), (0.45, 0), (0.45, 1), (1, 1)],
-    kinds.Ramp: [(0, 0), (0.3, 0), (1, 1)],
-    kinds.SineWave: [(k / 32, 0.5 + 0.5 * math.sin(2 * math.pi * k / 32)) for k in range(33)],
-    kinds.Saturation: [(0, 0), (0.3, 0), (0.7, 1), (1, 1)],
-}
-_FACE_TEXT: dict[type[Block], str] = {
-    kinds.Clock: "t",
-    kinds.Rne: "rne",
-    kinds.Gravload: "g(q)",
-    kinds.Inertia: "M(q)",
-    kinds.Coriolis: "C(q, qd)",
-    kinds.Jacob0: "J(q)",
-    kinds.Jacobe: "Jₑ(q)",
-    kinds.T2xyz: "T→xyz",
-    kinds.Xyz2T: "xyz→T",
-    kinds.Atan2: "atan2",
-    kinds.Power: "u^v",
-    kinds.Terminator: "⊣",
-}
 _FUNCTION_TEXT = {
     "square": "u²",
     "reciprocal": "1/u",

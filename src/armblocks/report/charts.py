@@ -50,7 +50,13 @@ class Panel:
 
 
 def time_chart(
-    time: _Array, panels: Sequence[Panel], *, title: str, description: str, height: float = PANEL_HEIGHT
+    time: _Array,
+    panels: Sequence[Panel],
+    *,
+    title: str,
+    description: str,
+    height: float = PANEL_HEIGHT,
+    width: float = FIGURE_WIDTH,
 ) -> Picture:
     """Panels under one another over one time axis (s), each line named at its right end."""
     spans = [_value_range(panel) for panel in panels]
@@ -59,11 +65,11 @@ def time_chart(
     ]
     left = 14 + max(text_width(axis_number(v), SMALL_SIZE) for values in ticks for v in values)
     left = max(left, 48.0)
-    right = FIGURE_WIDTH - _LABEL_ROOM
+    right = width - _LABEL_ROOM
     bottom = len(panels) * (_HEAD + height) + (len(panels) - 1) * _GAP
-    picture = Picture(width=FIGURE_WIDTH, height=bottom + 44, title=title, description=description)
+    picture = Picture(width=width, height=bottom + 44, title=title, description=description)
     across = Scale(float(time[0]), _end_of(time), left, right)
-    time_ticks = nice_ticks(across.low, across.high, 10)
+    time_ticks = nice_ticks(across.low, across.high, 10 if width >= FIGURE_WIDTH else 6)
     for number, (panel, span, values) in enumerate(zip(panels, spans, ticks)):
         top = number * (_HEAD + height + _GAP) + _HEAD
         up = Scale(*span, top + height, top)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from enum import IntEnum
 
 from armblocks.diagram import (
+    Block,
     Bus,
     Connection,
     Diagram,
@@ -20,7 +21,7 @@ from armblocks.diagram import (
 )
 from armblocks.report import block_faces
 from armblocks.report.block_faces import FaceShape, Room, Trend
-from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes
+from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes, sized_box
 from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text
 from armblocks.report.style import Theme, Tone
 from armblocks.report.svg import svg_file
@@ -31,6 +32,8 @@ from armblocks.simulation.result import SimulationResult
 _MARGIN = 22.0
 _ROUNDING = 5.0
 _TRENDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
+_STUB = 16.0
+"""px of wire at the ports of a block that is drawn alone."""
 
 
 def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *, inside: str = "") -> Picture:
@@ -70,6 +73,26 @@ def diagram_svg(
 ) -> str:
     """:func:`diagram_picture` as an SVG document; ``theme`` ``None`` follows the reader's preference."""
     return svg_file(diagram_picture(diagram, result), theme=theme)
+
+
+def block_picture(block: Block) -> Picture:
+    """One block alone, with stubs of its wires: the symbol that stands for it."""
+    box = sized_box("", block)
+    marks: list[Mark] = []
+    for spot in (*box.inputs, *box.outputs):
+        outside = (spot.x + _STUB * (-1 if spot in box.inputs else 1) * abs(spot.dx), spot.y)
+        path = (outside, (spot.x, spot.y)) if spot in box.inputs else ((spot.x, spot.y), outside)
+        marks.append(Curve(_rounded((path[0], path[1])), stroke=Tone.WIRE, width=1.2))
+        if spot in box.inputs:
+            marks.append(_arrow_head(path))
+    marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
+    picture = Picture(
+        width=box.width + 2 * (_STUB + 2),
+        height=box.height + 8,
+        title=f"Symbol of {block.title}",
+    )
+    picture.place(Picture(width=0, height=0, title="", marks=marks), _STUB + 2 - box.x, 4 - box.y)
+    return picture
 
 
 def _nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:

@@ -65,7 +65,7 @@ class Box:
 
 def boxes(diagram: Diagram) -> dict[str, Box]:
     """Every block's box: from the diagram's layout if it names all blocks, else from :func:`layered`."""
-    sized = {name: _sized(name, block) for name, block in diagram.blocks.items()}
+    sized = {name: sized_box(name, block) for name, block in diagram.blocks.items()}
     if not diagram.layout or set(diagram.layout) < set(diagram.blocks):
         return _turned(diagram, layered(diagram, sized))
     placed: dict[str, Box] = {}
@@ -286,7 +286,7 @@ def _port_y(spots: Sequence[PortSpot], port: str) -> float:
     return next(spot.y for spot in spots if spot.name == port)
 
 
-def _sized(name: str, block: Block) -> Box:
+def sized_box(name: str, block: Block) -> Box:
     shape, width, height = face_size(block)
     inputs, outputs = len(block.input_ports()), len(block.output_ports())
     if shape is FaceShape.CARD:

@@ -69,7 +69,7 @@ def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
     )
 
 
-def view_figures(diagram: Diagram, result: SimulationResult) -> Iterator[Figure]:
+def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGURE_WIDTH) -> Iterator[Figure]:
     """A figure for every Scope and XY Graph of the diagram, in the order of their names."""
     for block, view in diagram_views(diagram):
         if view.kind is ViewKind.TRACES:
@@ -77,7 +77,7 @@ def view_figures(diagram: Diagram, result: SimulationResult) -> Iterator[Figure]
                 name=f"scope-{file_name(block)}",
                 section="scopes",
                 caption=view.title or block,
-                picture=_scope(block, view, result),
+                picture=_scope(block, view, result, width),
             )
         elif view.kind is ViewKind.PATH:
             yield Figure(
@@ -190,7 +190,7 @@ def _factor(unit: str, shown_unit: str, values: _Array) -> float:
     return si_prefix(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))[0]
 
 
-def _scope(block: str, view: View, result: SimulationResult) -> Picture:
+def _scope(block: str, view: View, result: SimulationResult, width: float) -> Picture:
     panels: list[Panel] = []
     for number, signal in enumerate(view.signals):
         label = view.labels[number] if number < len(view.labels) else ""
@@ -217,6 +217,7 @@ def _scope(block: str, view: View, result: SimulationResult) -> Picture:
         title=f"Scope {block}",
         description=f"Traces over time of {', '.join(panel.quantity for panel in panels)}.",
         height=128.0,
+        width=width,
     )
 
 

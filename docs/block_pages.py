@@ -1,0 +1,283 @@
+"""A page for every block: what it does, its ports and parameters, and a worked example with its plot."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterable, Iterator
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Diagram, Parameter, ParameterKind, Port, State, ViewKind, infer_shapes
+from armblocks.face.block_examples import caption, example_block
+from armblocks.formats import diagram_to_bytes, diagram_to_python, load_robot
+from armblocks.report import block_picture, diagram_picture
+from armblocks.report.figures import Figure, motion_figures, view_figures
+from armblocks.report.motion import motions
+from armblocks.report.style import theme_variables
+from armblocks.report.svg import page_rules, svg_inline
+
+FIGURE_WIDTH = 736.0
+"""px: what the theme's column holds, so that type in figures is as large as it says."""
+
+
+def block_pages() -> Iterator[tuple[str, str]]:
+    """Path and text of every page: the index, then one for each block."""
+    yield "blocks.md", index_page()
+    for kind in BLOCKS.values():
+        yield f"blocks/{kind.type_name()}.md", block_page(kind)
+
+
+def index_page() -> str:
+    """Every block of the library by family: its symbol and what it does."""
+    lines = [
+        "# Blocks",
+        "",
+        f"The library has {len(BLOCKS)} blocks. Each has a page with its equation, ports, parameters and a",
+        "worked example: a small diagram, the Python that builds it, and what a run of it gives.",
+        "In a terminal, `armblocks blocks NAME` says the same.",
+        "",
+    ]
+    for family, kinds in BLOCKS.by_family().items():
+        lines += [f"## {family.capitalize()}", "", '<div class="block-list">', ""]
+        for kind in kinds:
+            lines += [
+                '<div class="block-entry">',
+                f'<div class="symbol">{symbol(kind, "index")}</div><div>',
+                "",
+                f"[{kind.type_name()}](blocks/{kind.type_name()}.md){other_title(kind)}<br>",
+                prose(kind.summary()),
+                "",
+                "</div></div>",
+                "",
+            ]
+        lines += ["</div>", ""]
+    return "\n".join(lines) + "\n"
+
+
+def other_title(kind: type[Block]) -> str:
+    """The name people know the block by, where its type does not say it already."""
+    same = kind.title.replace(" ", "").casefold() == kind.type_name().casefold()
+    return "" if same else f" ({prose(kind.title)})"
+
+
+def block_page(kind: type[Block]) -> str:
+    """All about one block."""
+    block = example_block(kind)
+    diagram = ab.block_example(kind)
+    name = kind.type_name()
+    called = f"**{prose(kind.title)}**, of" if other_title(kind) else "Of"
+    lines = [
+        # Without a place in the table of contents: the theme would write all blocks beside each of them.
+        "---",
+        "orphan: true",
+        "---",
+        "",
+        f"# {name}",
+        "",
+        f'<div class="symbol alone">{symbol(kind, name)}</div>',
+        "",
+        f"{called} the family [{kind.family}](../blocks.md#{kind.family}).",
+        "",
+        *docstring(kind),
+        "",
+        *worked_example(kind, diagram),
+        *port_table(block),
+        *parameter_table(kind),
+        *behaviour(diagram),
+    ]
+    others = [other for other in BLOCKS.by_family()[kind.family] if other is not kind]
+    if others:
+        links = ", ".join(f"[{other.type_name()}]({other.type_name()}.md)" for other in others)
+        lines += ["## See also", "", f"The family {kind.family}: {links}. [All blocks](../blocks.md).", ""]
+    return "\n".join(lines)
+
+
+def symbol(kind: type[Block], page: str) -> str:
+    """The block's face as SVG."""
+    picture = block_picture(example_block(kind))
+    size = f' style="width:{picture.width:.0f}px"'
+    return svg_inline(picture, f"{page}-{kind.type_name()}").replace("<svg ", f"<svg{size} ", 1)
+
+
+def docstring(kind: type[Block]) -> list[str]:
+    """The docstring as Markdown: paragraphs of prose, indented formulas as they are."""
+    lines: list[str] = []
+    for paragraph in inspect.cleandoc(kind.__doc__ or "").split("\n\n"):
+        if paragraph.startswith("    "):
+            lines += ["```text", inspect.cleandoc(paragraph), "```", ""]
+        else:
+            text = paragraph[:-1] if paragraph.endswith("::") else paragraph
+            lines += [prose(text), ""]
+    return lines[:-1]
+
+
+def prose(text: str) -> str:
+    """A docstring's words as Markdown: code stays code, all else, formulas with stars included, is plain."""
+    parts = re.split(r"(?::\w+:)?(`+)(.+?)\1", text)
+    found = [
+        re.sub(r"([*_\[\]|$<>#\\~])", r"\\\1", plain) + (f"`{code}`" if code else "")
+        for plain, code in zip(parts[::3], [*parts[2::3], ""])
+    ]
+    return "".join(found)
+
+
+def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """A Markdown table and an empty line."""
+    heads, cells = list(headings), [[cell.replace("\n", " ") for cell in row] for row in rows]
+    # A column with nothing in it, such as units that no port has, is left out.
+    kept = [k for k in range(len(heads)) if any(row[k] for row in cells)]
+    heads, cells = [heads[k] for k in kept], [[row[k] for k in kept] for row in cells]
+    body = ["| " + " | ".join(row) + " |" for row in cells]
+    return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads), *body, ""]
+
+
+def port_table(block: Block) -> list[str]:
+    """What goes in, what comes out, and what a run records beside it."""
+    sides = (
+        ("input", block.input_ports()),
+        ("output", block.output_ports()),
+        ("recorded", block.record_ports()),
+    )
+    rows = [
+        (f"`{port.name}`", side, shape_text(port), port.unit, prose(port.doc))
+        for side, ports in sides
+        for port in ports
+    ]
+    return ["## Ports", "", *table(("port", "side", "shape", "unit", "meaning"), rows)] if rows else []
+
+
+def shape_text(port: Port) -> str:
+    """``any``, ``scalar``, ``3``, ``4 x 4``."""
+    if port.shape is None:
+        return "any"
+    return " × ".join(map(str, port.shape)) or "scalar"
+
+
+def parameter_table(kind: type[Block]) -> list[str]:
+    """What can be set, what it may be, and which can be given another value without compiling again."""
+    if not kind.parameters():
+        return []
+    rows = [
+        (
+            f"`{rule.name}`",
+            prose(allowed(rule)),
+            rule.unit,
+            default_text(rule),
+            "yes" if rule.tunable else "",
+            prose(rule.doc),
+        )
+        for rule in kind.parameters()
+    ]
+    return [
+        "## Parameters",
+        "",
+        *table(("parameter", "may be", "unit", "default", "tunable", "meaning"), rows),
+    ]
+
+
+def allowed(rule: Parameter) -> str:
+    """The rule in words; choices as code. Numbers are finite unless it is said that they may be infinite."""
+    if rule.kind is ParameterKind.CHOICE:
+        return ", ".join(f"`{choice}`" for choice in rule.choices)
+    words = rule.describe().removesuffix(", finite")
+    if rule.kind is ParameterKind.ARRAY:
+        shapes = " or ".join(
+            ("number", "vector", "matrix", "table of three axes", "table of four axes")[n]
+            for n in rule.dimensions
+        )
+        words = ", ".join([shapes, *words.split(", ")[1:]])
+    infinite = not rule.finite and rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY)
+    return f"{words}, may be infinite" if infinite else words.removeprefix("a ").removeprefix("an ")
+
+
+def default_text(rule: Parameter) -> str:
+    """The default as Python, empty where one must be given."""
+    return "" if rule.required else f"`{rule.default!r}`"
+
+
+def behaviour(diagram: Diagram) -> list[str]:
+    """What the block keeps and where it switches, in the shapes of the example."""
+    block = diagram.blocks[diagram.name]
+    shapes = infer_shapes(diagram).inputs[diagram.name]
+    kept: list[tuple[str, State]] = [
+        *(("continuous state", state) for state in block.states(shapes)),
+        *(("discrete state", state) for state in block.discrete_states(shapes)),
+        *(("mode", state) for state in block.modes(shapes)),
+    ]
+    rows = [(f"`{state.name}`", what, state.unit, prose(state.doc)) for what, state in kept]
+    rows += [
+        (f"`{guard.name}`", f"event {DIRECTIONS[guard.direction]}", "", prose(guard.doc))
+        for guard in block.guards(shapes)
+    ]
+    lines: list[str] = []
+    if rows:
+        lines = ["## States and events", "", *table(("name", "what it is", "unit", "meaning"), rows)]
+    if block.sampled:
+        lines += ["Works at the ticks of its clock only; its outputs are held in between.", ""]
+    if block.time_derivatives:
+        pairs = ", ".join(
+            f"`{out}` is the exact time derivative of what feeds `{into}`"
+            for out, into in block.time_derivatives.items()
+        )
+        lines += [f"{pairs}.", ""]
+    return lines
+
+
+DIRECTIONS = {1: "at a zero upwards", -1: "at a zero downwards", 0: "at a zero"}
+
+
+def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
+    """The example's drawing, what a run of it gives, and both its forms."""
+    result = ab.simulate(diagram)
+    figures = list(view_figures(diagram, result, FIGURE_WIDTH))
+    if any(view.kind is ViewKind.ROBOT for _, view in diagram.views()):
+        figures += [next(motion_figures(motion, "")) for motion in motions(diagram, result)]
+    drawing = diagram_picture(diagram, result)
+    lines = ["## Example", "", prose(caption(kind)), ""]
+    lines += [figure_html(figure) for figure in figures]
+    size = f' style="width:{drawing.width:.0f}px"'
+    drawn = svg_inline(drawing, "diagram").replace("<svg ", f"<svg{size} ", 1)
+    lines += [f'<figure class="drawing">{drawn}</figure>', ""]
+    lines += ["```python", diagram_to_python(diagram).rstrip(), "```", ""]
+    data = diagram_to_bytes(diagram, load_robot).decode()
+    lines += [
+        "<details><summary>The same as a file</summary>",
+        "",
+        "```json",
+        data.rstrip(),
+        "```",
+        "",
+        "</details>",
+        "",
+    ]
+    return lines
+
+
+def figure_html(figure: Figure) -> str:
+    """A figure of the report, for these pages."""
+    shape = "narrow" if figure.narrow else "wide"
+    drawn = svg_inline(figure.picture, f"plot-{figure.name}")
+    return f'<figure class="{shape}">{drawn}</figure>\n'
+
+
+def style_sheet() -> str:
+    """Colours of the figures by the theme's own switch, and the few rules of the block pages."""
+    light, dark = theme_variables("light"), theme_variables("dark")
+    return (
+        f"body{{{light}}}body[data-theme=dark]{{{dark}}}"
+        f"@media(prefers-color-scheme:dark){{body:not([data-theme=light]){{{dark}}}}}" + page_rules() + RULES
+    )
+
+
+RULES = """
+article figure{margin:1.2rem 0}article figure svg,.symbol svg{display:block;max-width:100%;height:auto}
+article figure.wide svg{width:100%}article figure.narrow svg{max-width:400px;width:100%}
+article table.docutils{margin-left:0}
+.symbol.alone{float:right;margin:0 0 1rem 1.5rem}
+.block-list{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:.4rem 1.6rem}
+.block-entry{display:grid;grid-template-columns:112px 1fr;gap:.8rem;align-items:center}
+.block-entry p{margin:.2rem 0;line-height:1.35;font-size:.92em}
+.block-entry .symbol{justify-self:center}
+@media(max-width:46em){article figure.wide{overflow-x:auto}article figure.wide svg{min-width:560px}}
+"""
