@@ -287,6 +287,7 @@ def _port_y(spots: Sequence[PortSpot], port: str) -> float:
 
 
 def sized_box(name: str, block: Block) -> Box:
+    """A box of the size that suits the block, its ports along the edges, at the origin."""
     shape, width, height = face_size(block)
     inputs, outputs = len(block.input_ports()), len(block.output_ports())
     if shape is FaceShape.CARD:
