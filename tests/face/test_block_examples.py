@@ -22,6 +22,7 @@ def run_as_typed(code: str) -> dict[str, object]:
     return namespace
 
 
+@pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
 @pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
 def test_the_worked_example_runs_and_its_python_is_the_same_diagram(kind: type[Block]) -> None:
     diagram = ab.block_example(kind)
