@@ -15,6 +15,8 @@ from armblocks.blocks import (
     expression,
     joint_control,
     joint_paths,
+    joint_pid,
+    joint_sensors,
     lags,
     limited_integrators,
     logic,
@@ -86,6 +88,8 @@ from armblocks.blocks.joint_control import (
     RobotEnergy,
 )
 from armblocks.blocks.joint_paths import CirclePath, CTraj, MultiSegment, Trapezoidal
+from armblocks.blocks.joint_pid import JointPID, SampledJointPID
+from armblocks.blocks.joint_sensors import Encoder, JointSensor, Tachometer
 from armblocks.blocks.lags import (
     FirstOrderLag,
     LeadLag,
@@ -155,6 +159,7 @@ from armblocks.blocks.orientations import (
 )
 from armblocks.blocks.poses import (
     Delta2Tr,
+    PoseIntegration,
     PoseInverse,
     PoseProduct,
     Rp2T,
@@ -246,6 +251,8 @@ BLOCKS = BlockLibrary(
         poses,
         joint_paths,
         joint_control,
+        joint_pid,
+        joint_sensors,
         drives,
         arm_plant,
         expression,
@@ -307,6 +314,7 @@ __all__ = [
     "Display",
     "Divide",
     "DotProduct",
+    "Encoder",
     "Eul2T",
     "Expression",
     "ExtractDiagonal",
@@ -336,6 +344,8 @@ __all__ = [
     "Jacobe",
     "JacobianInverse",
     "JointPD",
+    "JointPID",
+    "JointSensor",
     "JointStops",
     "LeadLag",
     "LinearSolve",
@@ -364,6 +374,7 @@ __all__ = [
     "Outport",
     "PolarToCartesian",
     "Polynomial",
+    "PoseIntegration",
     "PoseInverse",
     "PoseProduct",
     "Power",
@@ -396,6 +407,7 @@ __all__ = [
     "Rounding",
     "Rp2T",
     "Rpy2T",
+    "SampledJointPID",
     "Saturation",
     "Scope",
     "SecondOrderLag",
@@ -419,6 +431,7 @@ __all__ = [
     "T2eul",
     "T2rpy",
     "T2xyz",
+    "Tachometer",
     "TappedDelay",
     "Terminator",
     "ToWorkspace",

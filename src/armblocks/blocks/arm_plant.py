@@ -61,8 +61,8 @@ class ArmPlant(Block):
     title: ClassVar[str] = "Robot with Dry Friction and Stops"
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The Puma sinks from a stretched pose against the friction of its motors, and rests for good.",
-        parameters={"robot": "puma560", "q0": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0)},
+        shows="The Puma falls onto the end stop of its shoulder and, by the friction of its motors, to rest.",
+        parameters={"robot": "puma560", "q0": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), "stops": "hard"},
         inputs={"tau": made("Constant", value=(0.0,) * 6)},
         shown=("q", "qd", "friction"),
     )

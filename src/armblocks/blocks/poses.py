@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import ClassVar
 
-from casadi import SX, cross, mtimes, skew, vertcat
+import numpy as np
+from casadi import SX, cross, dot, mtimes, norm_2, skew, vertcat
+from numpy.typing import ArrayLike
 
 from armblocks.blocks.example_signals import (
     HELIX_POSE,
@@ -18,7 +20,9 @@ from armblocks.blocks.example_signals import (
     position_of,
 )
 from armblocks.blocks.orientations import pose
-from armblocks.diagram import Block, Port, Signals, WorkedExample, made, parameter
+from armblocks.diagram import Block, Port, Shapes, Signals, State, WorkedExample, made, parameter, shape_of
+from armblocks.errors import InputError
+from armblocks.spatial.orientation import from_quaternion, quaternion_product
 
 _FRAMES = ("body", "world")
 
@@ -271,3 +275,68 @@ class Delta2Tr(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"T": pose(SX.eye(3) + skew(u["dx"][3:]), u["dx"][:3])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseIntegration(Block):
+    """The pose that a velocity leads to: p' = v and Q' = 1/2 w Q (world axes), or p' = R v and Q' = 1/2 Q w.
+
+    V is (v; w), of the frame's origin: in world axes what ``jacob0`` gives, in the frame's own (body) axes
+    what ``jacobe`` does. The state is the position and a quaternion Q. The pose is that of Q / |Q|, so that
+    its rotation is exact at any step; |Q| is led back to 1 at the rate ``restoring``, which changes no pose.
+    """
+
+    family: ClassVar[str] = "transforms"
+    title: ClassVar[str] = "Pose Integration"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A frame that goes forward and turns at constant rates, in its own axes, moves on a screw.",
+        inputs={"V": made("Constant", value=(1.0, 0.0, 0.2, 0.0, 0.0, 1.0))},
+        shown=(made("T2xyz").by(T="T").at("x"), made("T2xyz").by(T="T").at("z")),
+    )
+
+    axes: str = parameter("body", choices=_FRAMES, doc="the axes of the velocity")
+    position: ArrayLike = parameter((0.0, 0.0, 0.0), dimensions=(1,), doc="at t = 0 (3,)", unit="m")
+    quaternion: ArrayLike = parameter(
+        (1.0, 0.0, 0.0, 0.0), dimensions=(1,), doc="orientation at t = 0, scalar first (4,), of any length"
+    )
+    restoring: float = parameter(1.0, minimum=0.0, doc="rate at which |Q| returns to 1", unit="1/s")
+
+    def check(self) -> None:
+        for name, count in (("position", 3), ("quaternion", 4)):
+            shape = shape_of(self.parameter_value(name))
+            if shape != (count,):
+                raise InputError(
+                    f"the {name} has {shape[0]} numbers", where="PoseIntegration", allowed=f"{count}"
+                )
+        if not any(np.asarray(self.quaternion)):
+            raise InputError(
+                "the quaternion is zero",
+                where="PoseIntegration",
+                allowed="one that is not",
+                fix="give (1, 0, 0, 0) for no rotation",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("V", "velocity of the origin (m/s), then angular velocity (rad/s)", shape=(6,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "the pose", shape=(4, 4)),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return State("p", (3,), "the position", "m"), State("Q", (4,), "the quaternion, scalar first")
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(from_quaternion(x["Q"]), x["p"])}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        v, w, Q = u["V"][:3], vertcat(0.0, u["V"][3:]), x["Q"]
+        body = self.axes == "body"
+        turning = 0.5 * quaternion_product(*((Q, w) if body else (w, Q)))
+        return {
+            "p": mtimes(from_quaternion(Q), v) if body else v,
+            "Q": turning + 0.5 * p["restoring"] * (1.0 - dot(Q, Q)) * Q,
+        }
+
+    def initial_states(self, p: Signals) -> Signals:
+        Q = p["quaternion"]
+        return {"p": p["position"], "Q": Q / norm_2(Q)}
