@@ -25,7 +25,9 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("dop853", None), ("rk4", 0.013)])
+@pytest.mark.parametrize(
+    ("solver", "step"), [("rk45", None), ("dop853", None), ("rk4", 0.013), ("rodas5p", None), ("ros5", 0.013)]
+)
 @pytest.mark.parametrize("name", list(SYSTEMS))
 def test_an_interrupted_run_gives_the_bits_of_an_uninterrupted_one(
     name: str, solver: str, step: float | None, tmp_path: Path

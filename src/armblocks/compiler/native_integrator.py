@@ -19,7 +19,7 @@ from armblocks.compiler.linear_equations import LinearSpace
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
 from armblocks.compiler.rosenbrock_tableau import Tableau
-from armblocks.compiler.runge_kutta import POINTERS, Loop, define_loop
+from armblocks.compiler.runge_kutta import POINTERS, STIFF_LOOKS, Loop, define_loop
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
@@ -100,6 +100,7 @@ class NativeIntegrator:
         atol: float = 1e-9,
         max_step: float = float("inf"),
         checkpoint: Checkpoint | None = None,
+        watch_stiffness: bool = False,
     ) -> Integration:
         """A run from ``start`` to ``samples[-1]``, ready for its first step.
 
@@ -108,7 +109,8 @@ class NativeIntegrator:
         that lies inside, what comes before sees ``f`` at most at the last double before it, and what comes
         after starts anew. ``step`` s: grid of a fixed-step method (its instants are ``k step``); ``rtol``,
         ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the run goes on from there, as
-        the run that left it would have. Nothing is checked.
+        the run that left it would have. With ``watch_stiffness`` it pauses, :attr:`Integration.stiff`, where
+        stability has held its steps short for long. Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -131,6 +133,7 @@ class NativeIntegrator:
         run.reals[Real.ATOL] = atol
         run.reals[Real.MAX_STEP] = max_step
         run.reals[Real.SPAN] = stop
+        run.counts[Count.WATCHING] = watch_stiffness
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
             run.counts[Count.SAMPLE] = 1
@@ -139,9 +142,27 @@ class NativeIntegrator:
             run.counts[Count.SEGMENT] = run.counts[Count.SEGMENTS]  # the instant itself, and no step
         return run
 
+    def take_over(self, run: Integration) -> Integration:
+        """Go on by this method where another one of the same system stands, between two of its steps.
+
+        What is recorded goes into the same arrays.
+        """
+        old, here = run.integrator.workspace, self.workspace
+        new = Integration(self, *run.course, records=(run.states, run.discrete, run.algebraic))
+        head = here.slope(1)  # numbers, x, y, and the derivative at x
+        new.reals[:head] = run.reals[:head]
+        new.reals[here.z :] = run.reals[old.z :]
+        new.counts[:] = run.counts
+        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.WATCHING]] = 0
+        return new
+
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
         """The native call. The interpreter's lock is released while it works."""
         return Status(self._advance(*addresses, max_steps))
+
+
+def _checkpoint(run: Integration, reals: Vector, counts: Integers) -> Checkpoint:
+    return Checkpoint(reals=reals, counts=counts, method=run.integrator.tableau.name)
 
 
 def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
@@ -155,34 +176,42 @@ def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """The arrays of a run before the step that its end cut short."""
+    """The arrays of a run before the step that its end cut short, and the name of their method."""
 
     reals: Vector
     counts: Integers
+    method: str
 
 
 class Integration:
     """One run: all of its state is in two arrays, so any chunking of the steps gives the same bits."""
 
     def __init__(
-        self, integrator: NativeIntegrator, p: Vector, samples: Vector, ends: Vector, clamps: Vector
+        self,
+        integrator: NativeIntegrator,
+        p: Vector,
+        samples: Vector,
+        ends: Vector,
+        clamps: Vector,
+        records: tuple[Vector, Vector, Vector] | None = None,
     ) -> None:
         sizes, workspace = integrator.sizes, integrator.workspace
         self.integrator = integrator
         self.reals = np.zeros(workspace.size)
         self.counts = np.zeros(workspace.counts, dtype=np.int64)
-        self.states = np.empty((samples.size, sizes.states))
-        """States at the sample instants, ``(N, n)``: valid up to ``recorded``."""
-        self.discrete = np.empty((samples.size, sizes.discrete))
-        """Discrete variables there, ``(N, nz)``."""
-        self.algebraic = np.empty((samples.size, sizes.algebraic))
-        """Unknowns of the implicit equations there, ``(N, nw)``."""
+        if records is None:
+            x, z, w = (np.empty((samples.size, n)) for n in (sizes.states, sizes.discrete, sizes.algebraic))
+            records = x, z, w
+        self.states, self.discrete, self.algebraic = records
+        """At the sample instants, states ``(N, n)``, discrete variables ``(N, nz)`` and unknowns of the
+        implicit equations ``(N, nw)``: valid up to ``recorded``."""
         self.counts[Count.SAMPLES] = samples.size
         self.counts[Count.SEGMENTS] = ends.size
         self.status = Status.PAUSED
-        self._saved = Checkpoint(reals=np.full_like(self.reals, np.nan), counts=np.zeros_like(self.counts))
-        self._kept = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
-        arrays = (self.reals, self.counts, *self._kept, self.states, self.discrete, self.algebraic)
+        self._saved = _checkpoint(self, np.full_like(self.reals, np.nan), np.zeros_like(self.counts))
+        # Parameters, sample instants, ends of the segments, and how late each may evaluate its derivative.
+        self.course = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
+        arrays = (self.reals, self.counts, *self.course, self.states, self.discrete, self.algebraic)
         self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
         arrays += (self._saved.reals, self._saved.counts, self._scratch)
         self._addresses = tuple(array.ctypes.data for array in arrays)
@@ -218,11 +247,11 @@ class Integration:
         """From where a longer run would go on; ``None`` if there is no such place yet."""
         if np.isnan(self._saved.reals[Real.TIME]):
             return None
-        return Checkpoint(reals=self._saved.reals.copy(), counts=self._saved.counts.copy())
+        return _checkpoint(self, self._saved.reals.copy(), self._saved.counts.copy())
 
     def now(self) -> Checkpoint:
         """The arrays as they are, between two calls of :meth:`advance`."""
-        return Checkpoint(reals=self.reals.copy(), counts=self.counts.copy())
+        return _checkpoint(self, self.reals.copy(), self.counts.copy())
 
     @property
     def point(self) -> RunPoint:
@@ -235,6 +264,12 @@ class Integration:
     def trial_unknowns(self) -> Vector:
         """Unknowns of the implicit equations at the point evaluated last, ``(nw,)``: NaN if not found."""
         return self._vector(self.integrator.workspace.trial_w, self.integrator.sizes.algebraic)
+
+    @property
+    def stiff(self) -> bool:
+        """Whether it paused because stability has held its steps short for long."""
+        long = self.counts[Count.STIFF] >= STIFF_LOOKS and self.counts[Count.WATCHING] != 0
+        return bool(long) and self.status is Status.PAUSED
 
     @property
     def instants(self) -> int:
@@ -304,7 +339,7 @@ class Integration:
     def first_non_finite_stage(self) -> tuple[float, Vector]:
         """Time and state at which the derivative of the step tried last became NaN or infinite first."""
         tableau = self.integrator.tableau
-        K, h, clamp = self._stage_derivatives(), self.last_step, self._kept[3][self.counts[Count.SEGMENT]]
+        K, h, clamp = self._stage_derivatives(), self.last_step, self.course[3][self.counts[Count.SEGMENT]]
         # Before the stages a Rosenbrock method keeps the derivative at the start.
         first = 0 if isinstance(tableau, ButcherTableau) else 1
         bad = [stage for stage in range(tableau.stages) if not np.isfinite(K[first + stage]).all()]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from armblocks.compiler.butcher_tableau import Row
 from armblocks.compiler.integrator_workspace import Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import number_text
@@ -40,6 +41,7 @@ class RosenbrockStep(StepWriter):
         self.rosenbrock = tableau
         self.space = space
         self._jacobian = jacobian
+        self._time = ""
         emit_linear_equations(routine.module, space, tableau.gamma)
 
     def prepare(self, time: str) -> None:
@@ -60,6 +62,7 @@ class RosenbrockStep(StepWriter):
     def stages(self, time: str, h: str, new_time: str) -> None:
         """All stages, the new state into y and the derivatives into their rows of K."""
         w, tableau = self.w, self.rosenbrock
+        self._time = time
         w.do(f"call void @factor(ptr %scratch, double {h})" if self.space.plan else self._whole(h))
         for stage in range(tableau.stages):
             row = 1 + stage
@@ -81,6 +84,39 @@ class RosenbrockStep(StepWriter):
             )
         self.move((0.0, *tableau.weights), h)
         self.evaluate(new_time, self.y, tableau.end_row)
+
+    def error_norm(self, h: str, error: Row) -> str:
+        """That of the embedded method, or of the values in the middle of the step, whichever is larger."""
+        w, tableau, space = self.w, self.rosenbrock, self.space
+        ends = super().error_norm(h, error)
+        state, slope = self.K(tableau.middle_row), self.K(tableau.middle_row + 1)
+        middle = w.fma(number_text(0.5), h, self._time)
+        self.interpolate(middle, self._time, h, w.at("%reals", state))
+        self.evaluate(middle, state, tableau.middle_row + 1)
+        weights = tableau.slope_weights(0.5)
+
+        def defect(i: str) -> None:
+            value = w.subtract(self.read(slope, i), self.combination(weights, i))
+            w.put(value, w.at("%scratch", w.word_op("add", i, str(space.right))))
+
+        def nothing(i: str) -> None:
+            place = w.word_op("add", i, str(space.right + self.n))
+            w.put(number_text(0.0), w.at("%scratch", place))
+
+        def weighted(i: str) -> str:
+            value = w.get(w.at("%scratch", w.word_op("add", i, str(space.solution))))
+            before, after = (w.absolute(self.read(place, i)) for place in (self.x, self.y))
+            return w.divide(value, self.scale(w.maximum(before, after)))
+
+        w.for_each(self.n, defect)
+        if space.size > self.n:
+            w.for_each(space.size - self.n, nothing)
+        w.do("call void @solve_linear(ptr %scratch)")
+        between = w.multiply(h, self.mean_square(weighted))
+        # A NaN of either is the result: it makes the step be tried shorter.
+        return w.select(
+            w.compare("olt", between, ends), ends, w.add(between, w.multiply(ends, number_text(0.0)))
+        )
 
     def extra_stages(self, time: str, h: str) -> None:
         """None: the stages give the values between the steps."""

@@ -25,7 +25,10 @@ class RosenbrockTableau:
 
     This is the form in which no product with ``J`` is left (Hairer, Wanner II, IV.7, equation (7.25), with
     ``u = h k``); :func:`from_textbook` makes it from ``alpha``, ``Gamma``, ``b``. The estimate of the error
-    is ``h * sum_j error[j] k[j]``, of order ``error_order``; without ``error`` the step is fixed.
+    is ``h * sum_j error[j] k[j]``, of order ``error_order``; without ``error`` the step is fixed. An adaptive
+    step is also judged by its values in between, whose defect ``r = f - x'`` in its middle is what a stiff
+    system shows of their error: ``(I / gamma - h J)^-1 h r`` has to be below the tolerance as well. Otherwise
+    steps would grow without bound where fast dynamics follow slow inputs, right at their ends only.
 
     Where implicit equations ``0 = g(t, x, w)`` belong to the system, ``J`` and ``T`` are those along their
     solution ``w(t, x)``: the matrix gets the rows of ``g`` below it and is eliminated as a whole.
@@ -97,8 +100,9 @@ class RosenbrockTableau:
 
     @property
     def rows(self) -> int:
-        """Rows of ``K``: the derivative at the step's start, the stages, the derivative at its end."""
-        return self.stages + 2
+        """Rows of ``K``: the derivative at the step's start, the stages, the derivative at its end; and the
+        state and the derivative in its middle."""
+        return self.stages + 4
 
     @property
     def end_row(self) -> int:
@@ -115,6 +119,16 @@ class RosenbrockTableau:
         """``dense`` over the rows of ``K``."""
         nothing = (0.0,) * len(self.dense[0])
         return (nothing, *self.dense, nothing)
+
+    @property
+    def middle_row(self) -> int:
+        """The row of ``K`` with the state in the middle of the step; the next one has its derivative."""
+        return self.stages + 2
+
+    def slope_weights(self, theta: float) -> Row:
+        """``x'(t + theta h)`` of the values between the steps, over the rows of ``K``."""
+        powers = [(m + 1) * theta**m for m in range(len(self.dense[0]))]
+        return (0.0, *(sum(a * b for a, b in zip(row, powers)) for row in self.dense))
 
     @property
     def content(self) -> str:

@@ -109,7 +109,7 @@ class StepWriter(ABC):
         def weighted(weights: Row) -> Callable[[str], str]:
             def element(index: str) -> str:
                 before, after = (w.absolute(self.read(place, index)) for place in (self.x, self.y))
-                return w.divide(self.combination(weights, index), self._scale(w.maximum(before, after)))
+                return w.divide(self.combination(weights, index), self.scale(w.maximum(before, after)))
 
             return element
 
@@ -129,7 +129,7 @@ class StepWriter(ABC):
         w = self.w
 
         def weighted(value: Callable[[str], str]) -> Callable[[str], str]:
-            return lambda i: w.divide(value(i), self._scale(w.absolute(self.read(self.x, i))))
+            return lambda i: w.divide(value(i), self.scale(w.absolute(self.read(self.x, i))))
 
         d0 = self.mean_square(weighted(lambda i: self.read(self.x, i)))
         d1 = self.mean_square(weighted(lambda i: self.read(self.K(0), i)))
@@ -176,7 +176,8 @@ class StepWriter(ABC):
 
     # Sums.
 
-    def _scale(self, magnitude: str) -> str:
+    def scale(self, magnitude: str) -> str:
+        """What an error is measured by: ``atol + rtol magnitude``."""
         return self.w.fma(magnitude, self._rtol, self._atol)
 
     def combination(self, weights: Row, index: str) -> str:

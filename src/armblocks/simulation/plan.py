@@ -14,7 +14,7 @@ from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, TABLEAUX, find_tableau
+from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, STIFF, TABLEAUX, find_tableau
 
 Array = NDArray[np.float64]
 
@@ -28,9 +28,11 @@ SMALLEST_RTOL = 1e-13
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time."""
+    """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time; ``stiff`` is what
+    goes on in its place where the system turns out to be stiff, if anything."""
 
     tableau: Tableau | None
+    stiff: Tableau | None
     solver: str
     reason: str
     instants: Array
@@ -78,6 +80,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions, start: float =
     solver = "none" if tableau is None or system.states.size == 0 else tableau.name
     return Plan(
         tableau=tableau,
+        stiff=STIFF if tableau is DEFAULT and options.solver.casefold() == "auto" else None,
         solver=solver,
         reason=reason,
         instants=sample_instants(stop, sample_time, start),
@@ -108,7 +111,7 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau
     if named is None and options.step is not None:
         return RK4, "a step was given, so a fixed-step method of order 4"
     if named is None:
-        return DEFAULT, "auto: adaptive and explicit, order 5, for systems that are not stiff"
+        return DEFAULT, f"auto: {DEFAULT.title}, explicit, as nothing showed that the system is stiff"
     if named.adaptive and options.step is not None:
         raise InputError(
             f"solver {named.name} chooses its own steps, and step is {options.step:g} s",

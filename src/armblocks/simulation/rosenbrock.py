@@ -97,7 +97,7 @@ _INNER = (
 RODAS5P = RosenbrockTableau(
     name="rodas5p",
     aliases=("stiff", "ode15s", "rodas"),
-    title="Rodas5P 5(4), stiffly accurate and L-stable",
+    title="Rodas5P 5(4)",
     source=(
         "Steinebach: Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the "
         "Julia Differential Equations package, BIT Numer. Math. 63 (2023) 27"

@@ -57,6 +57,7 @@ class RunState:
             "name": self.name,
             "names": self.names,
             "settings": self.settings,
+            "method": "" if self.checkpoint is None else self.checkpoint.method,
         }
         arrays: dict[str, NDArray[Any]] = {
             "description": np.array(json.dumps(description)),
@@ -89,6 +90,7 @@ class RunState:
                 checkpoint = Checkpoint(
                     reals=np.ascontiguousarray(arrays["reals"], dtype=np.float64).reshape(-1),
                     counts=np.ascontiguousarray(arrays["counts"], dtype=np.int64).reshape(-1),
+                    method=str(description["method"]),
                 )
             first, second, third = (tuple(map(str, part)) for part in description["names"])
             return cls(

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import Integration, RunPoint
+from armblocks.compiler.native_integrator import Checkpoint, Integration, NativeIntegrator, RunPoint
+from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import SimulationError
@@ -43,8 +44,9 @@ def simulate(
     ``parameters`` changes tunable ones: a mapping from ``block.parameter``, or the flat vector ``(np,)``.
     ``progress(time, fraction, real_time_factor)`` is called at most some 16 times a second and at the end.
 
-    With ``solver="auto"`` a system without states is evaluated directly at all instants, any other is
-    integrated by Dormand-Prince 5(4), or by RK4 where ``step`` is given. Without a ``sample_time`` the stop
+    With ``solver="auto"`` a system without states is evaluated directly at all instants. Any other is
+    integrated by RK4 where ``step`` is given, else by Dormand-Prince 5(4), until stability and not accuracy
+    has held its steps short some thousand times: then Rodas5P goes on. Without a ``sample_time`` the stop
     time is cut into 1000 (10 s in steps of 10 ms); with a fixed step, every step is recorded, or as many of
     them as give at most 10 000 rows.
 
@@ -100,6 +102,9 @@ class _Run:
         self.progress = progress
         self.initial_state = initial_state
         self.reason = plan.reason
+        self.resumption = ""
+        self.solver = plan.solver
+        self.checkpoint: Checkpoint | None = None
         self.settings = ""
         self.integration: Integration | None = None
         self.message = ""
@@ -140,14 +145,19 @@ class _Run:
         native = compiled.integrator(plan.tableau)
         step = 0.0 if plan.tableau.adaptive else plan.step
         numbers = (step, options.rtol, options.atol, plan.max_step)
-        self.settings = settings_text(native.key, numbers, self.p)
+        key = native.key if plan.stiff is None else (*native.key, "auto")
+        self.settings = settings_text(key, numbers, self.p)
         checkpoint = None
         if self.initial_state is not None:
             start = self.resume_from(self.initial_state)
             if self.initial_state.settings == self.settings:
                 checkpoint = self.initial_state.checkpoint
             how = "exactly as the run before" if checkpoint is not None else "started anew"
-            self.reason = f"{plan.reason}; goes on from {start.time:g} s, {how}"
+            if plan.stiff is not None and checkpoint is not None and checkpoint.method == plan.stiff.name:
+                native = self.prepared(plan.stiff)
+                self.solver = plan.stiff.name
+                self.reason = f"auto: {plan.stiff.title}, as the run before found the system stiff"
+            self.resumption = f"; goes on from {start.time:g} s, {how}"
         else:
             start = RunPoint(
                 time=0.0,
@@ -167,11 +177,14 @@ class _Run:
             atol=options.atol,
             max_step=plan.max_step,
             checkpoint=checkpoint,
+            watch_stiffness=plan.stiff is not None and native.tableau is plan.tableau,
         )
         self.integration = integration
         steps = 1000
         try:
             while integration.status is Status.PAUSED:
+                if integration.stiff:
+                    integration = self.change_method(integration)
                 started = perf_counter()
                 integration.advance(steps)
                 now = perf_counter()
@@ -183,6 +196,29 @@ class _Run:
             self.complete = False
             self.message = f"stopped by Ctrl-C at {integration.time:g} s of {options.stop_time:g} s"
         return integration
+
+    def prepared(self, tableau: Tableau) -> NativeIntegrator:
+        """The native loop of another method; the time to make it counts as preparation."""
+        started = perf_counter()
+        native = self.compiled.integrator(tableau)
+        spent = perf_counter() - started
+        self.preparation_time += spent
+        self.begun += spent
+        return native
+
+    def change_method(self, integration: Integration) -> Integration:
+        """The run goes on by the method for stiff systems, from where it stands."""
+        first, stiff = self.plan.tableau, self.plan.stiff
+        assert first is not None and stiff is not None
+        native = self.prepared(stiff)
+        self.checkpoint = integration.checkpoint
+        self.solver = f"{first.name}, then {stiff.name}"
+        self.reason = (
+            f"auto: {first.title} until {integration.time:.4g} s, then {stiff.title}, because the system is "
+            f"stiff: stability, not accuracy, held the explicit steps at {integration.last_step:.2g} s"
+        )
+        self.integration = native.take_over(integration)
+        return self.integration
 
     @staticmethod
     def resume_from(state: RunState) -> RunPoint:
@@ -197,7 +233,7 @@ class _Run:
             point = RunPoint(time=float(self.plan.instants[-1]), x=np.empty(0))
         else:
             point = integration.point
-            checkpoint = integration.checkpoint
+            checkpoint = self.checkpoint or integration.checkpoint
             if checkpoint is None and integration.status is Status.PAUSED:
                 checkpoint = integration.now()  # stopped between two steps: the next one goes on from here
         return RunState(
@@ -226,12 +262,12 @@ class _Run:
     def make_result(
         self, instants: Array, states: Array, signals: Array, *, failed: bool = False
     ) -> SimulationResult:
-        compiled, plan, integration = self.compiled, self.plan, self.integration
+        compiled, integration = self.compiled, self.integration
         wall_time = perf_counter() - self.begun
         reached = float(instants[-1]) if instants.size else 0.0
         report = RunReport(
-            solver=plan.solver,
-            reason=self.reason,
+            solver=self.solver,
+            reason=self.reason + self.resumption,
             steps=0 if integration is None else integration.accepted,
             rejected=0 if integration is None else integration.rejected,
             evaluations=0 if integration is None else integration.evaluations,

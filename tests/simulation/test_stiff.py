@@ -1,0 +1,242 @@
+"""Stiff systems: known problems, events and ticks, implicit equations, the automatic choice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from hybrid_systems import column, hybrid, loop_of_cosine
+from scipy.integrate import solve_ivp
+from small_systems import scalar
+from stiff_systems import (
+    KINETICS,
+    ROBERTSON_END,
+    VAN_DER_POL_END,
+    ball_on_fast_plate,
+    heat,
+    kinetics,
+    pendulum,
+    robertson,
+    robertson_dae,
+    van_der_pol,
+)
+
+from armblocks.compiler.system import compile_system
+from armblocks.equations import SimulationOptions
+from armblocks.errors import SimulationError
+from armblocks.simulation import RunState, simulate
+from armblocks.simulation.rosenbrock import RODAS5P
+from armblocks.simulation.tableaux import RK45
+
+ROBERTSON = compile_system(robertson())
+STIFF_LAG = compile_system(scalar("lag", lambda t, x, p: -1e6 * (x - ca.cos(t)), 1.0))
+
+
+@pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-4), (1e-6, 2e-6), (1e-9, 2e-9)])
+def test_robertson_to_1e11_seconds(rtol: float, error: float) -> None:
+    """About the digits that were asked for, in a few hundred steps over 11 decades."""
+    options = SimulationOptions(stop_time=1e11, solver="rodas5p", rtol=rtol, atol=rtol * 1e-8)
+    result = simulate(ROBERTSON, options)
+    np.testing.assert_allclose(result["y"][-1], ROBERTSON_END, rtol=error)
+    assert result.run.steps < 1500
+    # Sums of the three are kept by the equations, and so by every Rosenbrock method.
+    np.testing.assert_allclose(result["y"].sum(axis=1), 1.0, rtol=1e-12)
+
+
+def test_robertson_with_the_conservation_law_as_an_implicit_equation() -> None:
+    options = SimulationOptions(stop_time=1e11, solver="rodas5p", rtol=1e-6, atol=1e-14)
+    result = simulate(compile_system(robertson_dae()), options)
+    found = np.array([result[name][-1] for name in "abc"])
+    np.testing.assert_allclose(found, ROBERTSON_END, rtol=1e-5)
+    total = result["a"] + result["b"] + result["c"]
+    np.testing.assert_allclose(total, 1.0, rtol=1e-15)  # solved at every instant, not drifting
+
+
+@pytest.mark.parametrize(("rtol", "error"), [(1e-4, 1e-3), (1e-6, 1e-6), (1e-9, 1e-9)])
+def test_van_der_pol_with_mu_1000(rtol: float, error: float) -> None:
+    options = SimulationOptions(stop_time=2000.0, solver="rodas5p", rtol=rtol, atol=rtol * 1e-3)
+    result = simulate(compile_system(van_der_pol(1000.0)), options)
+    np.testing.assert_allclose(result["y"][-1], VAN_DER_POL_END, rtol=error)
+
+
+@pytest.mark.parametrize("name", list(KINETICS))
+@pytest.mark.parametrize("solver", ["rodas5p", "ros23"])
+def test_chemical_kinetics_against_radau(name: str, solver: str) -> None:
+    """SciPy's Radau at 1e-10 shares nothing with these methods."""
+    rates, start, stop = KINETICS[name]
+    system = compile_system(kinetics(name))
+    rtol = 1e-8 if solver == "rodas5p" else 1e-6
+    result = simulate(system, SimulationOptions(stop_time=stop, solver=solver, rtol=rtol, atol=1e-12))
+    expected = solve_ivp(
+        lambda t, y: rates(y),
+        (0, stop),
+        start,
+        method="Radau",
+        rtol=1e-10,
+        atol=1e-14,
+        t_eval=result.time[::100],
+    ).y.T
+    # Order 2 keeps fewer digits along the oscillator's steep fronts.
+    allowed = 2e-6 if solver == "rodas5p" else 5e-3
+    np.testing.assert_allclose(result["y"][::100], expected, rtol=allowed, atol=1e-9)
+
+
+def test_heat_in_a_rod_of_500_states() -> None:
+    """Fastest rate 1e6 1/s: few steps, each of work in proportion to the states."""
+    rod, mode, rate = heat(500)
+    compiled = compile_system(rod)
+    result = simulate(compiled, SimulationOptions(stop_time=0.3, solver="rodas5p", rtol=1e-8, atol=1e-12))
+    expected = np.exp(-rate * result.time)[:, np.newaxis] * mode
+    np.testing.assert_allclose(result["y"], expected, atol=3e-8)
+    assert result.run.steps < 100
+    space = compiled.integrator(RODAS5P).space
+    assert space is not None and space.plan is not None
+    assert space.plan.filled == 500 + 2 * 499  # nothing fills in
+
+
+def test_pendulum_of_index_1_keeps_its_period() -> None:
+    """The values at 10 s follow from elliptic functions; the rod is kept by its force alone."""
+    result = simulate(
+        compile_system(pendulum()),
+        SimulationOptions(stop_time=10.0, solver="rodas5p", rtol=1e-10, atol=1e-12),
+    )
+    expected = [-0.27508746257611686, -0.96141920509912506, 4.1755981009517288, -1.1947490545604753]
+    found = [result[name][-1] for name in ("x", "y", "vx", "vy")]
+    np.testing.assert_allclose(found, expected, atol=1e-6)  # 4 revolutions at 1e-10 a step
+    np.testing.assert_allclose(result["x"] ** 2 + result["y"] ** 2, 1.0, atol=1e-7)
+
+
+def test_an_implicit_loop_is_solved_at_every_stage() -> None:
+    result = simulate(compile_system(loop_of_cosine()), SimulationOptions(stop_time=1.0, solver="rodas5p"))
+    np.testing.assert_allclose(result["loop/u"], 0.7390851332151607, rtol=1e-14)
+
+
+def test_a_loop_that_becomes_singular_is_named() -> None:
+    """``w^2 = x`` with ``x = 1 - t``: at 1 s both solutions meet and there is none after it."""
+    ending = hybrid(
+        "ending",
+        states=("tank/x",),
+        algebraic=("root/w",),
+        signals=("x", "w"),
+        x0=(1.0,),
+        w0=(1.0,),
+        derivative=lambda t, x, z, w, p: column(-1.0 + 0.0 * w),
+        outputs=lambda t, x, z, w, p: column(x, w),
+        residual=lambda t, x, z, w, p: w * w - x,
+    )
+    with pytest.raises(SimulationError, match="the loop through 'root' have no solution") as error:
+        simulate(compile_system(ending), SimulationOptions(stop_time=2.0, solver="rodas5p"))
+    kept = error.value.partial
+    assert kept is not None
+    np.testing.assert_allclose(kept["w"], np.sqrt(1.0 - kept.time), atol=1e-6)  # pyright: ignore
+
+
+@pytest.mark.parametrize("solver", ["rodas5p", "ros23"])
+def test_events_and_ticks_are_those_of_the_explicit_methods(solver: str) -> None:
+    """Bounces at their known times, samples of a lag of 1e-4 s that follows the ball."""
+    impacts = [0.451523640985731, 1.08365673836575, 1.52614990653177]
+    system = compile_system(ball_on_fast_plate())
+    options = SimulationOptions(stop_time=1.6, solver=solver, sample_time=0.01, rtol=1e-9, atol=1e-11)
+    result = simulate(system, options)
+    assert result.run.ticks == 17
+    assert result.run.events == 3
+    last = np.unique(result["last"])
+    np.testing.assert_allclose(last[1:], impacts, atol=1e-9)
+    # Far from a bounce the lag is behind by v / rate.
+    at = np.searchsorted(result.time, 0.3 - 1e-9)
+    behind = result["h"][at] - result["v"][at] / 1e4
+    assert result["lag"][at] == pytest.approx(behind, abs=1e-6)
+    assert result["hold"][at] == result["lag"][at]
+
+
+# The linearised input of implicit Euler misses h^2 / 2 of the cosine.
+@pytest.mark.parametrize(("solver", "error"), [("ros5", 2e-6), ("implicit_euler", 5.1e-5)])
+def test_fixed_steps_far_beyond_the_stability_of_explicit_methods(solver: str, error: float) -> None:
+    """Steps of 0.01 s for a lag of 1e-6 s: it follows its input, to the order of the method."""
+    result = simulate(STIFF_LAG, SimulationOptions(stop_time=2.0, solver=solver, step=0.01))
+    assert result.run.steps == 200
+    np.testing.assert_allclose(result["block/y"], np.cos(result.time), atol=error)
+
+
+def test_an_infinite_slope_of_the_derivative_is_survived() -> None:
+    """``x' = 1 - sqrt(x)`` from 0, with an infinite Jacobian; ``t = -2 (s + log(1 - s))``, s the root."""
+    tank = compile_system(scalar("tank", lambda t, x, p: 1.0 - ca.sqrt(x), 0.0))
+    result = simulate(tank, SimulationOptions(stop_time=3.0, solver="rodas5p", rtol=1e-8, atol=1e-12))
+    s = np.sqrt(result["block/y"])
+    np.testing.assert_allclose(-2.0 * (s + np.log1p(-s)), result.time, atol=1e-5)
+
+
+def test_auto_goes_over_to_the_stiff_method_and_says_so() -> None:
+    result = simulate(STIFF_LAG, SimulationOptions(stop_time=10.0))
+    assert result.run.solver == "rk45, then rodas5p"
+    assert result.run.reason.startswith("auto: Dormand-Prince 5(4) until 0.0")
+    assert "then Rodas5P 5(4), because the system is stiff" in result.run.reason
+    assert result.run.message == ""
+    assert result.run.steps < 10_000  # it would be three millions
+    np.testing.assert_allclose(result["block/y"], np.cos(result.time), atol=1e-5)
+
+
+def test_auto_stays_explicit_where_accuracy_bounds_the_steps() -> None:
+    """The longest step does here: many steps, none of them at the border of stability."""
+    quiet = compile_system(scalar("quiet", lambda t, x, p: ca.cos(t) - x, 0.0))
+    result = simulate(quiet, SimulationOptions(stop_time=100.0, max_step=0.01))
+    assert result.run.steps >= 10_000
+    assert result.run.solver == "rk45"
+    assert "nothing showed that the system is stiff" in result.run.reason
+
+
+@pytest.mark.parametrize("cuts", [[0.001], [0.03, 0.5], [0.02, 0.3, 0.6]])
+def test_an_interrupted_automatic_run_gives_the_same_bits(cuts: list[float], tmp_path: Path) -> None:
+    """Cut before the change of the method, after it, and both."""
+
+    def options(stop: float) -> SimulationOptions:
+        return SimulationOptions(stop_time=stop, sample_time=0.0005)
+
+    whole = simulate(STIFF_LAG, options(1.0))
+    assert whole.run.solver == "rk45, then rodas5p"
+    state: RunState | None = None
+    for stop in cuts:
+        state = simulate(STIFF_LAG, options(stop), initial_state=state).final_state
+        assert state is not None
+        state.save(tmp_path / "state")
+        state = RunState.load(tmp_path / "state")
+    rest = simulate(STIFF_LAG, options(1.0), initial_state=state)
+    assert "exactly as the run before" in rest.run.reason
+    if cuts[-1] > 0.03:
+        assert rest.run.solver == "rodas5p"
+        assert "as the run before found the system stiff" in rest.run.reason
+    same = np.isin(whole.time, rest.time)
+    assert same.sum() > 700
+    assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()
+
+
+def test_chunks_of_steps_do_not_move_the_change_of_method() -> None:
+    """However often the loop is looked after, it pauses at the same step."""
+    native = STIFF_LAG.integrator(RK45)
+    times = []
+    for chunk in (10**6, 777, 1000):
+        run = native.begin(
+            np.array([1.0]), np.empty(0), np.array([0.0, 10.0]), np.empty(0), watch_stiffness=True
+        )
+        while not run.stiff:
+            run.advance(chunk)
+        times.append((run.time, run.accepted))
+    assert times[0] == times[1] == times[2]
+
+
+def test_blow_up_under_a_stiff_method_is_reported_where_it_happens() -> None:
+    blow_up = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
+    with pytest.raises(SimulationError, match="the step became as small as the rounding") as error:
+        simulate(blow_up, SimulationOptions(stop_time=2.0, solver="rodas5p"))
+    text = str(error.value)
+    assert "'block/x'" in text
+    time = float(text.split("rounding of the time at ")[1].split(" s")[0])
+    assert time == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_root_of_a_negative_number_is_named_under_a_stiff_method() -> None:
+    falling = compile_system(scalar("falling", lambda t, x, p: -ca.sqrt(1.0 - t) - 1e3 * x, 1.0))
+    with pytest.raises(SimulationError, match="the derivative of state 'block/x' is not finite at 1"):
+        simulate(falling, SimulationOptions(stop_time=2.0, solver="rodas5p"))
