@@ -25,6 +25,7 @@ from armblocks.blocks import (
     matrices,
     noise,
     orientations,
+    pid,
     poses,
     reductions,
     repeating,
@@ -35,6 +36,7 @@ from armblocks.blocks import (
     sources,
     transforms,
     waveforms,
+    zero_poles,
 )
 from armblocks.blocks.arithmetic import (
     Abs,
@@ -54,7 +56,7 @@ from armblocks.blocks.arithmetic import (
     UnaryMinus,
 )
 from armblocks.blocks.arm_plant import ArmPlant
-from armblocks.blocks.continuous import PID, Derivative, Integrator, StateSpace, TransferFunction
+from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
 from armblocks.blocks.delays import Delay, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
 from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
 from armblocks.blocks.discrete import (
@@ -63,7 +65,6 @@ from armblocks.blocks.discrete import (
     DigitalClock,
     DiscreteDerivative,
     DiscreteIntegrator,
-    DiscretePID,
     RateLimiter,
 )
 from armblocks.blocks.discrete_filters import (
@@ -157,6 +158,7 @@ from armblocks.blocks.orientations import (
     T2Quaternion,
     T2rpy,
 )
+from armblocks.blocks.pid import PID, PID2DOF, DiscretePID, DiscretePID2DOF
 from armblocks.blocks.poses import (
     Delta2Tr,
     PoseIntegration,
@@ -209,6 +211,7 @@ from armblocks.blocks.sinks import Display, Scope, Terminator, ToWorkspace, XYGr
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
 from armblocks.blocks.transforms import T2xyz, Xyz2T
 from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
+from armblocks.blocks.zero_poles import AnalogFilter, DigitalFilter, DiscreteZeroPole, ZeroPole
 from armblocks.diagram import Block, BlockLibrary, structure, virtual_wiring
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
@@ -226,7 +229,9 @@ BLOCKS = BlockLibrary(
         maths,
         continuous,
         limited_integrators,
+        zero_poles,
         lags,
+        pid,
         discontinuities,
         dry_friction,
         delays,
@@ -264,7 +269,9 @@ BLOCKS = BlockLibrary(
 __all__ = [
     "BLOCKS",
     "PID",
+    "PID2DOF",
     "Abs",
+    "AnalogFilter",
     "AngleAxis2T",
     "AngleDifference",
     "ArmPlant",
@@ -303,14 +310,17 @@ __all__ = [
     "DiagonalMatrix",
     "Difference",
     "DigitalClock",
+    "DigitalFilter",
     "DirectLookup",
     "DiscreteDerivative",
     "DiscreteFilter",
     "DiscreteFir",
     "DiscreteIntegrator",
     "DiscretePID",
+    "DiscretePID2DOF",
     "DiscreteStateSpace",
     "DiscreteTransferFunction",
+    "DiscreteZeroPole",
     "Display",
     "Divide",
     "DotProduct",
@@ -452,4 +462,5 @@ __all__ = [
     "XYGraph",
     "Xyz2T",
     "ZeroOrderHold",
+    "ZeroPole",
 ]

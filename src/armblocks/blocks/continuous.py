@@ -25,7 +25,6 @@ from armblocks.diagram import (
     rate_unit,
     shape_of,
 )
-from armblocks.equations import Shape
 from armblocks.errors import InputError
 
 
@@ -95,73 +94,6 @@ class Derivative(Block):
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": rate_unit(inputs["u"])}
-
-
-@dataclass(frozen=True, kw_only=True)
-class PID(Block):
-    """Proportional, integral and filtered derivative action: y = (P + I/s + D N s/(s + N)) u.
-
-    The form is that of Simulink's PID Controller (parallel). States: ``integral`` (integral' = I u) and
-    ``filter`` (filter' = N (D u - filter)), both 0 at the start unless said otherwise.
-    """
-
-    family: ClassVar[str] = "continuous"
-    title: ClassVar[str] = "PID Controller"
-    example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "A closed loop: the controller brings a second-order plant to 1, and its integral action "
-            "leaves no error."
-        ),
-        parameters={"P": 4.0, "I": 2.0, "D": 2.0, "N": 20.0},
-        inputs={
-            "u": made("Sum", signs="+-")
-            .named("error")
-            .by(
-                u1=made("Step").named("wanted"),
-                u2=made("TransferFunction", denominator=(1.0, 1.0, 1.0)).named("plant").by(u="y"),
-            )
-        },
-        shown=("wanted/y", "plant/y"),
-    )
-
-    P: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="proportional gain")
-    I: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="integral gain", unit="1/s")  # noqa: E741
-    D: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="derivative gain", unit="s")
-    N: ArrayLike = parameter(
-        100.0, kind=ParameterKind.ARRAY, doc="bandwidth of the derivative's filter", unit="rad/s", above=0.0
-    )
-    initial_integral: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="integral action at t = 0")
-    initial_filter: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="filter state at t = 0")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the error"),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the control action"),)
-
-    def states(self, inputs: Shapes) -> tuple[State, ...]:
-        shape = self._shape(inputs)
-        return (
-            State("integral", shape, "the integral action"),
-            State("filter", shape, "the filtered D u"),
-        )
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": self._shape(inputs)}
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        rate = p["N"] * (p["D"] * u["u"] - x["filter"])
-        return {"y": p["P"] * u["u"] + x["integral"] + rate}
-
-    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"integral": p["I"] * u["u"], "filter": p["N"] * (p["D"] * u["u"] - x["filter"])}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"integral": p["initial_integral"], "filter": p["initial_filter"]}
-
-    def _shape(self, inputs: Shapes) -> Shape:
-        names = [rule.name for rule in self.parameters()]
-        return broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})
 
 
 @dataclass(frozen=True, kw_only=True)

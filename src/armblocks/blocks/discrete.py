@@ -1,4 +1,4 @@
-"""Sampled sums, differences, controllers and counters: they work at the ticks of their clock.
+"""Sampled sums, differences and counters: they work at the ticks of their clock.
 
 In their equations k counts the ticks and T is the period of the clock.
 """
@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, fmin, if_else, logic_and
+from casadi import SX, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.diagram import (
@@ -26,7 +26,6 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
-from armblocks.equations import Shape
 
 INPUT = Port("u", "what is sampled")
 
@@ -162,93 +161,6 @@ class DiscreteDerivative(Block):
 
     def initial_states(self, p: Signals) -> Signals:
         return {"x": p["initial"]}
-
-
-@dataclass(frozen=True, kw_only=True)
-class DiscretePID(Block):
-    """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
-
-    That is Simulink's Discrete PID Controller (parallel) with forward Euler rules. Where the output is
-    limited, ``clamping`` stops the integral while it would drive the output further out, and
-    ``back_calculation`` adds T Kb (y - unlimited y) to it.
-    """
-
-    family: ClassVar[str] = "discrete"
-    title: ClassVar[str] = "Discrete PID Controller"
-    example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A closed loop with a plant that flows: the controller acts every 0.1 s.",
-        parameters={"P": 3.0, "I": 2.0, "sample_time": 0.1},
-        inputs={
-            "u": made("Sum", signs="+-")
-            .named("error")
-            .by(
-                u1=made("Step").named("wanted"),
-                u2=made("TransferFunction", denominator=(1.0, 1.0)).named("plant").by(u="y"),
-            )
-        },
-        shown=("wanted/y", "plant/y"),
-    )
-    sampled: ClassVar[bool] = True
-
-    P: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="proportional gain")
-    I: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="integral gain", unit="1/s")  # noqa: E741
-    D: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="derivative gain", unit="s")
-    N: ArrayLike = parameter(
-        100.0, kind=ParameterKind.ARRAY, doc="bandwidth of the derivative's filter", unit="rad/s", above=0.0
-    )
-    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
-    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
-    anti_windup: str = parameter(
-        "none", choices=("none", "clamping", "back_calculation"), doc="what keeps the integral in bounds"
-    )
-    Kb: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="back-calculation gain", unit="1/s")
-    sample_time: ArrayLike = sample_time_parameter()
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the error"),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the control action"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": self._shape(inputs)}
-
-    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        shape = self._shape(inputs)
-        return (
-            State("integral", shape, "the integral action"),
-            State("filter", shape, "the filtered D u"),
-        )
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._limited(self._unlimited(x, u, p), p)}
-
-    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        rate = p["I"] * u["u"]
-        free = self._unlimited(x, u, p)
-        excess = free - self._limited(free, p)
-        if self.anti_windup == "clamping":
-            outwards = logic_and(excess != 0.0, excess * rate > 0.0)
-            rate = if_else(outwards, SX(0.0), rate)
-        elif self.anti_windup == "back_calculation":
-            rate = rate - p["Kb"] * excess
-        return {
-            "integral": x["integral"] + p["T"] * rate,
-            "filter": x["filter"] + p["T"] * p["N"] * (p["D"] * u["u"] - x["filter"]),
-        }
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"integral": SX(0.0), "filter": SX(0.0)}
-
-    def _unlimited(self, x: Signals, u: Signals, p: Signals) -> SX:
-        return p["P"] * u["u"] + x["integral"] + p["N"] * (p["D"] * u["u"] - x["filter"])
-
-    def _limited(self, value: SX, p: Signals) -> SX:
-        return fmin(fmax(value, p["lower"]), p["upper"])
-
-    def _shape(self, inputs: Shapes) -> Shape:
-        names = ("P", "I", "D", "N", "lower", "upper", "Kb")
-        return broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -42,6 +42,7 @@ class Parameter:
     ``tunable``: its value stays an input of the compiled system (numbers and arrays only; an array's shape
     is part of the structure). ``dimensions``: how many axes an array may have (0 is a plain number).
     ``minimum``, ``above``, ``maximum`` bound every entry; ``finite`` refuses infinities (NaN always is).
+    ``roots``: an array of zeros or poles, which may be empty; complex ones become rows (real, imaginary).
     ``of_type``: the class that an object of kind ``ROBOT`` or ``DIAGRAM`` must have.
     """
 
@@ -57,6 +58,7 @@ class Parameter:
     above: float | None = None
     maximum: float = math.inf
     finite: bool = True
+    roots: bool = False
     of_type: type | None = None
 
     @property
@@ -161,7 +163,10 @@ def _check_array(rule: Parameter, value: object, where: str) -> Value:
         array = np.asarray(cast("Any", value))
     except ValueError:  # rows of different lengths
         raise _refuse(rule, value, where) from None
-    if array.dtype.kind not in "iuf" or array.ndim not in rule.dimensions or array.size == 0:
+    if rule.roots and array.dtype.kind == "c" and array.ndim == 1:
+        array = np.column_stack([array.real, array.imag])
+    empty = array.size == 0 and not rule.roots
+    if array.dtype.kind not in "iuf" or array.ndim not in rule.dimensions or empty:
         raise _refuse(rule, value, where)
     array = array.astype(np.float64)
     _check_bounds(rule, array, value, where)

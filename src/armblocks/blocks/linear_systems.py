@@ -1,0 +1,225 @@
+"""Linear systems from zeros and poles, and the filters that are known by their zeros and poles.
+
+A system is realised as a chain of sections with one or two poles each: its polynomials are never multiplied
+out, which would spoil the poles of high orders. Every section is scaled so that its states are about as large
+as the input.
+
+A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 3rd edition, 2010, section 6.3 (cascades),
+7.2 and appendix B (filters, bilinear transformation).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError
+
+Matrix = NDArray[np.float64]
+Roots = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZeroPoleGain:
+    """gain (s - zero1) (s - zero2) … / ((s - pole1) (s - pole2) …); real coefficients."""
+
+    zeros: Roots
+    poles: Roots
+    gain: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearSystem:
+    """x' (or the next x) = A x + B u, y = C x + D u for one input and one output."""
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: float
+
+
+def complex_roots(given: ArrayLike, where: str, name: str) -> Roots:
+    """Zeros or poles, as (n,) real numbers or (n, 2) rows (real, imaginary).
+
+    Raises ``InputError`` where a complex one stands without its conjugate.
+    """
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim == 2 and values.shape[1] != 2:
+        raise InputError(
+            f"{name} has shape {values.shape}", where=where, allowed="(n,), or (n, 2): real, imaginary"
+        )
+    roots = values.astype(np.complex128) if values.ndim == 1 else values[:, 0] + 1j * values[:, 1]
+    above, below = roots[roots.imag > 0.0], roots[roots.imag < 0.0]
+    if sorted(above, key=_order) != sorted(np.conj(below), key=_order):
+        raise InputError(
+            f"{name} are {roots.tolist()}",
+            where=where,
+            allowed="complex numbers in conjugate pairs",
+            fix="add the missing ones",
+        )
+    return roots
+
+
+def check_proper(zeros: Roots, poles: Roots, where: str) -> None:
+    """Raise ``InputError`` for a system without poles, or with more zeros than poles."""
+    if len(poles) == 0 or len(zeros) > len(poles):
+        raise InputError(
+            f"there are {len(zeros)} zeros and {len(poles)} poles",
+            where=where,
+            allowed="at least one pole, and no more zeros than poles",
+            fix="use a Gain where there is no pole; more zeros than poles cannot be simulated",
+        )
+
+
+def realised(system: ZeroPoleGain) -> LinearSystem:
+    """The chain of sections."""
+    total = LinearSystem(A=np.zeros((0, 0)), B=np.zeros(0), C=np.zeros(0), D=1.0)
+    scale = system.gain
+    for zeros, poles in _sections(system.zeros, system.poles):
+        section, factor = _section(zeros, poles)
+        total, scale = _in_series(total, section), scale / factor
+    return LinearSystem(A=total.A, B=total.B, C=scale * total.C, D=scale * total.D)
+
+
+def _order(root: complex) -> tuple[float, float]:
+    return (root.real, root.imag)
+
+
+def _sections(zeros: Roots, poles: Roots) -> list[tuple[list[complex], list[complex]]]:
+    """Poles in ones and conjugate pairs, each with its share of the zeros: at most as many."""
+    pole_groups = _groups(poles)
+    zero_groups = _groups(zeros)
+    pairs = [group for group in zero_groups if len(group) == 2]
+    # A pair of zeros needs a place with two poles; real poles are put together where pairs of them lack.
+    while sum(len(group) == 2 for group in pole_groups) < len(pairs):
+        first, second = [group for group in pole_groups if len(group) == 1][:2]
+        pole_groups = [group for group in pole_groups if group is not first and group is not second]
+        pole_groups.append(first + second)
+    sections: list[tuple[list[complex], list[complex]]] = [([], group) for group in pole_groups]
+    for group in sorted(zero_groups, key=len, reverse=True):
+        free = [section for section in sections if len(section[0]) + len(group) <= len(section[1])]
+        nearest = min(free, key=lambda section: abs(section[1][0] - group[0]))
+        nearest[0].extend(group)
+    return sections
+
+
+def _groups(roots: Roots) -> list[list[complex]]:
+    real = [[complex(root)] for root in sorted(roots[roots.imag == 0.0], key=_order)]
+    upper = sorted(roots[roots.imag > 0.0], key=_order)
+    return [[complex(root), complex(root).conjugate()] for root in upper] + real
+
+
+def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[LinearSystem, float]:
+    """``factor`` times the section, and the factor that makes its gain about 1."""
+    size = max(map(abs, poles)) or 1.0
+    factor = size ** len(poles) / math.prod(max(abs(zero), size) for zero in zeros)
+    above: Matrix = np.atleast_1d(np.real(np.poly(np.asarray(zeros, dtype=np.complex128))))
+    below: Matrix = np.real(np.poly(np.asarray(poles, dtype=np.complex128)))
+    above = factor * np.concatenate([np.zeros(len(below) - len(above)), above])
+    direct = float(above[0])
+    rest: Matrix = (above - direct * below)[1:]
+    first = poles[0]
+    if len(poles) == 1:
+        A, B, C = [[first.real]], [size], [rest[0] / size]
+    elif first.imag:
+        # x1 + i x2 turns by itself
+        sigma, omega = first.real, first.imag
+        A, B = [[sigma, omega], [-omega, sigma]], [size, 0.0]
+        C = [rest[0] / size, -(rest[1] + rest[0] * sigma) / omega / size]
+    else:
+        A, B = [[first.real, size], [0.0, poles[1].real]], [0.0, size]
+        C = [(rest[1] + rest[0] * first.real) / size**2, rest[0] / size]
+    return LinearSystem(A=np.array(A), B=np.array(B), C=np.array(C), D=direct), factor
+
+
+def _in_series(one: LinearSystem, two: LinearSystem) -> LinearSystem:
+    """Two behind one."""
+    n, m = len(one.B), len(two.B)
+    A = np.zeros((n + m, n + m))
+    A[:n, :n], A[n:, n:], A[n:, :n] = one.A, two.A, np.outer(two.B, one.C)
+    return LinearSystem(
+        A=A,
+        B=np.concatenate([one.B, two.B * one.D]),
+        C=np.concatenate([two.D * one.C, two.C]),
+        D=one.D * two.D,
+    )
+
+
+# Filters. Frequencies are in rad/s, or warped for the bilinear transformation.
+
+
+def low_pass(design: str, order: int, ripple: float, attenuation: float) -> ZeroPoleGain:
+    """The filter whose pass band ends (``chebyshev2``: stop band begins) at 1 rad/s; two numbers in dB."""
+    angles = math.pi * (2.0 * np.arange(1, order + 1) - 1.0) / (2.0 * order)
+    circle = np.exp(1j * (angles + math.pi / 2.0))
+    none = np.zeros(0, dtype=np.complex128)
+    if design == "butterworth":
+        return ZeroPoleGain(zeros=none, poles=_paired(circle), gain=1.0)
+    squeeze = 10.0 ** (ripple / 10.0) - 1.0 if design == "chebyshev1" else 10.0 ** (attenuation / 10.0) - 1.0
+    stretch = math.asinh(math.sqrt(squeeze if design == "chebyshev2" else 1.0 / squeeze)) / order
+    ellipse = _paired(math.sinh(stretch) * circle.real + 1j * math.cosh(stretch) * circle.imag)
+    if design == "chebyshev1":
+        gain = float(np.prod(-ellipse).real)
+        return ZeroPoleGain(
+            zeros=none, poles=ellipse, gain=gain / math.sqrt(1.0 + squeeze) if order % 2 == 0 else gain
+        )
+    poles = _paired(1.0 / ellipse)
+    middle = order // 2 if order % 2 else None
+    zeros = _paired(np.delete(1j / np.cos(angles), [] if middle is None else [middle]))
+    gain = float((np.prod(-poles) / np.prod(-zeros)).real)
+    return ZeroPoleGain(zeros=zeros, poles=poles, gain=gain)
+
+
+def shifted(base: ZeroPoleGain, kind: str, edge: float, upper_edge: float) -> ZeroPoleGain:
+    """The low-pass filter of 1 rad/s as ``low_pass``, ``high_pass``, ``band_pass`` or ``band_stop``."""
+    z, p, k, excess = base.zeros, base.poles, base.gain, len(base.poles) - len(base.zeros)
+    if kind == "low_pass":
+        return ZeroPoleGain(zeros=z * edge, poles=p * edge, gain=k * edge**excess)
+    turned = k * float((np.prod(-z) / np.prod(-p)).real)
+    if kind == "high_pass":
+        zeros = np.concatenate([edge / z, np.zeros(excess)])
+        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(edge / p), gain=turned)
+    width, centre = upper_edge - edge, math.sqrt(edge * upper_edge)
+    if kind == "band_pass":
+        zeros = np.concatenate([_split(z * width / 2.0, centre), np.zeros(excess)])
+        poles = _split(p * width / 2.0, centre)
+        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(poles), gain=k * width**excess)
+    notches = np.concatenate([np.full(excess, 1j * centre), np.full(excess, -1j * centre)])
+    zeros = np.concatenate([_split(width / 2.0 / z, centre), notches])
+    return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(_split(width / 2.0 / p, centre)), gain=turned)
+
+
+def warped(fraction: float) -> float:
+    """The frequency that the bilinear transformation of :func:`sampled` takes to this share of Nyquist's."""
+    return math.tan(math.pi * fraction / 2.0)
+
+
+def sampled(system: ZeroPoleGain) -> ZeroPoleGain:
+    """The bilinear transformation s = (z - 1) / (z + 1)."""
+    z, p = system.zeros, system.poles
+    excess = len(p) - len(z)
+    return ZeroPoleGain(
+        zeros=_paired(np.concatenate([(1.0 + z) / (1.0 - z), np.full(excess, -1.0)])),
+        poles=_paired((1.0 + p) / (1.0 - p)),
+        gain=system.gain * float((np.prod(1.0 - z) / np.prod(1.0 - p)).real),
+    )
+
+
+def _split(roots: Roots, centre: float) -> Roots:
+    """The two roots around ``centre`` that one root around 0 becomes."""
+    apart: Any = np.sqrt(roots**2 - centre**2 + 0j)
+    return np.concatenate([roots + apart, roots - apart])
+
+
+def _paired(roots: ArrayLike) -> Roots:
+    """The same roots, where what is conjugate but for rounding is exactly so, and what is real is so."""
+    given = np.asarray(roots, dtype=np.complex128)
+    tolerance = 1e-9 * np.abs(given)
+    real = given[np.abs(given.imag) <= tolerance].real + 0j
+    upper = given[given.imag > tolerance]
+    return np.concatenate([upper, np.conj(upper), real])

@@ -1,0 +1,240 @@
+"""The laws of PID controllers, in continuous time and sampled, for one and two degrees of freedom.
+
+A law sees three errors, one for each action: with one degree of freedom they are all the input. As in
+Simulink, the ideal form multiplies the integral and the derivative gain by P, so that the states are in units
+of the output either way.
+
+K. J. Astrom, T. Hagglund, Advanced PID Control, 2006, sections 3.4 (set-point weighting) and 3.5 (windup,
+back-calculation and tracking).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
+
+from armblocks.blocks.switching import JUST, zone, zone_after
+from armblocks.diagram import Guard, Signals, State
+from armblocks.equations import Shape
+
+FORMS = ("parallel", "ideal")
+ANTI_WINDUP = ("none", "clamping", "back_calculation")
+RESETS: Mapping[str, int] = {"none": 0, "rising": 1, "falling": -1, "either": 0}
+METHODS = ("forward_euler", "backward_euler", "trapezoidal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errors:
+    """What each of the three actions acts upon."""
+
+    proportional: SX
+    integral: SX
+    derivative: SX
+
+
+def one_error(u: SX) -> Errors:
+    """One degree of freedom."""
+    return Errors(proportional=u, integral=u, derivative=u)
+
+
+def weighted_errors(r: SX, u: SX, p: Signals) -> Errors:
+    """Two degrees of freedom: the reference counts ``b`` and ``c`` times for two of the actions."""
+    return Errors(proportional=p["b"] * r - u, integral=r - u, derivative=p["c"] * r - u)
+
+
+def pid_states(shape: Shape) -> tuple[State, ...]:
+    """The two states that every law has."""
+    return (
+        State("integral", shape, "the integral action"),
+        State("filter", shape, "the filtered derivative gain times error"),
+    )
+
+
+def pid_start(p: Signals) -> Signals:
+    """Where the two begin."""
+    return {"integral": p["initial_integral"], "filter": p["initial_filter"]}
+
+
+def _gains(form: str, p: Signals) -> tuple[SX, SX, SX]:
+    factor = p["P"] if form == "ideal" else SX(1.0)
+    return p["P"], factor * p["I"], factor * p["D"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContinuousPid:
+    """The law in continuous time. Limits are switched at exactly located events."""
+
+    form: str
+    limited: bool
+    anti_windup: str
+    external_reset: str
+
+    @property
+    def clamps(self) -> bool:
+        """Whether the integral stands still while it would drive the output further out."""
+        return self.limited and self.anti_windup == "clamping"
+
+    def modes(self, shape: Shape) -> tuple[State, ...]:
+        """Which limit holds, and where the integral drives the output."""
+        limit = (State("limit", shape, "1 at the upper limit, -1 at the lower, else 0"),)
+        drive = (State("drive", shape, "1 where the integral rises, else -1"),)
+        return (*(limit if self.limited else ()), *(drive if self.clamps else ()))
+
+    def guards(self, shape: Shape) -> tuple[Guard, ...]:
+        """The limits, the turn of the integral, the reset."""
+        found = list[Guard]()
+        if self.limited:
+            found += [
+                Guard("upper", shape, "the output - upper"),
+                Guard("lower", shape, "the output - lower"),
+            ]
+        if self.clamps:
+            found.append(Guard("drive", shape, "the rate of the integral"))
+        if self.external_reset != "none":
+            found.append(Guard("reset", (), "the trigger", RESETS[self.external_reset]))
+        return tuple(found)
+
+    def output(self, x: Signals, e: Errors, p: Signals) -> SX:
+        """What the plant gets."""
+        free = self._free(x, e, p)
+        if not self.limited:
+            return free
+        below = if_else(x["limit"] < 0.0, p["lower"], free)
+        return if_else(x["limit"] > 0.0, p["upper"], below)
+
+    def derivatives(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> Signals:
+        """Rates of integral and filter."""
+        _, _, D = _gains(self.form, p)
+        rate = self._rate(x, e, p, tracked)
+        if self.clamps:
+            rate = if_else(x["limit"] * x["drive"] > 0.0, 0.0, rate)
+        elif self.limited and self.anti_windup == "back_calculation":
+            rate = rate + p["Kb"] * (self.output(x, e, p) - self._free(x, e, p))
+        return {"integral": rate, "filter": p["N"] * (D * e.derivative - x["filter"])}
+
+    def guard_values(
+        self, x: Signals, e: Errors, p: Signals, tracked: SX | None, trigger: SX | None
+    ) -> Signals:
+        """The values of :meth:`guards`."""
+        found = dict[str, SX]()
+        if self.limited:
+            free = self._free(x, e, p)
+            found |= {"upper": free - p["upper"], "lower": free - p["lower"]}
+        if self.clamps:
+            found["drive"] = self._rate(x, e, p, tracked) - JUST
+        if trigger is not None:
+            found["reset"] = trigger - JUST
+        return found
+
+    def mode_values(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> Signals:
+        """The modes by the values of the moment."""
+        found = dict[str, SX]()
+        if self.limited:
+            found["limit"] = zone(self._free(x, e, p), p["lower"], p["upper"])
+        if self.clamps:
+            found["drive"] = if_else(self._rate(x, e, p, tracked) > 0.0, 1.0, -1.0)
+        return found
+
+    def resets(self, x: Signals, p: Signals, fired: Signals) -> Signals:
+        """Modes and states after events."""
+        found = dict[str, SX]()
+        if self.limited:
+            found["limit"] = zone_after(x["limit"], fired)
+        if self.clamps:
+            found["drive"] = if_else(fired["drive"] == 0.0, x["drive"], fired["drive"])
+        if self.external_reset != "none":
+            still = fired["reset"] == 0.0
+            found |= {name: if_else(still, x[name], start) for name, start in pid_start(p).items()}
+        return found
+
+    def _free(self, x: Signals, e: Errors, p: Signals) -> SX:
+        P, _, D = _gains(self.form, p)
+        return P * e.proportional + x["integral"] + p["N"] * (D * e.derivative - x["filter"])
+
+    def _rate(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> SX:
+        _, I, _ = _gains(self.form, p)  # noqa: E741
+        rate = I * e.integral
+        return rate if tracked is None else rate + p["Kt"] * (tracked - self.output(x, e, p))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledPid:
+    """The law at the ticks of a clock; T is the period.
+
+    Sums are forward Euler T / (z - 1), backward Euler T z / (z - 1), or trapezoidal T (z + 1) / 2 (z - 1).
+    With the last two the integral's newest share is part of the output. What back-calculation then takes off
+    it depends on the output itself; as that is straight in pieces, it is solved here and there is no loop.
+    """
+
+    form: str
+    anti_windup: str
+    external_reset: str
+    integrator_method: str
+    filter_method: str
+
+    def states(self, shape: Shape) -> tuple[State, ...]:
+        """Those of every law, and which side of zero the trigger was on."""
+        if self.external_reset == "none":
+            return pid_states(shape)
+        side = State("trigger", (), "1 where the trigger was positive at the tick before, -1 else, 0 unknown")
+        return (*pid_states(shape), side)
+
+    def start(self, p: Signals) -> Signals:
+        """Start values of the states."""
+        return pid_start(p) if self.external_reset == "none" else {**pid_start(p), "trigger": SX(0.0)}
+
+    def output(self, x: Signals, e: Errors, p: Signals, trigger: SX | None) -> SX:
+        """What the plant gets."""
+        return self._limited(self._free(self._at_tick(x, p, trigger), e, p), p)
+
+    def updates(self, x: Signals, e: Errors, p: Signals, trigger: SX | None, tracked: SX | None) -> Signals:
+        """What the states become."""
+        now = self._at_tick(x, p, trigger)
+        _, I, D = _gains(self.form, p)  # noqa: E741
+        rate, free = I * e.integral, self._free(now, e, p)
+        limited = self._limited(free, p)
+        if self.anti_windup == "clamping":
+            outwards = (free - limited) * rate > 0.0
+            rate = if_else(outwards, SX(0.0), rate)
+        elif self.anti_windup == "back_calculation":
+            share = _share(self.integrator_method) * p["T"] * p["Kb"]
+            rate = rate + p["Kb"] * (limited - free) / (1.0 + share)
+        if tracked is not None:
+            rate = rate + p["Kt"] * (tracked - limited)
+        found = {
+            "integral": now["integral"] + p["T"] * rate,
+            "filter": now["filter"] + p["T"] * self._derivative(now, D * e.derivative, p),
+        }
+        if trigger is not None:
+            found["trigger"] = if_else(trigger > 0.0, 1.0, -1.0)
+        return found
+
+    def _free(self, now: Signals, e: Errors, p: Signals) -> SX:
+        P, I, D = _gains(self.form, p)  # noqa: E741
+        free = P * e.proportional + now["integral"] + self._derivative(now, D * e.derivative, p)
+        share = _share(self.integrator_method)
+        return free + share * p["T"] * I * e.integral if share else free
+
+    def _derivative(self, now: Signals, weighted: SX, p: Signals) -> SX:
+        """The filtered derivative d: d = N (D e - f), where f sums d."""
+        rate, share = p["N"] * (weighted - now["filter"]), _share(self.filter_method)
+        return rate / (1.0 + share * p["T"] * p["N"]) if share else rate
+
+    def _at_tick(self, x: Signals, p: Signals, trigger: SX | None) -> Signals:
+        """The states, set anew where the trigger fires."""
+        if trigger is None:
+            return x
+        rises = logic_and(x["trigger"] < 0.0, trigger > 0.0)
+        falls = logic_and(x["trigger"] > 0.0, trigger <= 0.0)
+        fires = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.external_reset]
+        return {name: if_else(fires, start, x[name]) for name, start in pid_start(p).items()}
+
+    def _limited(self, value: SX, p: Signals) -> SX:
+        return fmin(fmax(value, p["lower"]), p["upper"])
+
+
+def _share(method: str) -> float:
+    """How much of a tick's own increment a sum already has at that tick."""
+    return {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
