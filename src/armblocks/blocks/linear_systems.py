@@ -118,23 +118,29 @@ def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[Linear
     """``factor`` times the section, and the factor that makes its gain about 1."""
     size = max(map(abs, poles)) or 1.0
     factor = size ** len(poles) / math.prod(max(abs(zero), size) for zero in zeros)
-    above: Matrix = np.atleast_1d(np.real(np.poly(np.asarray(zeros, dtype=np.complex128))))
-    below: Matrix = np.real(np.poly(np.asarray(poles, dtype=np.complex128)))
-    above = factor * np.concatenate([np.zeros(len(below) - len(above)), above])
+    above, below = factor * _polynomial(zeros), _polynomial(poles)
+    above = np.concatenate([np.zeros(len(below) - len(above)), above])
     direct = float(above[0])
     rest: Matrix = (above - direct * below)[1:]
     first = poles[0]
     if len(poles) == 1:
-        A, B, C = [[first.real]], [size], [rest[0] / size]
+        a, b, c = [[first.real]], [size], [rest[0] / size]
     elif first.imag:
         # x1 + i x2 turns by itself
         sigma, omega = first.real, first.imag
-        A, B = [[sigma, omega], [-omega, sigma]], [size, 0.0]
-        C = [rest[0] / size, -(rest[1] + rest[0] * sigma) / omega / size]
+        a, b = [[sigma, omega], [-omega, sigma]], [size, 0.0]
+        c = [rest[0] / size, -(rest[1] + rest[0] * sigma) / omega / size]
     else:
-        A, B = [[first.real, size], [0.0, poles[1].real]], [0.0, size]
-        C = [(rest[1] + rest[0] * first.real) / size**2, rest[0] / size]
-    return LinearSystem(A=np.array(A), B=np.array(B), C=np.array(C), D=direct), factor
+        a, b = [[first.real, size], [0.0, poles[1].real]], [0.0, size]
+        c = [(rest[1] + rest[0] * first.real) / size**2, rest[0] / size]
+    return LinearSystem(A=np.array(a), B=np.array(b), C=np.array(c), D=direct), factor
+
+
+def _polynomial(roots: Sequence[complex]) -> Matrix:
+    """Its coefficients from the highest power, 1, to the lowest; at most two roots, conjugate or real."""
+    if len(roots) == 2:
+        return np.array([1.0, -(roots[0] + roots[1]).real, (roots[0] * roots[1]).real])
+    return np.array([1.0, *(-root.real for root in roots)])
 
 
 def _in_series(one: LinearSystem, two: LinearSystem) -> LinearSystem:
@@ -162,7 +168,7 @@ def low_pass(design: str, order: int, ripple: float, attenuation: float) -> Zero
         return ZeroPoleGain(zeros=none, poles=_paired(circle), gain=1.0)
     squeeze = 10.0 ** (ripple / 10.0) - 1.0 if design == "chebyshev1" else 10.0 ** (attenuation / 10.0) - 1.0
     stretch = math.asinh(math.sqrt(squeeze if design == "chebyshev2" else 1.0 / squeeze)) / order
-    ellipse = _paired(math.sinh(stretch) * circle.real + 1j * math.cosh(stretch) * circle.imag)
+    ellipse = _paired(math.sinh(stretch) * np.real(circle) + 1j * math.cosh(stretch) * np.imag(circle))
     if design == "chebyshev1":
         gain = float(np.prod(-ellipse).real)
         return ZeroPoleGain(
@@ -222,4 +228,5 @@ def _paired(roots: ArrayLike) -> Roots:
     tolerance = 1e-9 * np.abs(given)
     real = given[np.abs(given.imag) <= tolerance].real + 0j
     upper = given[given.imag > tolerance]
-    return np.concatenate([upper, np.conj(upper), real])
+    found: Roots = np.concatenate([upper, np.conj(upper), real]).astype(np.complex128)
+    return found

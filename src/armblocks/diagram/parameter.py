@@ -160,11 +160,11 @@ def _check_number(rule: Parameter, value: object, where: str) -> float:
 
 def _check_array(rule: Parameter, value: object, where: str) -> Value:
     try:
-        array = np.asarray(cast("Any", value))
+        array: np.ndarray[Any, Any] = np.asarray(cast("Any", value))
     except ValueError:  # rows of different lengths
         raise _refuse(rule, value, where) from None
     if rule.roots and array.dtype.kind == "c" and array.ndim == 1:
-        array = np.column_stack([array.real, array.imag])
+        array = np.column_stack([np.real(array), np.imag(array)])
     empty = array.size == 0 and not rule.roots
     if array.dtype.kind not in "iuf" or array.ndim not in rule.dimensions or empty:
         raise _refuse(rule, value, where)
