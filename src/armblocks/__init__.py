@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armblocks.face.reporting import write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
     from armblocks.face.trajectory import JointTrajectory, jtraj
+    from armblocks.face.trimming import trim
     from armblocks.robot import (
         DhRow,
         Fixed,
@@ -79,6 +80,7 @@ else:
             "save_robot": "armblocks.face.robots",
             "simulate": "armblocks.face.model",
             "standard_dh": "armblocks.robot",
+            "trim": "armblocks.face.trimming",
             "write_report": "armblocks.face.reporting",
         },
     )
@@ -120,6 +122,7 @@ __all__ = [
     "save_robot",
     "simulate",
     "standard_dh",
+    "trim",
     "write_report",
 ]
 

@@ -10,9 +10,13 @@ import armblocks as ab
 from armblocks.blocks import (
     Constant,
     Expression,
+    ForwardDynamics,
     Gain,
+    Inport,
     Integrator,
+    Outport,
     Saturation,
+    Subsystem,
     Sum,
     UnitDelay,
     ZeroOrderHold,
@@ -258,3 +262,40 @@ def test_implicit_equations_without_a_solution_are_refused() -> None:
         ab.linearize(implicit(1.0, "u2 + u2^2 + u1"))
     with pytest.raises(SimulationError, match="are singular at this point"):
         ab.linearize(implicit(0.0, "u2 + u2^3 + u1"))
+
+
+def test_a_subsystem_is_seen_through_like_the_flat_diagram() -> None:
+    inside = ab.DiagramBuilder("inside")
+    entry = inside.add("in", Inport())
+    lag = inside.add("lag", Sum(signs="+-"), entry)
+    state = inside.add("x", Integrator(), lag)
+    inside.connect(state, lag["u2"])
+    inside.add("out", Outport(), inside.add("gain", Gain(gain=3.0), state))
+    outside = ab.DiagramBuilder("outside")
+    source = outside.add("u", Constant(value=1.0))
+    plant = outside.add("plant", Subsystem(diagram=inside.build()), source)
+    outside.add("twice", Gain(gain=2.0), plant)
+    diagram = outside.build()
+    s = 0.3 + 2.0j
+    for inputs in ("u", "u/y", "plant/lag/u1"):
+        system = ab.linearize(diagram, inputs, ["twice", "plant", "plant/x"])
+        assert np.allclose(system.at(s)[:, 0], np.array([6.0, 3.0, 1.0]) / (s + 1.0), rtol=1e-13)
+    assert ab.linearize(diagram, "plant/gain.gain", "twice").D[0, 0] == 0.0
+
+
+def test_a_puma_falls_as_its_mass_matrix_and_the_slope_of_its_weight_say() -> None:
+    puma = ab.load_robot("puma560")
+    q = np.array([0.1, 0.6, -0.4, 0.2, 0.5, -0.3])
+    builder = ab.DiagramBuilder("puma")
+    torque = builder.add("torque", Constant(value=puma.gravload(q)))
+    builder.add("arm", ForwardDynamics(robot=puma.robot, q0=q), torque)
+    system = ab.linearize(builder.build(), "torque", "arm/q")
+    inverse = np.linalg.inv(puma.inertia(q))
+    assert np.allclose(system.B[6:], inverse, rtol=1e-9, atol=1e-9)
+    step = 1e-5
+    slope = np.column_stack(
+        [(puma.gravload(q + e) - puma.gravload(q - e)) / (2 * step) for e in step * np.eye(6)]
+    )
+    # At rest and in balance the only slope of qdd by q is that of the weight; central differences: h^2.
+    assert np.allclose(system.A[6:, :6], -inverse @ slope, rtol=0.0, atol=1e-5 * np.abs(inverse).max())
+    assert np.array_equal(system.A[:6, 6:], np.eye(6))

@@ -229,16 +229,17 @@ def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int
     return places, tuple(names)
 
 
-def output_ends(system: HybridSystem, wanted: Sequence[str]) -> tuple[list[int], Ends]:
-    """Rows of ``y``, names and units of the scalars of some signals; the inputs are still empty.
+def output_ends(system: HybridSystem, wanted: Mapping[str, str]) -> tuple[list[int], Ends]:
+    """Rows of ``y``, names and units of the scalars of some signals, given as name for people to name in the
+    system; the inputs are still empty.
 
     Raises ``UnknownNameError``.
     """
     rows: list[int] = []
     names: list[str] = []
     units: list[str] = []
-    for name in wanted:
-        path = system.aliases.get(name, name)
+    for name, own in wanted.items():
+        path = system.aliases.get(own, own)
         if path not in system.signals_layout.ranges:
             known = [*system.signals_layout.names, *system.aliases]
             raise UnknownNameError("signal", name, known, where=system.name)

@@ -26,6 +26,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.equations import Shape
 from armblocks.errors import InputError, UnknownNameError
 
@@ -77,7 +78,7 @@ class LoopOpening(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedDiagram:
-    """A diagram with its points in place.
+    """A diagram with its points in place: flat, or the one that was given where it needs no points.
 
     ``inputs``: for every input that was asked for the path of the parameter that moves it. ``levels``: for
     every opened wire the parameter that holds its signal, and the path of the signal in the first diagram.
@@ -98,15 +99,19 @@ def with_analysis_points(
     Where a signal is both, the change comes in behind the cut. Raises ``UnknownNameError`` and ``InputError``
     for names that mean nothing of the kind or stand twice.
     """
+    form = flatten_hierarchy(diagram)
+    given, diagram = diagram, form.diagram
     parameters: dict[str, str] = {}
     moved: dict[PortRef, str] = {}
     for name in _once(inputs, "input"):
         path = _parameter(diagram, name)
         if path is None:
-            moved[_port(diagram, name, "input")] = name
+            moved[_port(form, name, "input")] = name
         else:
             parameters[name] = path
-    opened = {_port(diagram, name, "opening") for name in _once(openings, "opening")}
+    opened = {_port(form, name, "opening") for name in _once(openings, "opening")}
+    if not moved and not opened:
+        return PreparedDiagram(diagram=given, inputs=parameters, levels={})
     shapes = infer_shapes(diagram)
     blocks, wires = dict(diagram.blocks), list(diagram.connections)
     levels: dict[str, str] = {}
@@ -137,18 +142,21 @@ def _once(names: Sequence[str], kind: str) -> Sequence[str]:
 
 def _parameter(diagram: Diagram, name: str) -> str | None:
     """The path of a tunable parameter, or ``None`` where the name is no parameter's."""
-    if "/" in name or "." not in name:
+    block, dot, parameter_name = name.rpartition(".")
+    if not dot or "/" in parameter_name:
         return None
-    block, _, parameter_name = name.rpartition(".")
     known = [rule.name for rule in diagram.block(block).parameters() if rule.tunable]
     if parameter_name not in known:
         raise UnknownNameError("tunable parameter", parameter_name, known, where=f"block '{block}'")
     return name
 
 
-def _port(diagram: Diagram, name: str, kind: str) -> PortRef:
-    block_name, _, port = name.rpartition("/") if "/" in name else (name, "", "")
-    block = diagram.block(block_name)
+def _port(form: FlatForm, name: str, kind: str) -> PortRef:
+    if name in form.aliases:
+        return form.aliases[name]
+    whole = name in form.diagram.blocks or "/" not in name
+    block_name, _, port = (name, "", "") if whole else name.rpartition("/")
+    block = form.diagram.block(block_name)
     outputs = [entry.name for entry in block.output_ports()]
     if port:
         known = [*outputs, *(entry.name for entry in block.input_ports())]

@@ -14,6 +14,7 @@ from armblocks.analysis.linearisation import input_ends, linearise, output_ends
 from armblocks.analysis.operating_point import OperatingPoint, initial_point, operating_point, placed
 from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.diagram.analysis_points import PreparedDiagram, with_analysis_points
+from armblocks.diagram.hierarchy import flatten_hierarchy
 from armblocks.equations import HybridSystem
 from armblocks.equations.evaluation import EvaluatedSystem, Point
 from armblocks.errors import InputError
@@ -80,7 +81,7 @@ def linearize(
     Raises ``UnknownNameError`` and ``InputError`` for names, ``SimulationError`` where the run, or a slope,
     has no finite value.
     """
-    described = _diagram(diagram, parameters)
+    described = described_diagram(diagram, parameters)
     wanted, seen, opened = _names(inputs), _names(outputs), _names(open)
     if isinstance(at, float | int | RunState | OperatingPoint):
         return _linearized(described, wanted, seen, opened, operating_point_at(described, at, **settings))
@@ -89,9 +90,10 @@ def linearize(
     return tuple(prepared.at(point) for point in points)
 
 
-def _diagram(
+def described_diagram(
     diagram: Diagram | CompiledDiagram | str | PathLike[str], parameters: Mapping[str, object] | None
 ) -> Diagram:
+    """The diagram that is meant, with other values of its parameters."""
     if isinstance(diagram, CompiledDiagram):
         diagram = diagram.diagram
     elif not isinstance(diagram, Diagram):
@@ -130,7 +132,10 @@ class _Prepared:
             else trace_diagram(self.points.diagram)
         )
         places, names = input_ends(system, self.points.inputs)
-        rows, ends = output_ends(system, outputs)
+        # Ports of subsystems are not in the flat diagram that has the points.
+        aliases = flatten_hierarchy(diagram).aliases
+        known = (name if name in system.aliases else str(aliases.get(name, name)) for name in outputs)
+        rows, ends = output_ends(system, dict(zip(outputs, known)))
         units = tuple(unit for path in self.points.inputs.values() for unit in _units(system, path))
         self.ends = dataclasses.replace(ends, inputs=names, input_units=units)
         self.evaluated = EvaluatedSystem(system, places, rows)

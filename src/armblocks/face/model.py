@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.diagram import Diagram, flat_diagram, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
@@ -100,12 +101,27 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
     return known
 
 
+def _run_state(system: HybridSystem, point: OperatingPoint) -> RunState:
+    """The state of a run that stands at an operating point."""
+    layouts = (system.states, system.discrete, system.algebraic)
+    parts = (point.states, point.discrete, point.algebraic)
+    states, discrete, algebraic = (layout.pack(part) for layout, part in zip(layouts, parts))
+    return RunState(
+        name=point.name,
+        time=point.time,
+        states=states,
+        discrete=discrete,
+        algebraic=algebraic,
+        names=(system.states.names, system.discrete.names, system.algebraic.names),
+    )
+
+
 def simulate(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     *,
     parameters: Mapping[str, object] | None = None,
     progress: Progress | None = None,
-    initial_state: RunState | str | PathLike[str] | None = None,
+    initial_state: RunState | OperatingPoint | str | PathLike[str] | None = None,
     **settings: Any,
 ) -> SimulationResult:
     """Run a diagram and return its recorded signals.
@@ -116,12 +132,15 @@ def simulate(
     ``{"jtraj.tmax": 5.0}``; tunable ones need no new compilation. ``progress(time, fraction,
     real_time_factor)`` is called now and then during a long run. ``initial_state``: another run's
     ``final_state``, or the file that its ``save`` wrote; the run goes on from there to ``stop_time``, bit for
-    bit as if the other had not ended where nothing else is changed.
+    bit as if the other had not ended where nothing else is changed. Or an operating point, such as ``trim``
+    finds: the run begins there, at its time.
 
     Raises InputError for a setting out of range, UnknownNameError for an unknown one, SimulationError (with
     the ``partial`` result) where the run cannot go on.
     """
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    if isinstance(initial_state, OperatingPoint):
+        initial_state = _run_state(model.system, initial_state)
     if initial_state is not None and not isinstance(initial_state, RunState):
         initial_state = RunState.load(initial_state)
     if not settings:

@@ -1,0 +1,304 @@
+"""Operating points at which a system rests: Newton's method, damped, with exact slopes.
+
+The unknowns are the states that are not given, what the clocks move, the unknowns of implicit equations, and
+the parameters that are free. The equations: every state that shall rest has the rate 0, every tick leaves
+what it moves as it is, the implicit equations hold, and the chosen signals have their values. Steps are those
+of Levenberg and Marquardt (Moré, Lecture Notes in Mathematics 630, 1978, 105-116), each unknown in the scale
+of its own column and kept within its bounds; of several solutions the one near the start is found, and where
+there are infinitely many, the nearest. Modes follow the point that was found, then it is sought again.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.operating_point import OperatingPoint, operating_point, solved
+from armblocks.equations import HybridSystem, Signature
+from armblocks.equations.evaluation import EvaluatedSystem, Point
+from armblocks.errors import SimulationError
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+MOST_ITERATIONS = 200
+MOST_MODES = 20
+"""How often the modes may change before it is said that they do not settle."""
+NAMED = 6
+"""How many culprits a message names."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrimProblem:
+    """What is sought.
+
+    ``start`` the first guess, ``free_states`` places in ``x`` that may change, ``resting`` places in ``x``
+    whose rate has to be 0, ``free_parameters`` places in ``p``, ``rows`` places in ``y`` that have to have
+    the values ``targets``. ``bounds``: lower and upper end by the name of an unknown scalar.
+    """
+
+    system: HybridSystem
+    start: Point
+    free_states: Places
+    resting: Places
+    free_parameters: Places
+    rows: Places
+    targets: Array
+    bounds: Mapping[str, tuple[float, float]]
+    tolerance: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrimResult:
+    """An operating point and how well it rests.
+
+    ``free``: the parameters that were found, as ``simulate(parameters=…)`` takes them. ``residuals``: what is
+    left of every equation, by name. ``at_bounds``: unknowns that ended at an end of their range.
+    """
+
+    point: OperatingPoint
+    free: Mapping[str, Array]
+    residuals: Mapping[str, float]
+    at_bounds: tuple[str, ...]
+    iterations: int
+
+    @property
+    def largest_residual(self) -> float:
+        """Magnitude of what is farthest from resting."""
+        return max((abs(value) for value in self.residuals.values()), default=0.0)
+
+    def __repr__(self) -> str:
+        head = (
+            f"<TrimResult of {self.point.name} at {self.point.time:g} s: {len(self.residuals)} equations to "
+            f"{self.largest_residual:.2g} in {self.iterations} iterations>"
+        )
+        parts = [*self.point.states.items(), *self.point.discrete.items(), *self.free.items()]
+        width = max((len(name) for name, _ in parts), default=0)
+        return "\n".join(
+            [head, *(f"  {name:<{width}}  {np.array2string(value, precision=8)}" for name, value in parts)]
+        )
+
+
+def trim_system(problem: TrimProblem) -> TrimResult:
+    """Solve a problem. Raises ``SimulationError``, what was reached as ``partial``, where it cannot rest."""
+    search = _Search(problem)
+    point, iterations = problem.start, 0
+    seen: list[bytes] = []
+    while True:
+        point, used = search.run(point)
+        iterations += used
+        if not problem.system.discrete.size:
+            break
+        z = np.where(search.sampled, point.z, search.whole.settled(point))
+        if np.array_equal(z, point.z) or z.tobytes() in seen or len(seen) == MOST_MODES:
+            settled = np.array_equal(z, point.z)
+            if not settled:
+                names = _elements(problem.system.discrete)
+                moving = [names[k] for k in np.flatnonzero(z != point.z).tolist()]
+                raise SimulationError(
+                    f"the modes {', '.join(moving[:NAMED])} do not settle",
+                    where=problem.system.name,
+                    allowed="an operating point inside one piece of every switching block",
+                    fix="start from a point on the side that is meant, or change the limits",
+                    partial=search.result(point, iterations),
+                )
+            break
+        seen.append(point.z.tobytes())
+        point = dataclasses.replace(point, z=z)
+    result = search.result(point, iterations)
+    if not search.rests(point):
+        raise _failure(problem, search, point, result)
+    return result
+
+
+def _elements(layout: Signature) -> list[str]:
+    return [name for slot in layout for name in slot.elements]
+
+
+class _Search:
+    """Equations, slopes and steps of one problem."""
+
+    def __init__(self, problem: TrimProblem) -> None:
+        system = problem.system
+        self.problem = problem
+        self.evaluated = EvaluatedSystem(system, problem.free_parameters.tolist(), problem.rows.tolist())
+        self.whole = EvaluatedSystem(system)
+        self.sampled = self.evaluated.sampled
+        self.moved: Places = np.flatnonzero(self.sampled)
+        moved: list[int] = self.moved.tolist()
+        self.ticking = np.ones(len(system.clocks))
+        self.state_names, discrete_names = _elements(system.states), _elements(system.discrete)
+        parameter_names = _elements(system.parameters)
+        signal_names = _elements(system.signals_layout)
+        self.unknowns: list[str] = [
+            *(self.state_names[k] for k in problem.free_states.tolist()),
+            *(discrete_names[k] for k in moved),
+            *_elements(system.algebraic),
+            *(parameter_names[k] for k in problem.free_parameters.tolist()),
+        ]
+        self.equations: list[str] = [
+            *(f"rate of {self.state_names[k]}" for k in problem.resting.tolist()),
+            *(f"tick of {discrete_names[k]}" for k in moved),
+            *(f"equation of {name}" for name in _elements(system.algebraic)),
+            *(signal_names[k] for k in problem.rows.tolist()),
+        ]
+        ends = [problem.bounds.get(name, (-np.inf, np.inf)) for name in self.unknowns]
+        self.lower = np.array([low for low, _ in ends], dtype=np.float64)
+        self.upper = np.array([high for _, high in ends], dtype=np.float64)
+
+    def gathered(self, point: Point) -> Array:
+        """The unknowns of a point in one vector."""
+        problem = self.problem
+        return np.concatenate(
+            [point.x[problem.free_states], point.z[self.moved], point.w, point.p[problem.free_parameters]]
+        )
+
+    def spread(self, values: Array, point: Point) -> Point:
+        """The point with other values of the unknowns."""
+        problem = self.problem
+        sizes = [problem.free_states.size, self.moved.size, point.w.size]
+        states, ticked, unknowns, parameters = np.split(values, np.cumsum(sizes))
+        x, z, p = point.x.copy(), point.z.copy(), point.p.copy()
+        x[problem.free_states], z[self.moved], p[problem.free_parameters] = states, ticked, parameters
+        return Point(t=point.t, x=x, z=z, w=unknowns, p=p)
+
+    def residuals(self, point: Point) -> Array:
+        """What is left of every equation."""
+        problem, evaluated = self.problem, self.evaluated
+        parts = [evaluated.derivative(point)[problem.resting]]
+        if self.moved.size:
+            parts.append((evaluated.update(point, self.ticking) - point.z)[self.moved])
+        parts += [evaluated.residual(point), evaluated.signals(point) - problem.targets]
+        return np.concatenate(parts)
+
+    def slopes(self, point: Point) -> Array:
+        """Derivatives of the equations by the unknowns."""
+        problem, evaluated = self.problem, self.evaluated
+        flow = evaluated.derivative_slopes(point)
+        blocks = [(flow, problem.resting, False)]
+        if self.moved.size:
+            blocks.append((evaluated.update_slopes(point, self.ticking), self.moved, True))
+        everything = np.arange(point.w.size)
+        blocks.append((evaluated.residual_slopes(point), everything, False))
+        blocks.append((evaluated.signal_slopes(point), np.arange(problem.rows.size), False))
+        rows: list[Array] = []
+        for slopes, chosen, ticked in blocks:
+            by_z = slopes.z[np.ix_(chosen, self.moved)]
+            if ticked:
+                by_z = by_z - np.eye(self.moved.size)
+            by_x = slopes.x[np.ix_(chosen, problem.free_states)]
+            rows.append(np.hstack([by_x, by_z, slopes.w[chosen], slopes.p[chosen]]))
+        return np.vstack(rows)
+
+    def rests(self, point: Point) -> bool:
+        """Whether every equation holds to the tolerance."""
+        residuals = self.residuals(point)
+        return bool(
+            np.isfinite(residuals).all() and np.abs(residuals).max(initial=0.0) <= self.problem.tolerance
+        )
+
+    def run(self, start: Point) -> tuple[Point, int]:
+        """Damped steps until they no longer help."""
+        point = self.spread(np.clip(self.gathered(start), self.lower, self.upper), start)
+        residuals = self.residuals(point)
+        damping, scale = 1e-3, np.zeros(len(self.unknowns))
+        for iteration in range(MOST_ITERATIONS):
+            if not residuals.size or not residuals.any():
+                return point, iteration
+            slopes = self.slopes(point)
+            if not np.isfinite(slopes).all() or not np.isfinite(residuals).all():
+                return point, iteration
+            scale = np.maximum(scale, np.linalg.norm(slopes, axis=0))
+            while True:
+                if damping > 1e12:
+                    return point, iteration
+                step = self._step(point, slopes, residuals, damping, scale)
+                trial = self.spread(self.gathered(point) + step, point)
+                left = self.residuals(trial)
+                if np.isfinite(left).all() and np.linalg.norm(left) < np.linalg.norm(residuals):
+                    break
+                damping *= 10.0
+            point, residuals, damping = trial, left, max(damping / 30.0, 1e-18)
+        return point, MOST_ITERATIONS
+
+    def _step(self, point: Point, slopes: Array, residuals: Array, damping: float, scale: Array) -> Array:
+        """One step of the damped normal equations, within the bounds; who would leave them stays there."""
+        here = self.gathered(point)
+        weights = np.sqrt(damping) * np.where(scale > 0.0, scale, 1.0)
+        free = np.ones(here.size, dtype=np.bool_)
+        step = np.zeros(here.size)
+        for _ in range(here.size + 1):
+            matrix = np.vstack([slopes[:, free], np.diag(weights[free])])
+            # Who stands at an end of the range already counts in the right-hand side.
+            right = np.concatenate([-(residuals + slopes[:, ~free] @ step[~free]), np.zeros(int(free.sum()))])
+            step[free] = np.linalg.lstsq(matrix, right, rcond=None)[0]
+            beyond = free & ((here + step < self.lower) | (here + step > self.upper))
+            if not beyond.any():
+                break
+            step = np.clip(here + step, self.lower, self.upper) - here
+            free &= ~beyond
+        return step
+
+    def result(self, point: Point, iterations: int) -> TrimResult:
+        """What was reached, by name."""
+        if self.rests(point):
+            point = solved(self.whole, point)
+        values = self.gathered(point)
+        bounded = (values <= self.lower) | (values >= self.upper)
+        system = self.problem.system
+        known = operating_point(self.whole, point)
+        chosen = {int(k) for k in self.problem.free_parameters}
+        free = {
+            name: known.parameters[name]
+            for name, place in system.parameters.ranges.items()
+            if chosen & set(range(*place.indices(system.parameters.size)))
+        }
+        return TrimResult(
+            point=known,
+            free=free,
+            residuals=dict(zip(self.equations, self.residuals(point).tolist())),
+            at_bounds=tuple(self.unknowns[k] for k in np.flatnonzero(bounded).tolist()),
+            iterations=iterations,
+        )
+
+
+def _failure(problem: TrimProblem, search: _Search, point: Point, result: TrimResult) -> SimulationError:
+    """Which equations do not hold, and what stands in the way."""
+    left = {name: value for name, value in result.residuals.items() if not abs(value) <= problem.tolerance}
+    worst = sorted(left, key=lambda name: -abs(left[name]) if np.isfinite(left[name]) else -np.inf)
+    listed = ", ".join(f"{name} is {_left(name, left[name])}" for name in worst[:NAMED])
+    more = f" and {len(worst) - NAMED} more" if len(worst) > NAMED else ""
+    return SimulationError(
+        f"no operating point was found: {listed}{more}",
+        where=problem.system.name,
+        allowed=_why(problem, search, point, worst, result),
+        fix="free another parameter, give another start, or let a state move",
+        partial=result,
+    )
+
+
+def _left(name: str, value: float) -> str:
+    return f"{value:.4g}" if name.startswith(("rate of", "tick of", "equation of")) else f"{value:+.4g} off"
+
+
+def _why(
+    problem: TrimProblem, search: _Search, point: Point, worst: Sequence[str], result: TrimResult
+) -> str:
+    slopes = search.slopes(point)
+    if not np.isfinite(slopes).all():
+        return "points with finite slopes, and this one has none"
+    rows = {name: slopes[k] for k, name in enumerate(search.equations)}
+    fixed = [name for name in worst if not rows[name].any()]
+    if fixed:
+        return (
+            f"equations that something free moves, and {', '.join(fixed[:NAMED])} follows from nothing free"
+        )
+    if result.at_bounds:
+        return f"values within the bounds, and {', '.join(result.at_bounds[:NAMED])} is at one of them"
+    if len(search.equations) > len(search.unknowns):
+        return f"as many equations as unknowns ({len(search.equations)} and {len(search.unknowns)} here)"
+    return "a start from which the equations can be solved"

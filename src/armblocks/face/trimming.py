@@ -1,0 +1,172 @@
+"""Trimming a diagram: the operating point at which it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.analysis.trim import TrimProblem, TrimResult, trim_system
+from armblocks.diagram import Diagram
+from armblocks.equations import HybridSystem, Signature
+from armblocks.equations.evaluation import Point
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.face.linearizing import Where, described_diagram, operating_point_at
+from armblocks.face.model import CompiledDiagram, compile_diagram
+
+Array = NDArray[np.float64]
+Values = Mapping[str, ArrayLike]
+
+
+def trim(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    *,
+    outputs: Values | None = None,
+    states: Values | None = None,
+    free: Sequence[str] = (),
+    moving: Sequence[str] = (),
+    guess: Values | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    at: Where = 0.0,
+    parameters: Mapping[str, object] | None = None,
+    tolerance: float = 1e-9,
+    **settings: Any,
+) -> TrimResult:
+    """Find an operating point at which a diagram rests.
+
+    All states are sought, but for those in ``states``, which have the values given there, and all have to
+    rest, but for those that are ``moving``. ``free``: tunable parameters that are sought too,
+    ``"torque.value"`` (or ``"torque"`` for a block that has one only). ``outputs``: values that signals have
+    to have; NaN leaves an entry open. ``bounds``: ``(lower, upper)`` of states and free parameters. The
+    search starts where the run is ``at`` (0: its start), with the values of ``guess`` put in; time-dependent
+    signals have their value of that time. A state is named ``block/state``, or by its block if that has only
+    one.
+
+    Sampled blocks rest when a tick changes nothing. Every equation holds to ``tolerance``, in its own unit.
+
+    Raises ``SimulationError``, naming what does not rest and why, with the best point found as ``partial``;
+    ``UnknownNameError`` and ``InputError`` for names and values that do not fit.
+    """
+    described = described_diagram(diagram, parameters)
+    system = compile_diagram(described).system
+    known = operating_point_at(described, at, **settings)
+    x = system.states.pack(known.states)
+    p = system.parameters.pack(known.parameters)
+    given = _values(system.states, states or {}, "state", system)
+    x[list(given)] = list(given.values())
+    places = _parameter_places(system, free)
+    for name, value in (guess or {}).items():
+        layout, slot = _state_or_parameter(system, name)
+        kind, vector = ("state", x) if layout is system.states else ("parameter", p)
+        found = _values(layout, {slot: value}, kind, system)
+        vector[list(found)] = list(found.values())
+    let_go = {place for name in moving for place in _places(system.states, name, "state", system)}
+    rows, targets = _targets(system, outputs or {})
+    everything = range(system.states.size)
+    return trim_system(
+        TrimProblem(
+            system=system,
+            start=Point(
+                t=known.time,
+                x=x,
+                z=system.discrete.pack(known.discrete),
+                w=system.algebraic.pack(known.algebraic),
+                p=p,
+            ),
+            free_states=np.array([k for k in everything if k not in given], dtype=np.intp),
+            resting=np.array([k for k in everything if k not in let_go], dtype=np.intp),
+            free_parameters=np.array(places, dtype=np.intp),
+            rows=np.array(rows, dtype=np.intp),
+            targets=np.array(targets, dtype=np.float64),
+            bounds=_bounds(system, bounds or {}),
+            tolerance=tolerance,
+        )
+    )
+
+
+def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) -> str:
+    """The slot itself, or the only one of a block."""
+    if name in layout.ranges:
+        return name
+    separator = "." if kind == "parameter" else "/"
+    own = [slot.name for slot in layout if slot.name.rpartition(separator)[0] == name]
+    if len(own) != 1:
+        raise UnknownNameError(kind, name, layout.names, where=system.name)
+    return own[0]
+
+
+def _places(layout: Signature, name: str, kind: str, system: HybridSystem) -> list[int]:
+    place = layout.ranges[_slot_name(layout, name, kind, system)]
+    return list(range(*place.indices(layout.size)))
+
+
+def _values(layout: Signature, values: Values, kind: str, system: HybridSystem) -> dict[int, float]:
+    """Values by place in the flat vector; a number is spread over a vector."""
+    found: dict[int, float] = {}
+    for name, value in values.items():
+        slot = layout[_slot_name(layout, name, kind, system)]
+        places = _places(layout, name, kind, system)
+        found |= dict(zip(places, _spread(value, slot.shape, f"{kind} '{name}'").tolist()))
+    return found
+
+
+def _spread(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim and array.shape != shape:
+        raise InputError(
+            f"{what} is given values of shape {array.shape}", allowed=f"a number, or shape {shape}"
+        )
+    return np.broadcast_to(array, shape).ravel()
+
+
+def _parameter_places(system: HybridSystem, free: Sequence[str]) -> list[int]:
+    return [place for name in free for place in _places(system.parameters, name, "parameter", system)]
+
+
+def _targets(system: HybridSystem, outputs: Values) -> tuple[list[int], list[float]]:
+    rows: list[int] = []
+    targets: list[float] = []
+    layout = system.signals_layout
+    for name, value in outputs.items():
+        path = system.aliases.get(name, name)
+        if path not in layout.ranges:
+            raise UnknownNameError("signal", name, [*layout.names, *system.aliases], where=system.name)
+        wanted = _spread(value, layout[path].shape, f"signal '{name}'").tolist()
+        places = range(*layout.ranges[path].indices(layout.size))
+        kept = [(place, target) for place, target in zip(places, wanted) if not np.isnan(target)]
+        rows += [place for place, _ in kept]
+        targets += [target for _, target in kept]
+    return rows, targets
+
+
+def _bounds(
+    system: HybridSystem, bounds: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """By the name of every scalar."""
+    found: dict[str, tuple[float, float]] = {}
+    for name, (low, high) in bounds.items():
+        place = _state_or_parameter(system, name)
+        if not low <= high:
+            raise InputError(
+                f"the bounds of '{name}' are {low:g} and {high:g}",
+                allowed="the lower one first",
+                fix="swap them",
+            )
+        layout, slot = place
+        found |= dict.fromkeys(layout[slot].elements, (float(low), float(high)))
+    return found
+
+
+def _state_or_parameter(system: HybridSystem, name: str) -> tuple[Signature, str]:
+    """The layout and the slot that a name means; a state rather than a parameter."""
+    try:
+        return system.states, _slot_name(system.states, name, "state", system)
+    except UnknownNameError:
+        known = (*system.states.names, *system.parameters.names)
+    try:
+        return system.parameters, _slot_name(system.parameters, name, "parameter", system)
+    except UnknownNameError:
+        raise UnknownNameError("state or parameter", name, known, where=system.name) from None

@@ -1,0 +1,196 @@
+"""Operating points at which diagrams rest."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.analysis.trim import TrimResult
+from armblocks.blocks import (
+    Clock,
+    Constant,
+    DiscreteIntegrator,
+    Expression,
+    Gain,
+    Integrator,
+    Saturation,
+    Sum,
+    Switch,
+    UnitDelay,
+)
+from armblocks.errors import InputError, SimulationError, UnknownNameError
+
+
+def pendulum() -> ab.Diagram:
+    """qdd = torque - 9.81 sin(q) - 0.1 qd."""
+    builder = ab.DiagramBuilder("pendulum")
+    torque = builder.add("torque", Constant(value=0.0))
+    total = builder.add("sum", Sum(signs="+--"), torque)
+    speed = builder.add("qd", Integrator(initial=0.2), total)
+    angle = builder.add("q", Integrator(initial=0.5), speed)
+    builder.connect(builder.add("weight", Expression(formula="9.81 * sin(u)"), angle), total["u2"])
+    builder.connect(builder.add("friction", Gain(gain=0.1), speed), total["u3"])
+    return builder.build()
+
+
+def test_a_pendulum_hangs_down_and_stands_up_by_where_the_search_starts() -> None:
+    down = ab.trim(pendulum())
+    assert float(down.point.states["q/x"]) == pytest.approx(0.0, abs=1e-12)
+    up = ab.trim(pendulum(), guess={"q": 3.0})
+    assert float(up.point.states["q/x"]) == pytest.approx(math.pi, rel=1e-13)
+    assert up.largest_residual < 1e-13
+    unstable = ab.linearize(pendulum(), "torque", "q", at=up.point)
+    assert unstable.poles().real.max() == pytest.approx(-0.05 + math.sqrt(0.05**2 + 9.81), rel=1e-12)
+
+
+def test_a_free_torque_holds_a_given_angle() -> None:
+    for given in ({"states": {"q": 0.7}}, {"outputs": {"q": 0.7}}):
+        found = ab.trim(pendulum(), free=["torque"], **given)  # type: ignore[arg-type]
+        assert float(found.free["torque.value"]) == pytest.approx(9.81 * math.sin(0.7), rel=1e-12)
+    held = ab.simulate(pendulum(), parameters=found.free, initial_state=found.point, stop_time=5.0)
+    assert np.allclose(held["q"], 0.7, atol=1e-9)
+
+
+def test_a_state_may_move_while_another_is_steady() -> None:
+    builder = ab.DiagramBuilder("car")
+    force = builder.add("force", Constant(value=10.0))
+    total = builder.add("sum", Sum(signs="+-"), force)
+    speed = builder.add("speed", Integrator(), total)
+    builder.add("place", Integrator(), speed)
+    builder.connect(builder.add("drag", Expression(formula="0.4 * u * abs(u)"), speed), total["u2"])
+    found = ab.trim(builder.build(), moving=["place"], guess={"speed": 1.0})
+    assert float(found.point.states["speed/x"]) == pytest.approx(5.0, rel=1e-12)
+    with pytest.raises(SimulationError, match="no operating point was found"):
+        ab.trim(builder.build(), guess={"speed": 1.0})
+
+
+def test_a_sampled_controller_rests_where_its_integrator_holds_the_plant() -> None:
+    builder = ab.DiagramBuilder("sampled")
+    wanted = builder.add("wanted", Constant(value=2.0))
+    error = builder.add("error", Sum(signs="+-"), wanted)
+    control = builder.add("control", DiscreteIntegrator(sample_time=0.1), error)
+    rate = builder.add("rate", Sum(signs="+-"), control)
+    state = builder.add("x", Integrator(), rate)
+    builder.connect(builder.add("loss", Gain(gain=3.0), state), rate["u2"])
+    builder.connect(state, error["u2"])
+    found = ab.trim(builder.build())
+    assert float(found.point.signals["x/y"]) == pytest.approx(2.0, rel=1e-12)
+    assert float(found.point.signals["control/y"]) == pytest.approx(6.0, rel=1e-12)
+
+
+def limited(torque: float) -> ab.Diagram:
+    """x' = sat(torque) - x."""
+    builder = ab.DiagramBuilder("limited")
+    source = builder.add("torque", Constant(value=torque))
+    limit = builder.add("limit", Saturation(lower=-1.0, upper=1.0), source)
+    total = builder.add("sum", Sum(signs="+-"), limit)
+    state = builder.add("x", Integrator(), total)
+    builder.connect(state, total["u2"])
+    return builder.build()
+
+
+def test_modes_follow_the_point() -> None:
+    found = ab.trim(limited(0.0), free=["torque"], guess={"torque.value": 5.0}, outputs={"x": 0.4})
+    assert float(found.free["torque.value"]) == pytest.approx(0.4, rel=1e-12)
+
+
+def test_bounds_are_kept_and_named_where_they_stand_in_the_way() -> None:
+    two = ab.trim(pendulum(), free=["torque"], states={"q": 0.3}, bounds={"torque": (-20.0, 20.0)})
+    assert not two.at_bounds
+    with pytest.raises(
+        SimulationError, match=r"rate of qd/x is -0.8.*torque.value is at one of them"
+    ) as caught:
+        ab.trim(pendulum(), free=["torque"], states={"q": 0.3}, bounds={"torque.value": (-2.0, 2.0)})
+    assert isinstance(caught.value.partial, TrimResult)
+    assert caught.value.partial.at_bounds == ("torque.value",)
+
+
+def test_an_implicit_equation_is_part_of_the_point() -> None:
+    builder = ab.DiagramBuilder("implicit")
+    source = builder.add("u", Constant(value=3.0))
+    total = builder.add("sum", Sum(signs="+--"), source)
+    state = builder.add("x", Integrator(initial=0.1), total)
+    builder.connect(builder.add("cube", Expression(formula="u^3"), total), total["u2"])
+    builder.connect(state, total["u3"])
+    found = ab.trim(builder.build())
+    assert float(found.point.states["x/x"]) == pytest.approx(3.0, rel=1e-12)
+
+
+def test_a_puma_is_held_by_the_torque_of_its_weight() -> None:
+    puma = ab.load_robot("puma560")
+    q = np.array([0.1, 0.6, -0.4, 0.2, 0.5, -0.3])
+    builder = ab.DiagramBuilder("held")
+    torque = builder.add("torque", Constant(value=np.zeros(6)))
+    builder.add("arm", ab.blocks.BLOCKS["ForwardDynamics"](robot=puma.robot), torque)  # type: ignore[call-arg]
+    found = ab.trim(builder.build(), free=["torque"], states={"arm/q": q, "arm/qd": 0.0})
+    assert np.allclose(found.free["torque.value"], puma.gravload(q), rtol=0.0, atol=1e-9)
+
+
+def test_what_nothing_free_moves_is_named() -> None:
+    builder = ab.DiagramBuilder("ramp")
+    builder.add("x", Integrator(), builder.add("u", Constant(value=1.0)))
+    with pytest.raises(SimulationError, match=r"rate of x/x is 1.*follows from nothing free"):
+        ab.trim(builder.build())
+
+
+def test_more_equations_than_unknowns_are_said() -> None:
+    with pytest.raises(SimulationError, match="as many equations as unknowns"):
+        ab.trim(pendulum(), outputs={"q": 0.7})
+
+
+def test_an_equation_without_a_root_is_said() -> None:
+    builder = ab.DiagramBuilder("rootless")
+    state = builder.add("x", Integrator(initial=0.3))
+    builder.connect(builder.add("f", Expression(formula="1 + u^2"), state), state["u"])
+    with pytest.raises(
+        SimulationError, match=r"rate of x/x is 1\b.*(a start from which|follows from nothing free)"
+    ):
+        ab.trim(builder.build())
+    builder = ab.DiagramBuilder("steep")
+    state = builder.add("x", Integrator(initial=0.0))
+    builder.connect(builder.add("f", Expression(formula="sqrt(u) + 1"), state), state["u"])
+    with pytest.raises(SimulationError, match="points with finite slopes"):
+        ab.trim(builder.build())
+
+
+def test_a_counter_never_rests() -> None:
+    builder = ab.DiagramBuilder("counter")
+    total = builder.add("sum", Sum(signs="++"), builder.add("one", Constant(value=1.0)))
+    builder.connect(builder.add("count", UnitDelay(sample_time=1.0), total), total["u2"])
+    with pytest.raises(SimulationError, match="tick of count"):
+        ab.trim(builder.build())
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="there is no state named 'angle'"):
+        ab.trim(pendulum(), states={"angle": 1.0})
+    with pytest.raises(UnknownNameError, match="there is no parameter named 'tork'"):
+        ab.trim(pendulum(), free=["tork"])
+    with pytest.raises(UnknownNameError, match="there is no signal named 'angle'"):
+        ab.trim(pendulum(), outputs={"angle": 1.0})
+    with pytest.raises(InputError, match="is given values of shape"):
+        ab.trim(pendulum(), states={"q": [1.0, 2.0]})
+    with pytest.raises(InputError, match=r"the bounds of 'q' are 2 and 1.*the lower one first"):
+        ab.trim(pendulum(), bounds={"q": (2.0, 1.0)})
+
+
+def test_time_stands_still_where_the_search_starts() -> None:
+    builder = ab.DiagramBuilder("timed")
+    total = builder.add("sum", Sum(signs="+-"), builder.add("t", Clock()))
+    state = builder.add("x", Integrator(), total)
+    builder.connect(state, total["u2"])
+    assert float(ab.trim(builder.build(), at=4.0).point.states["x/x"]) == pytest.approx(4.0, rel=1e-12)
+
+
+def test_modes_that_chase_each_other_are_named() -> None:
+    """x' = -1 - x / 10 above 0 and 1 - x / 10 below: each piece rests in the other."""
+    builder = ab.DiagramBuilder("chase")
+    state = builder.add("x", Integrator(initial=0.5))
+    above = builder.add("above", Expression(formula="-1 - 0.1 * u"), state)
+    below = builder.add("below", Expression(formula="1 - 0.1 * u"), state)
+    builder.connect(builder.add("switch", Switch(threshold=0.0), above, state, below), state["u"])
+    with pytest.raises(SimulationError, match=r"the modes switch/[a-z]+ do not settle"):
+        ab.trim(builder.build())
