@@ -87,8 +87,10 @@ def test_native_code_gives_what_the_interpreter_gives(diagram: Diagram) -> None:
     system = trace_diagram(diagram)
     compiled = compile_system(system)
     times, p = np.linspace(0.0, 5.0, 101), system.parameter_values
-    native = compiled.evaluate_signals(times, *[np.zeros((101, 0))] * 3, p)
-    interpreted = np.array([system.signals(t, (), (), (), p)[0] for t in times]).T
+    modes = np.random.default_rng(5).integers(0, 2, system.discrete.size).astype(float)
+    none = np.zeros((101, 0))
+    native = compiled.evaluate_signals(times, none, np.tile(modes, (101, 1)), none, p)
+    interpreted = np.array([system.signals(t, (), modes, (), p)[0] for t in times]).T
     # the same operations; sums and products may be fused, and elementary functions differ by an ulp or two
     assert native == pytest.approx(interpreted, rel=1e-11, abs=1e-12)
 

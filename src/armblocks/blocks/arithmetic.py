@@ -8,16 +8,36 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
-from casadi import SX, atan2, ceil, cos, fabs, floor, fmod, hypot, if_else, logic_and, sign, sin, sqrt
+from casadi import (
+    SX,
+    atan2,
+    ceil,
+    cos,
+    fabs,
+    floor,
+    fmax,
+    fmin,
+    fmod,
+    hypot,
+    if_else,
+    logic_and,
+    sign,
+    sin,
+    sqrt,
+)
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit
+from armblocks.blocks.switching import JUST, located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
+    Condition,
+    Guard,
     ParameterKind,
     Port,
     Shapes,
     Signals,
+    State,
     WorkedExample,
     broadcast,
     made,
@@ -45,6 +65,19 @@ _ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
     "round": _round,
     "fix": lambda u: sign(u) * floor(fabs(u)),
 }
+
+
+def _rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX]:
+    """Above which u the result exceeds n, and whether that border itself does; ``mirrored``: of -f(-u)."""
+    if function == "round":
+        return n + 0.5, n >= 0.0
+    if function == "fix":
+        return if_else(n >= 0.0, n + 1.0, n), n >= 0.0
+    if (function == "floor") is not mirrored:
+        return n + 1.0, SX(1.0)
+    return n, SX(0.0)
+
+
 _ROOTS: Mapping[str, Callable[[SX], SX]] = {
     "sqrt": sqrt,
     "signedSqrt": lambda u: sign(u) * sqrt(fabs(u)),
@@ -62,6 +95,8 @@ class Abs(Block):
         shows="The lower half of the sine, turned up.",
     )
 
+    zero_crossing: bool = zero_crossing_parameter()
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
 
@@ -74,8 +109,14 @@ class Abs(Block):
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, Condition("negative", inputs["u"], "1 where u < 0", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"negative": -u["u"]}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": fabs(u["u"])}
+        return {"y": if_else(x["negative"], -u["u"], u["u"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +184,8 @@ class Sign(Block):
         shows="1 while the sine is positive, -1 while it is negative.",
     )
 
+    zero_crossing: bool = zero_crossing_parameter()
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
 
@@ -152,8 +195,15 @@ class Sign(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": inputs["u"]}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        above = Condition("positive", inputs["u"], "1 where u > 0", closed=False)
+        return located(self, above, Condition("negative", inputs["u"], "1 where u < 0", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"positive": u["u"], "negative": -u["u"]}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": sign(u["u"])}
+        return {"y": x["positive"] - x["negative"]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,6 +246,7 @@ class Rounding(Block):
     )
 
     function: str = parameter("floor", choices=tuple(_ROUNDINGS), doc="which way")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -209,8 +260,37 @@ class Rounding(Block):
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("integer", inputs["u"], "the output"),) if self.zero_crossing else ()
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        if not self.zero_crossing:
+            return ()
+        up = Guard("up", inputs["u"], "u reaches where the output is greater", 1)
+        return (up, Guard("down", inputs["u"], "u reaches where the output is less", -1))
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _ROUNDINGS[self.function](u["u"])}
+        return {"y": x["integer"] if self.zero_crossing else _ROUNDINGS[self.function](u["u"])}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if not self.zero_crossing:
+            return {}
+        # Where the next integers begin, and whether their border belongs to them.
+        edge, owned = _rounding_edges(self.function, x["integer"])
+        below, below_owned = _rounding_edges(self.function, -x["integer"], mirrored=True)
+        return {
+            "up": u["u"] - edge + if_else(owned, JUST, -JUST),
+            "down": u["u"] + below - if_else(below_owned, JUST, -JUST),
+        }
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"integer": _ROUNDINGS[self.function](u["u"])} if self.zero_crossing else {}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        # A jump may pass several integers at once; at a border, rounding must not undo the step.
+        rounded = _ROUNDINGS[self.function](u["u"])
+        down = if_else(e["down"] < 0.0, fmin(rounded, x["integer"] - 1.0), x["integer"])
+        return {"integer": if_else(e["up"] > 0.0, fmax(rounded, x["integer"] + 1.0), down)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,28 +24,59 @@ EXTRAPOLATIONS = ("clip", "linear")
 Point = float | SX
 
 
-def weights(u: SX, points: Sequence[float], method: str = "linear", extrapolation: str = "clip") -> list[SX]:
-    """The weight of each of n >= 2 rising break points at position ``u``, a scalar."""
-    if method == "flat":
-        return cells(u, points[1:])
-    if method == "nearest":
-        return cells(u, [(left + right) / 2.0 for left, right in pairwise(points)])
-    inside = fmin(fmax(u, points[0]), points[-1])
+def weights(
+    u: SX,
+    points: Sequence[float],
+    method: str = "linear",
+    extrapolation: str = "clip",
+    cell: SX | None = None,
+) -> list[SX]:
+    """The weight of each of n >= 2 rising break points at position ``u``, a scalar.
+
+    ``cell``, if given, says which of :func:`borders` are at or below u: the equations that hold.
+    """
+    ends = borders(points, method, extrapolation)
+    if method in ("flat", "nearest"):
+        return cells(u, ends) if cell is None else [cell == float(k) for k in range(len(points))]
+    if extrapolation == "linear" and method == "linear":
+        found = None if cell is None else [cell == float(k) for k in range(len(points) - 1)]
+        return linear_weights(u, points, found)
+    if cell is None:
+        inside, found = fmin(fmax(u, points[0]), points[-1]), None
+    else:
+        last = float(len(ends))
+        inside = if_else(cell == 0.0, points[0], if_else(cell == last, points[-1], u))
+        at = fmin(fmax(cell, 1.0), last - 1.0)
+        found = [at == float(k) for k in range(1, len(points))]
     if method == "linear":
-        return linear_weights(inside if extrapolation == "clip" else u, points)
-    found = _cubic_weights(inside, points)
+        return linear_weights(inside, points, found)
+    weighted = _cubic_weights(inside, points)
     if extrapolation == "linear":
         slopes = spline_slopes(points)
         for k in range(len(points)):
             rate = if_else(u < points[0], float(slopes[0, k]), float(slopes[-1, k]))
-            found[k] = found[k] + rate * (u - inside)
-    return found
+            weighted[k] = weighted[k] + rate * (u - inside)
+    return weighted
 
 
-def linear_weights(u: SX, points: Sequence[Point]) -> list[SX]:
-    """Hat functions; the first and the last interval go on beyond the ends. Break points may be symbols."""
+def borders(points: Sequence[float], method: str, extrapolation: str) -> list[float]:
+    """The positions, rising, at which curve or slope jumps; a spline has none but where it is held."""
+    if method == "flat":
+        return list(points[1:])
+    if method == "nearest":
+        return [(left + right) / 2.0 for left, right in pairwise(points)]
+    if method == "linear":
+        return list(points if extrapolation == "clip" else points[1:-1])
+    return [points[0], points[-1]] if extrapolation == "clip" else []
+
+
+def linear_weights(u: SX, points: Sequence[Point], interval: Sequence[SX] | None = None) -> list[SX]:
+    """Hat functions; the first and the last interval go on beyond the ends. Break points may be symbols.
+
+    ``interval``, if given, marks the interval that u counts to with 1, all others with 0.
+    """
     found = [SX(0.0) for _ in points]
-    for k, inside in enumerate(cells(u, points[1:-1])):
+    for k, inside in enumerate(interval or cells(u, points[1:-1])):
         fraction = (u - points[k]) / (points[k + 1] - points[k])
         found[k] = found[k] + if_else(inside, 1.0 - fraction, 0.0)
         found[k + 1] = found[k + 1] + if_else(inside, fraction, 0.0)

@@ -9,13 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, fmin, if_else, mtimes
+from casadi import SX, if_else, logic_and, mtimes
 from numpy.typing import ArrayLike
 
 from armblocks import dynamics
 from armblocks.blocks.elimination import solve
 from armblocks.blocks.robot_ports import apply_traced, q_port, qd_port, qdd_port, tau_port
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, broadcast, parameter, shape_of
+from armblocks.blocks.switching import located, zero_crossing_parameter
+from armblocks.diagram import (
+    Block,
+    Condition,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    broadcast,
+    parameter,
+    shape_of,
+)
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 
@@ -281,6 +292,7 @@ class MotorDrive(Block):
     no_load_speed: ArrayLike = parameter(
         100.0, kind=ParameterKind.ARRAY, above=0.0, doc="speed w0 at which no torque is left", unit="rad/s"
     )
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "wanted torque", "N m"), Port("w", "speed", "rad/s"))
@@ -292,11 +304,44 @@ class MotorDrive(Block):
         names = ("peak", "stall", "no_load_speed")
         return {"y": broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        docs = {
+            "fast": "1 where the speed lowers the upper limit",
+            "overrun": "1 where it makes it brake",
+            "fast_back": "1 where the speed backwards raises the lower limit",
+            "overrun_back": "1 where it makes it brake",
+            "above": "1 above the upper limit",
+            "below": "1 below the lower limit",
+        }
+        return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        forwards, backwards = self._lines(u, p)
+        upper, lower = self._limits(x, u, p)
+        return {
+            "fast": p["peak"] - forwards,
+            "overrun": -p["peak"] - forwards,
+            "fast_back": p["peak"] + backwards,
+            "overrun_back": backwards - p["peak"],
+            "above": u["u"] - upper,
+            "below": lower - u["u"],
+        }
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        upper, lower = self._limits(x, u, p)
+        return {"y": if_else(x["above"], upper, if_else(x["below"], lower, u["u"]))}
+
+    @staticmethod
+    def _lines(u: Signals, p: Signals) -> tuple[SX, SX]:
+        """The voltage limits of both directions."""
         ratio = u["w"] / p["no_load_speed"]
-        upper = fmax(fmin(p["peak"], p["stall"] * (1.0 - ratio)), -p["peak"])
-        lower = fmin(fmax(-p["peak"], -p["stall"] * (1.0 + ratio)), p["peak"])
-        return {"y": fmin(fmax(u["u"], lower), upper)}
+        return p["stall"] * (1.0 - ratio), -p["stall"] * (1.0 + ratio)
+
+    def _limits(self, x: Signals, u: Signals, p: Signals) -> tuple[SX, SX]:
+        forwards, backwards = self._lines(u, p)
+        upper = if_else(x["overrun"], -p["peak"], if_else(x["fast"], forwards, p["peak"]))
+        return upper, if_else(x["overrun_back"], p["peak"], if_else(x["fast_back"], backwards, -p["peak"]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -317,6 +362,7 @@ class JointStops(Block):
     damping: ArrayLike = parameter(
         100.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="of the stops", unit="N m s/rad"
     )
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("q", "coordinates", "rad"), Port("qd", "speeds", "rad/s"))
@@ -329,8 +375,32 @@ class JointStops(Block):
         shapes = {name: shape_of(self.parameter_value(name)) for name in names}
         return {"tau": broadcast({**inputs, **shapes})}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["tau"]
+        docs = {
+            "low": "1 below the lower stop",
+            "pushed_up": "1 where spring and damper of the lower stop push",
+            "high": "1 above the upper stop",
+            "pushed_down": "1 where spring and damper of the upper stop push",
+        }
+        return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        up, down = self._pushes(u, p)
+        return {
+            "low": p["lower"] - u["q"],
+            "pushed_up": up,
+            "high": u["q"] - p["upper"],
+            "pushed_down": -down,
+        }
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        q, drag = u["q"], p["damping"] * u["qd"]
-        low = if_else(q < p["lower"], fmax(p["stiffness"] * (p["lower"] - q) - drag, 0.0), 0.0)
-        high = if_else(q > p["upper"], fmin(p["stiffness"] * (p["upper"] - q) - drag, 0.0), 0.0)
-        return {"tau": low + high}
+        up, down = self._pushes(u, p)
+        low = if_else(logic_and(x["low"], x["pushed_up"]), up, 0.0)
+        return {"tau": low + if_else(logic_and(x["high"], x["pushed_down"]), down, 0.0)}
+
+    @staticmethod
+    def _pushes(u: Signals, p: Signals) -> tuple[SX, SX]:
+        """What spring and damper of the lower and of the upper stop would give in contact."""
+        drag = p["damping"] * u["qd"]
+        return p["stiffness"] * (p["lower"] - u["q"]) - drag, p["stiffness"] * (p["upper"] - u["q"]) - drag

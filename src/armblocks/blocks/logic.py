@@ -1,7 +1,7 @@
 """Logic: signals that are 1 where something holds and 0 where it does not.
 
-Every input that is not zero counts as true. These blocks look at the values of the instant; what has to be
-caught between two steps needs a crossing.
+Every input that is not zero counts as true. Where a comparison of continuous signals changes its answer is an
+event, located exactly. A gate has none of its own: its inputs change at the events of others.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.selection import choose
+from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
+    Condition,
     ParameterKind,
     Port,
     Shapes,
@@ -28,16 +30,10 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.equations import Shape
 from armblocks.errors import InputError
 
-_RELATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
-    "==": lambda left, right: left == right,
-    "~=": lambda left, right: left != right,
-    "<": lambda left, right: left < right,
-    "<=": lambda left, right: left <= right,
-    ">": lambda left, right: right < left,
-    ">=": lambda left, right: right <= left,
-}
+_RELATIONS = ("==", "~=", "<", "<=", ">", ">=")
 _GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
     "AND": (logic_and, False),
     "OR": (logic_or, False),
@@ -59,7 +55,8 @@ class RelationalOperator(Block):
         inputs={"u1": made("SineWave"), "u2": made("Constant", value=0.5)},
     )
 
-    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u1", "the left side"), Port("u2", "the right side"))
@@ -70,8 +67,14 @@ class RelationalOperator(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast(inputs)}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _side_values(self.relation, u["u1"] - u["u2"])
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _RELATIONS[self.relation](u["u1"], u["u2"])}
+        return {"y": _related(self.relation, x)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +126,8 @@ class CompareToConstant(Block):
         parameters={"relation": ">", "constant": 0.5},
     )
 
-    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    zero_crossing: bool = zero_crossing_parameter()
     constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -135,8 +139,14 @@ class CompareToConstant(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({**inputs, "constant": shape_of(self.constant)})}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _side_values(self.relation, u["u"] - p["constant"])
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _RELATIONS[self.relation](u["u"], p["constant"])}
+        return {"y": _related(self.relation, x)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +159,8 @@ class CompareToZero(Block):
         shows="1 while the sine is not above 0.",
     )
 
-    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
+    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the left side"),)
@@ -160,8 +171,14 @@ class CompareToZero(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": inputs["u"]}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _side_values(self.relation, u["u"])
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _RELATIONS[self.relation](u["u"], SX(0.0))}
+        return {"y": _related(self.relation, x)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,6 +198,7 @@ class IntervalTest(Block):
     upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the upper end")
     lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
     upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "what is tested"),)
@@ -191,8 +209,17 @@ class IntervalTest(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({**inputs, "lower": shape_of(self.lower), "upper": shape_of(self.upper)})}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        above = Condition("above", shape, "1 above the lower end", closed=self.lower_closed)
+        below = Condition("below", shape, "1 below the upper end", closed=self.upper_closed)
+        return located(self, above, below)
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - p["lower"], "below": p["upper"] - u["u"]}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _inside(u["u"], p["lower"], p["upper"], self.lower_closed, self.upper_closed)}
+        return {"y": logic_and(x["above"], x["below"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,6 +239,7 @@ class IntervalTestDynamic(Block):
 
     lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
     upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("upper", "the upper end"), Port("u", "what is tested"), Port("lower", "the lower end"))
@@ -222,8 +250,17 @@ class IntervalTestDynamic(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast(inputs)}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        above = Condition("above", shape, "1 above the lower end", closed=self.lower_closed)
+        below = Condition("below", shape, "1 below the upper end", closed=self.upper_closed)
+        return located(self, above, below)
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - u["lower"], "below": u["upper"] - u["u"]}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _inside(u["u"], u["lower"], u["upper"], self.lower_closed, self.upper_closed)}
+        return {"y": logic_and(x["above"], x["below"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,6 +312,24 @@ class CombinatorialLogic(Block):
         return {"y": choose(row, [p["table"][k, :].T for k in range(p["table"].shape[0])])}
 
 
-def _inside(u: SX, lower: SX, upper: SX, lower_closed: bool, upper_closed: bool) -> SX:
-    above = lower <= u if lower_closed else lower < u
-    return logic_and(above, u <= upper if upper_closed else u < upper)
+def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:
+    """What a relation asks of left minus right; equality takes two questions."""
+    above = Condition("above", shape, "1 where the left side is greater", closed=False)
+    below = Condition("below", shape, "1 where the left side is less", closed=False)
+    if relation in (">", "<="):
+        return (above,)
+    return (below,) if relation in ("<", ">=") else (above, below)
+
+
+def _side_values(relation: str, difference: SX) -> Signals:
+    values = {"above": difference, "below": -difference}
+    return {entry.name: values[entry.name] for entry in _sides(relation, ())}
+
+
+def _related(relation: str, x: Signals) -> SX:
+    """The answer by the sides."""
+    if relation in ("==", "~="):
+        different = logic_or(x["above"], x["below"])
+        return logic_not(different) if relation == "==" else different
+    found = x["above"] if relation in (">", "<=") else x["below"]
+    return found if relation in (">", "<") else logic_not(found)

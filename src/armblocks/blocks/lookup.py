@@ -16,16 +16,20 @@ from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import (
     EXTRAPOLATIONS,
     METHODS,
+    borders,
     cells,
     contract,
     linear_weights,
     weights,
 )
+from armblocks.blocks.switching import JUST, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
+    Guard,
     Port,
     Shapes,
     Signals,
+    State,
     WorkedExample,
     broadcast,
     made,
@@ -84,6 +88,7 @@ class LookupTable1D(Block):
     table: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), doc="values there (n,)")
     method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
     extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
         rising("LookupTable1D", "positions", self.positions, *shape_of(self.table))
@@ -97,9 +102,57 @@ class LookupTable1D(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": inputs["u"]}
 
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("cell", inputs["u"], "how many borders are at or below u"),) if self._borders() else ()
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        if not self._borders():
+            return ()
+        up = Guard("up", inputs["u"], "u reaches the next border", 1)
+        return (up, Guard("down", inputs["u"], "u falls below the border", -1))
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        axes = [[float(value) for value in np.ravel(cast("Any", self.positions))]]
-        return {"y": _look_up([u["u"]], axes, p["table"], self.method, self.extrapolation)}
+        points, located = self._points(), bool(self._borders())
+
+        def value(position: SX, *cell: SX) -> SX:
+            found = weights(position, points, self.method, self.extrapolation, *cell)
+            return contract(p["table"], (len(points),), [found])
+
+        return {"y": by_element([u["u"], x["cell"]] if located else [u["u"]], value)}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        borders = self._borders()
+        if not borders:
+            return {}
+
+        def distance(cell: SX, position: SX, ends: list[float]) -> SX:
+            parts = (if_else(cell == float(k), position - end + JUST, 0.0) for k, end in enumerate(ends))
+            return sum(parts, SX(0.0))
+
+        # No border beyond the last: nothing is as far away as can be.
+        up, down = [*borders, math.inf], [-math.inf, *borders]
+        return {
+            "up": by_element([x["cell"], u["u"]], lambda cell, v: distance(cell, v, up)),
+            "down": by_element([x["cell"], u["u"]], lambda cell, v: distance(cell, v, down)),
+        }
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"cell": self._cell(u["u"])} if self._borders() else {}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        cell = self._cell(u["u"])
+        down = if_else(e["down"] < 0.0, fmin(cell, x["cell"] - 1.0), x["cell"])
+        return {"cell": if_else(e["up"] > 0.0, fmax(cell, x["cell"] + 1.0), down)}
+
+    def _points(self) -> list[float]:
+        return [float(value) for value in np.ravel(cast("Any", self.positions))]
+
+    def _borders(self) -> list[float]:
+        """Where an event happens."""
+        return borders(self._points(), self.method, self.extrapolation) if self.zero_crossing else []
+
+    def _cell(self, u: SX) -> SX:
+        return sum((u >= border for border in self._borders()), SX.zeros(*u.shape))
 
 
 @dataclass(frozen=True, kw_only=True)

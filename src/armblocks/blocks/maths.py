@@ -10,12 +10,14 @@ from math import pi
 from typing import ClassVar
 
 import casadi
-from casadi import SX, atan2, fmax, fmin, mtimes
+from casadi import SX, atan2, if_else, mtimes
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
+from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
+    Condition,
     ParameterKind,
     Port,
     Shapes,
@@ -347,6 +349,7 @@ class MinMax(Block):
 
     function: str = parameter("min", choices=("min", "max"), doc="which one")
     inputs: int = parameter(2, minimum=1, doc="how many inputs")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", self.inputs, "candidate")
@@ -360,5 +363,27 @@ class MinMax(Block):
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        doc = "1 where input {} is beyond all before it"
+        return located(
+            self, *(Condition(f"beyond{k}", shape, doc.format(k), closed=False) for k in self._later())
+        )
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        way = -1.0 if self.function == "min" else 1.0
+        values = list(u.values())
+        return {f"beyond{k}": way * (values[k - 1] - self._best(x, values, k - 1)) for k in self._later()}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": reduce(fmin if self.function == "min" else fmax, u.values())}
+        return {"y": self._best(x, list(u.values()), self.inputs)}
+
+    def _later(self) -> range:
+        return range(2, self.inputs + 1)
+
+    def _best(self, x: Signals, values: list[SX], count: int) -> SX:
+        """The best of the first ``count`` inputs, as the conditions tell."""
+        best = values[0]
+        for k in range(2, count + 1):
+            best = if_else(x[f"beyond{k}"], values[k - 1], best)
+        return best

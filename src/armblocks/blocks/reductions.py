@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -11,7 +12,8 @@ from typing import ClassVar
 from casadi import SX, dot, fabs, fmax, if_else, sqrt, vertcat
 
 from armblocks.blocks.example_signals import CIRCLING, THREE_PHASES
-from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.blocks.switching import located, zero_crossing_parameter
+from armblocks.diagram import Block, Condition, Port, Shapes, Signals, WorkedExample, made, parameter
 from armblocks.errors import InputError
 
 
@@ -81,6 +83,7 @@ class Extremum(Block):
     )
 
     function: str = parameter("min", choices=("min", "max"), doc="which one")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -94,12 +97,31 @@ class Extremum(Block):
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        count = math.prod(inputs["u"])
+        doc = "1 where element {} is beyond all before it"
+        return located(
+            self, *(Condition(f"beyond{k}", (), doc.format(k), closed=False) for k in range(2, count + 1))
+        )
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        way, values = -1.0 if self.function == "min" else 1.0, _elements(u["u"])
+        return {
+            f"beyond{k}": way * (values[k - 1] - self._best(x, values[: k - 1])[0])
+            for k in range(2, len(values) + 1)
+        }
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        best, index = u["u"][0], SX(1.0)
-        for k, value in enumerate(_elements(u["u"])[1:], 2):
-            better = value < best if self.function == "min" else value > best
-            best, index = if_else(better, value, best), if_else(better, float(k), index)
+        best, index = self._best(x, _elements(u["u"]))
         return {"y": best, "index": index}
+
+    def _best(self, x: Signals, values: list[SX]) -> tuple[SX, SX]:
+        """The best of some elements and its place, as the conditions tell."""
+        best, index = values[0], SX(1.0)
+        for k in range(2, len(values) + 1):
+            beyond = x[f"beyond{k}"]
+            best, index = if_else(beyond, values[k - 1], best), if_else(beyond, float(k), index)
+        return best, index
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,10 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports
 from armblocks.blocks.example_signals import THREE_PHASES
+from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
+    Condition,
     ParameterKind,
     Port,
     Shapes,
@@ -260,6 +262,7 @@ class MultiportSwitch(Block):
 
     inputs: int = parameter(3, minimum=1, doc="how many inputs there are to choose from")
     counting: str = parameter("one-based", choices=_COUNTING, doc="whether the first index is 1 or 0")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("index", "which input", shape=()), *numbered_ports("u", self.inputs, "candidate"))
@@ -273,11 +276,22 @@ class MultiportSwitch(Block):
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit({name: unit for name, unit in inputs.items() if name != "index"})}
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        doc = "1 where the index points at input {} or beyond"
+        return located(self, *(Condition(f"from{k}", (), doc.format(k)) for k in range(2, self.inputs + 1)))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        shift = 1.0 if self.counting == "zero-based" else 0.0
+        return {f"from{k}": u["index"] + shift - float(k) for k in range(2, self.inputs + 1)}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        index, *candidates = u.values()
+        _, *candidates = u.values()
         largest = reduce(lambda left, right: left if left.numel() > 1 else right, candidates)
         full = [value * SX.ones(*largest.shape) for value in candidates]
-        return {"y": choose(index, full, self.counting)}
+        chosen = full[0]
+        for k, value in enumerate(full[1:], 2):
+            chosen = if_else(x[f"from{k}"], value, chosen)
+        return {"y": chosen}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 from casadi import SX, if_else, logic_or
 
 from armblocks.diagram import (
     Block,
+    Condition,
     Signals,
     broadcast,
+    parameter,
     shape_of,
 )
 from armblocks.errors import InputError
 
 JUST = 1e-300
 """Beside a threshold by less than any signal can tell: it gives the threshold itself a side."""
+
+
+def zero_crossing_parameter() -> Any:
+    """Declare the parameter ``zero_crossing``, Simulink's "Enable zero-crossing detection"."""
+    return parameter(True, doc="whether the instants at which the block switches are located, as events")
+
+
+def located(block: Block, *conditions: Condition) -> tuple[Condition, ...]:
+    """Conditions of a block that has the parameter ``zero_crossing``."""
+    crossing = bool(block.parameter_value("zero_crossing"))
+    return tuple(dataclasses.replace(entry, located=crossing) for entry in conditions)
 
 
 def limits_in_order(block: Block, lower: str, upper: str) -> None:

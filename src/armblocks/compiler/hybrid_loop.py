@@ -190,19 +190,42 @@ class HybridLoop(Loop):
         w.place(on)
 
     def emit_settling(self, time: str) -> None:
-        """At the start, a reset without events: modes take the value that the signals ask for."""
+        """At the start, resets without events: modes take the values that the signals ask for.
+
+        A mode may move a signal on which another one depends, so this is repeated until nothing changes, at
+        most as often as there are guards.
+        """
         w, places = self.w, self.places
-        settle, on = w.fresh("settle"), w.fresh("on")
-        w.branch(w.compare("oeq", time, number_text(0.0)), settle, on)
+        settle, turn, on = w.fresh("settle"), w.fresh("turn"), w.fresh("on")
+        place = w.at("%counts", Count.SETTLE, "i64")
+        w.branch(w.word_test("ne", w.get(place, "i64"), "0"), settle, on)
         w.place(settle)
         w.put(time, self.instant)
-        self.emit_solve(self.instant, self.at(places.x))
         zero = number_text(0.0)
         w.for_each(self.guards, lambda i: w.put(zero, self.step.element(places.fired, i)))
+        w.put(str(self.guards), place, "i64")
+        w.jump(turn)
+        w.place(turn)
+        self.emit_solve(self.instant, self.at(places.x))
         arguments = (places.x, places.z, places.trial_w, places.fired, places.new_x, places.new_z)
         x, z, unknowns, e, new_x, new_z = (f"ptr {self.at(place)}" for place in arguments)
         w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
+        same = w.variable("double", number_text(1.0))
+
+        def compare(i: str) -> None:
+            old, new = (self.step.read(where, i) for where in (places.z, places.new_z))
+            w.put(w.select(w.compare("une", old, new), number_text(0.0), w.get(same)), same)
+
+        w.put(number_text(1.0), same)
+        w.for_each(self.sizes.discrete, compare)
         self.copy(places.new_z, places.z, self.sizes.discrete)
+        left = w.word_op("sub", w.get(place, "i64"), "1")
+        w.put(left, place, "i64")
+        again = w.both(w.compare("oeq", w.get(same), number_text(0.0)), w.word_test("sgt", left, "0"))
+        done = w.fresh("done")
+        w.branch(again, turn, done)
+        w.place(done)
+        w.put("0", place, "i64")
         w.jump(on)
         w.place(on)
 

@@ -79,7 +79,9 @@ class Count(IntEnum):
     """Looks in a row that did not."""
     WATCHING = 18
     """Whether the run wants to be told that it is stiff: it then pauses with ``STIFF`` at its limit."""
-    END = 19
+    SETTLE = 19
+    """Whether the modes are still to take the values that the signals ask for: at the start."""
+    END = 20
 
 
 class Stage(IntEnum):

@@ -230,6 +230,7 @@ class Integration:
         self._vector(places.w, sizes.algebraic)[:] = start.w
         self.counts[Count.STARTED] = Stage.INSTANT if sizes.hybrid else Stage.START
         self.counts[Count.FRESH] = 1
+        self.counts[Count.SETTLE] = 1
         for clock, (period, offset) in enumerate(sizes.clocks):
             number = 0 if first else max(0, int((start.time - offset) / period) - 1)
             while not first and number * period + offset <= start.time * SAME_INSTANT:

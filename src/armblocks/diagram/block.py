@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from casadi import SX
 
 from armblocks.diagram.parameter import Parameter, Value
-from armblocks.diagram.port import Guard, Port, State, View
+from armblocks.diagram.port import Condition, Guard, Port, State, View
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 
@@ -40,6 +40,10 @@ class Block(ABC):
     so that the flow is smooth; ``guards`` say where an event happens, ``resets`` what it changes, and
     ``mode_values`` what a mode has to be by the values of the moment (at the start, and within a sampled
     part of a diagram, which only looks at its ticks).
+
+    Where a mode is no more than whether some quantity is positive, the block states *conditions* instead:
+    ``condition_values`` gives the quantity, the equations find 1 or 0 as ``x[name]``, and mode, guard and
+    reset follow. A block that only sampled blocks and constants feed asks its conditions directly.
 
     The first line of a subclass's docstring says in one sentence what the block does, with its equation.
     """
@@ -130,6 +134,10 @@ class Block(ABC):
         """Quantities at whose zeros an event happens."""
         return ()
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        """What the equations ask of the values, in an order in which each may depend on those before it."""
+        return ()
+
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of those outputs whose port does not state one, given the shapes of all inputs.
 
@@ -180,6 +188,10 @@ class Block(ABC):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         """Value of every guard."""
+        return {}
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """The quantity of every condition: the answer is 1 where it is positive."""
         return {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

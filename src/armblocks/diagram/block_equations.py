@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property, lru_cache
 
-from casadi import SX, Function, densify, jtimes, vertcat
+from casadi import SX, Function, densify, if_else, jtimes, substitute, vertcat
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.parameter import shape_of
-from armblocks.diagram.port import Guard, State
+from armblocks.diagram.port import Condition, Guard, State
 from armblocks.equations import Shape, Slot, flatten, unflatten
 from armblocks.errors import DiagramError
 
@@ -143,7 +143,7 @@ def block_equations(
             ),
             input_shapes=tuple(input_shapes.items()),
             period=period if block.sampled else 0.0,
-            settled=settled and bool(block.modes(input_shapes)),
+            settled=settled and bool(block.modes(input_shapes) or block.conditions(input_shapes)),
             block=block,
         )
     )
@@ -180,8 +180,13 @@ def spread(value: SX, shape: Shape) -> SX:
 def _trace(structure: _Structure) -> BlockEquations:
     block = structure.block
     shapes = dict(structure.input_shapes)
-    states, discrete, modes = block.states(shapes), block.discrete_states(shapes), block.modes(shapes)
-    guards = block.guards(shapes)
+    states, discrete = block.states(shapes), block.discrete_states(shapes)
+    conditions = block.conditions(shapes)
+    # Those whose change is an event are modes; all others are asked where they are needed.
+    located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
+    asked = tuple(entry for entry in conditions if entry not in located)
+    modes = (*block.modes(shapes), *(State(entry.name, entry.shape, entry.doc) for entry in located))
+    guards = (*block.guards(shapes), *(Guard(entry.name, entry.shape, entry.doc) for entry in located))
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
         "z": [Slot(state.name, state.shape) for state in (*discrete, *modes)],
@@ -196,13 +201,18 @@ def _trace(structure: _Structure) -> BlockEquations:
     if block.sampled:
         p["T"] = SX(structure.period)
     x.update(z)
+    x.update(_answers(block, asked, t, x, u, p))
     if structure.settled:
         x.update(block.mode_values(t, x, u, p))
+    quantities = {entry.name: block.condition_values(t, x, u, p)[entry.name] for entry in located}
 
     output_shapes = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
     output_shapes.update(block.output_shapes(shapes))
     state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
-    resets = block.resets(t, x, u, p, e) if guards else dict[str, SX]()
+    resets = dict(block.resets(t, x, u, p, e)) if block.guards(shapes) else dict[str, SX]()
+    resets |= {
+        entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
+    }
     sought: dict[SlotKind, dict[str, Shape]] = {
         SlotKind.OUTPUT: {
             port.name: output_shapes[port.name]
@@ -221,8 +231,14 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.DERIVATIVE: block.derivatives(t, x, u, p),
         SlotKind.RECORD: block.records(t, x, u, p),
         SlotKind.UPDATE: block.updates(t, x, u, p),
-        SlotKind.GUARD: block.guard_values(t, x, u, p),
-        SlotKind.MODE: block.mode_values(t, x, u, p),
+        SlotKind.GUARD: {
+            **block.guard_values(t, x, u, p),
+            **{entry.name: _sided(quantities[entry.name], entry.closed) for entry in located},
+        },
+        SlotKind.MODE: {
+            **block.mode_values(t, x, u, p),
+            **{entry.name: _positive(quantities[entry.name], entry.closed) for entry in located},
+        },
         SlotKind.RESET: resets,
     }
     for kind, values in found.items():
@@ -233,6 +249,32 @@ def _trace(structure: _Structure) -> BlockEquations:
     return BlockEquations(
         states=states, discrete=(*discrete, *modes), modes=modes, guards=guards, groups=groups
     )
+
+
+def _positive(quantity: SX, closed: bool) -> SX:
+    return quantity >= 0.0 if closed else quantity > 0.0
+
+
+def _sided(quantity: SX, closed: bool) -> SX:
+    """The quantity with a side for its zero: moved by less than any signal can tell."""
+    return quantity + 1e-300 if closed else quantity - 1e-300
+
+
+def _answers(block: Block, asked: Sequence[Condition], t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+    """Conditions by the values of the moment, each put into those after it."""
+    unknown = {
+        entry.name: unflatten(SX.sym(entry.name, Slot(entry.name, entry.shape).size), entry.shape)
+        for entry in asked
+    }
+    quantities = block.condition_values(t, {**x, **unknown}, u, p) if asked else {}
+    found: dict[str, SX] = {}
+    for entry in asked:
+        quantity = SX(quantities[entry.name])
+        for name, value in found.items():
+            quantity = substitute(quantity, unknown[name], value)
+        answer = densify(SX(_positive(quantity, entry.closed)))
+        found[entry.name] = unflatten(spread(answer, entry.shape), entry.shape)
+    return found
 
 
 def _grouped(

@@ -45,6 +45,21 @@ class Guard:
     direction: int = 0
 
 
+@dataclass(frozen=True)
+class Condition:
+    """A yes or no that a block asks of its values, by element: 1 where a quantity is positive, else 0.
+
+    ``closed``: whether 0 itself counts as positive. ``located``: whether the instant at which the answer
+    changes is an event; if not, the answer follows the values at which the equations happen to be evaluated.
+    """
+
+    name: str
+    shape: Shape
+    doc: str
+    closed: bool = True
+    located: bool = True
+
+
 @dataclass(frozen=True, order=True)
 class PortRef:
     """A port of a named block, written ``block/port``."""

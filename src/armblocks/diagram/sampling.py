@@ -108,6 +108,24 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
     return Sampling(clocks, {name: clocks.index(clock) for name, clock in found.items()})
 
 
+def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> frozenset[str]:
+    """The blocks whose inputs may change between instants: fed by the time, a state or an event.
+
+    What only sampled blocks and constants feed changes at instants alone.
+    """
+    forward = {name: list[str]() for name in diagram.blocks}
+    for wire in diagram.connections:
+        forward[wire.source.block].append(wire.target.block)
+    found: set[str] = set()
+    queue = deque(name for name, own in equations.items() if _flows(diagram.blocks[name], own))
+    while queue:
+        for entry in forward[queue.popleft()]:
+            if entry not in found and not diagram.blocks[entry].sampled:
+                found.add(entry)
+                queue.append(entry)
+    return frozenset(found)
+
+
 def _flows(block: Block, equations: BlockEquations) -> bool:
     """Whether the outputs of a block move by themselves: with the time or with a continuous state."""
     return bool(equations.states) or any(group.timed for group in equations.groups)

@@ -26,7 +26,7 @@ from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.ordering import HELD, Evaluation, Network, Node, Value, evaluation_order
 from armblocks.diagram.port import Guard, PortRef
-from armblocks.diagram.sampling import Sampling, resolve_sampling
+from armblocks.diagram.sampling import Sampling, moving_blocks, resolve_sampling
 from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
 from armblocks.diagram.structure import Outport
 from armblocks.diagram.units import infer_units
@@ -61,6 +61,11 @@ def diagram_model(diagram: Diagram) -> Model:
     free = {name: block for name, block in diagram.blocks.items() if not block.sampled}
     equations = {name: _equations(name, block, shapes) for name, block in free.items()}
     sampling = resolve_sampling(diagram, equations)
+    moving = moving_blocks(diagram, equations)
+    for name, block in free.items():
+        # Nothing to locate where the answers change at instants only.
+        if name not in moving and block.conditions(shapes.inputs[name]) and not equations[name].states:
+            equations[name] = _equations(name, block, shapes, settled=not block.modes(shapes.inputs[name]))
     for name, clock in sampling.clock_of.items():
         period = sampling.clocks[clock].period
         equations[name] = _equations(name, diagram.blocks[name], shapes, period=period)

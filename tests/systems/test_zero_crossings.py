@@ -1,0 +1,335 @@
+"""Blocks that switch by their values: the instants are found exactly, by fixed and adaptive steps alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from stepwise_reference import run_reference
+
+from armblocks.blocks import (
+    Abs,
+    Clock,
+    CompareToConstant,
+    CompareToZero,
+    Constant,
+    Derivative,
+    Extremum,
+    Gain,
+    Integrator,
+    IntervalTest,
+    JointStops,
+    LookupTable1D,
+    MinMax,
+    MotorDrive,
+    MultiportSwitch,
+    Mux,
+    RelationalOperator,
+    Rounding,
+    Sign,
+    SineWave,
+    Sqrt,
+    Sum,
+    Switch,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.compiler.system import compile_system
+from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
+from armblocks.equations import SimulationOptions
+from armblocks.simulation import SimulationResult, simulate
+
+Run = Callable[[Diagram, float], dict[str, np.ndarray]]
+SAMPLES = 100
+
+
+def result_of(
+    diagram: Diagram, stop: float, solver: str = "rk45", step: float | None = None
+) -> SimulationResult:
+    options = SimulationOptions(
+        stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
+    )
+    return simulate(compile_system(trace_diagram(diagram)), options)
+
+
+def native(solver: str, step: float | None = None) -> Run:
+    def run(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+        result = result_of(diagram, stop, solver, step)
+        return {name: result[name] for name in result.names} | {"t": result.time}
+
+    return run
+
+
+def by_reference(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+    times = np.arange(SAMPLES + 1) * (stop / SAMPLES)
+    return run_reference(diagram, times.tolist(), step=stop / SAMPLES / 3) | {"t": times}
+
+
+RUNS = {"adaptive": native("rk45"), "fixed": native("rk4", 0.01), "reference": by_reference}
+
+
+@pytest.fixture(params=RUNS.values(), ids=RUNS)
+def run(request: pytest.FixtureRequest) -> Run:
+    return request.param
+
+
+def behind(block: Block, *sources: Block) -> Diagram:
+    """A block behind sources, with the integral of its first output, which tells when it switched."""
+    builder = DiagramBuilder("d")
+    fed = [builder.add(f"source{k}", source) for k, source in enumerate(sources)]
+    out = builder.add("block", block, *fed)[block.output_ports()[0].name]
+    builder.add("integral", Integrator(), out)
+    return builder.build()
+
+
+def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
+    # rtol 1e-10 over a few hundred steps; RK4 of 0.01 on sines: h^4/120 = 1e-10
+    assert found == pytest.approx(expected, abs=tolerance)
+
+
+def time_above(level: float, t: np.ndarray) -> np.ndarray:
+    """How long sin has exceeded ``level`` by the time t, from its arcs."""
+    first, last = math.asin(level), math.pi - math.asin(level)
+    rounds = np.floor(t / (2 * math.pi))
+    rest = t - 2 * math.pi * rounds
+    start = -(2 * math.pi - last) if level < 0 else first
+    begins, ends = (first, last) if level >= 0 else (start, last)
+    within = np.clip(rest, max(begins, 0.0), ends) - max(begins, 0.0)
+    if level < 0:
+        within = within + np.clip(rest - (2 * math.pi + first), 0.0, None)
+    return rounds * (last - first) + within
+
+
+def test_the_absolute_value_of_a_sine(run: Run) -> None:
+    found = run(behind(Abs(), SineWave(amplitude=2.0)), 10.0)
+    whole = np.floor(found["t"] / math.pi)
+    close(found["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(found["t"] - math.pi * whole)))
+
+
+def test_the_derivative_of_an_absolute_value_is_smooth_between_events(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    absolute = builder.add("abs", Abs(), builder.add("sine", SineWave()))
+    builder.add("integral", Integrator(), builder.add("rate", Derivative(), absolute))
+    found = run(builder.build(), 10.0)
+    close(found["integral/y"], np.abs(np.sin(found["t"])))
+
+
+@pytest.mark.parametrize("level", [0.3, -0.6])
+def test_a_comparison_is_true_for_as_long_as_it_should(level: float, run: Run) -> None:
+    for relation, part in ((">", 1.0), (">=", 1.0), ("<", 0.0), ("<=", 0.0), ("==", None), ("~=", 2.0)):
+        found = run(behind(CompareToConstant(relation=relation, constant=level), SineWave()), 10.0)
+        above, t = time_above(level, found["t"]), found["t"]
+        expected = {1.0: above, 0.0: t - above, None: 0.0 * t, 2.0: t}[part]
+        close(found["integral/y"], expected, 1e-9)
+
+
+def test_equal_signals_are_equal_until_one_moves(run: Run) -> None:
+    """max(t, 1) equals 1 up to t = 1."""
+    builder = DiagramBuilder("d")
+    one = builder.add("one", Constant(value=1.0))
+    most = builder.add("most", MinMax(function="max"), builder.add("clock", Clock()), one)
+    builder.add("integral", Integrator(), builder.add("equal", RelationalOperator(relation="=="), most, one))
+    found = run(builder.build(), 2.0)
+    close(found["integral/y"], np.minimum(found["t"], 1.0), 1e-12)
+
+
+def test_a_sign_and_an_interval(run: Run) -> None:
+    found = run(behind(Sign(), SineWave()), 10.0)
+    triangle = math.pi / 2 - np.abs(np.mod(found["t"], 2 * math.pi) - math.pi) + math.pi / 2
+    close(found["integral/y"], triangle, 1e-9)
+    found = run(behind(IntervalTest(lower=-0.6, upper=0.3), SineWave()), 10.0)
+    close(found["integral/y"], time_above(-0.6, found["t"]) - time_above(0.3, found["t"]), 1e-9)
+
+
+def test_the_greater_of_sine_and_cosine(run: Run) -> None:
+    cosine = SineWave(phase=math.pi / 2)
+    found = run(behind(MinMax(function="max"), SineWave(), cosine), 10.0)
+
+    def integral(t: float) -> float:
+        edges = [0.0, *[e for e in (math.pi / 4, 5 * math.pi / 4, 9 * math.pi / 4) if e < t], t]
+        total = 0.0
+        for k, (a, b) in enumerate(zip(edges, edges[1:])):
+            total += math.sin(b) - math.sin(a) if k % 2 == 0 else math.cos(a) - math.cos(b)
+        return total
+
+    close(found["integral/y"], np.array([integral(t) for t in found["t"]]))
+
+
+def test_the_place_of_the_greatest_element(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    parts = [builder.add(f"s{k}", SineWave(phase=-k * 2 * math.pi / 3)) for k in range(3)]
+    three = builder.add("three", Mux(inputs=3), *parts)
+    greatest = builder.add("greatest", Extremum(function="max"), three)
+    builder.add("integral", Integrator(), greatest["index"])
+    found = run(builder.build(), 2 * math.pi)
+    # element 1 leads around pi/2, 2 around 7 pi/6, 3 around 11 pi/6, each for a third of the turn
+    t, third = found["t"], 2 * math.pi / 3
+    first = math.pi / 6
+    expected = (
+        3 * np.minimum(t, first) + np.clip(t - first, 0, third) + 2 * np.clip(t - first - third, 0, third)
+    )
+    close(found["integral/y"], expected + 3 * np.clip(t - first - 2 * third, 0, None), 1e-9)
+
+
+def test_an_index_that_grows_throws_the_switch(run: Run) -> None:
+    values = [Constant(value=float(value)) for value in (5.0, -1.0, 2.0)]
+    found = run(behind(MultiportSwitch(), Clock(), *values), 5.0)
+    t = found["t"]
+    close(
+        found["integral/y"], 5 * np.minimum(t, 2) - np.clip(t - 2, 0, 1) + 2 * np.clip(t - 3, 0, None), 1e-11
+    )
+
+
+@pytest.mark.parametrize("function", ["floor", "ceil", "round", "fix"])
+def test_roundings_of_a_sine(function: str, run: Run) -> None:
+    """The integral of a sum of comparisons, each of which is known."""
+    found = run(behind(Rounding(function=function), SineWave(amplitude=2.5)), 10.0)
+    t = found["t"]
+
+    def above(level: float) -> np.ndarray:
+        return time_above(level / 2.5, t)
+
+    def below(level: float) -> np.ndarray:
+        return t - above(level)
+
+    expected = {
+        "floor": above(1) + above(2) - below(0) - below(-1) - below(-2),
+        "ceil": above(0) + above(1) + above(2) - below(-1) - below(-2),
+        "round": above(0.5) + above(1.5) + (above(2.5 - 1e-15) * 0) - below(-0.5) - below(-1.5),
+        "fix": above(1) + above(2) - below(-1) - below(-2),
+    }[function]
+    if function == "round":
+        # 2.5 is reached at single instants only
+        expected = expected + 0.0
+    close(found["integral/y"], expected, 2e-9)
+
+
+@pytest.mark.parametrize("method", ["linear", "nearest", "flat"])
+@pytest.mark.parametrize("extrapolation", ["clip", "linear"])
+def test_the_kinks_and_steps_of_a_table(method: str, extrapolation: str, run: Run) -> None:
+    """A ramp from -1 through the table -> its antiderivative, piece by piece."""
+    points, values = [0.0, 1.0, 1.5, 3.0], [1.0, -1.0, 2.0, 2.5]
+    table = LookupTable1D(positions=points, table=values, method=method, extrapolation=extrapolation)
+    builder = DiagramBuilder("d")
+    shifted = builder.add(
+        "u", Sum(signs="+-"), builder.add("t", Clock()), builder.add("one", Constant(value=1.0))
+    )
+    builder.add("integral", Integrator(), builder.add("block", table, shifted))
+    found = run(builder.build(), 5.0)
+
+    def curve(u: float) -> float:
+        if method == "flat":
+            return values[max(int(np.searchsorted(points, u, side="right")) - 1, 0)]
+        if method == "nearest":
+            return values[int(np.searchsorted([0.5, 1.25, 2.25], u, side="right"))]
+        if extrapolation == "linear" and u < 0.0:
+            return 1.0 - 2.0 * u
+        if extrapolation == "linear" and u > 3.0:
+            return 2.5 + (u - 3.0) / 3.0
+        return float(np.interp(u, points, values))
+
+    borders = [-1.0, 0.0, 0.5, 1.0, 1.25, 1.5, 2.25, 3.0, 4.0]
+
+    def integral(end: float) -> float:
+        total, nodes = 0.0, [b for b in borders if b < end] + [end]
+        for a, b in zip(nodes, nodes[1:]):
+            m = (a + b) / 2  # each piece is a line
+            total += (b - a) * curve(m)
+        return total
+
+    close(found["integral/y"], np.array([integral(t - 1.0) for t in found["t"]]), 1e-10)
+
+
+def test_the_limits_of_a_drive(run: Run) -> None:
+    """Wanted 15, peak 10, line 20 (1 - w/100) with w = 20 t: 10 up to t = 2.5, then falling, -10 from 7.5."""
+    builder = DiagramBuilder("d")
+    speed = builder.add("w", Gain(gain=20.0), builder.add("t", Clock()))
+    drive = builder.add("drive", MotorDrive(), builder.add("wanted", Constant(value=15.0)), speed)
+    builder.add("integral", Integrator(), drive)
+    found = run(builder.build(), 9.0)
+    t = found["t"]
+    falling = np.clip(t, 2.5, 7.5) - 2.5
+    close(
+        found["integral/y"],
+        10 * np.minimum(t, 2.5) + 10 * falling - 2 * falling**2 - 10 * np.clip(t - 7.5, 0, None),
+        1e-10,
+    )
+
+
+def test_a_mass_between_stops(run: Run) -> None:
+    """Against an elastic stop without damping: half a period of the spring, then back with the same speed."""
+    builder = DiagramBuilder("d")
+    stops = JointStops(lower=-1.0, upper=1.0, stiffness=100.0, damping=0.0)
+    q = builder.add("q", Integrator(initial=0.0))
+    qd = builder.add("qd", Integrator(initial=1.0))
+    builder.connect(qd, q["u"])
+    builder.connect(builder.add("stops", stops, q, qd), qd["u"])
+    found = run(builder.build(), 4.0)
+    t, half = found["t"], math.pi / 10
+    inside = 1.0 + np.sin(10 * (t - 1.0)) / 10
+    back = 1.0 - (t - 1.0 - half)
+    final = -1.0 - np.sin(10 * (t - 3.0 - half)) / 10
+    expected = np.select([t < 1, t < 1 + half, t < 3 + half], [t, inside, back], final)
+    close(found["q/y"], expected, 2e-8)
+
+
+def test_modes_settle_through_a_chain(run: Run) -> None:
+    """Each answer depends on the one before: |-2| = 2, 2 > 1, so the switch gives 7."""
+    builder = DiagramBuilder("d")
+    size = builder.add("size", Abs(), builder.add("u", Constant(value=-2.0)))
+    slowly = builder.add("moved", Sum(signs="++"), size, builder.add("t", Clock()))
+    large = builder.add("large", CompareToConstant(relation=">", constant=1.0), slowly)
+    seven, one = builder.add("seven", Constant(value=7.0)), builder.add("one", Constant(value=1.0))
+    out = builder.add("out", Switch(threshold=0.5), seven, large, one)
+    builder.add("integral", Integrator(), builder.add("sign", Sign(), builder.add("abs", Abs(), out)))
+    found = run(builder.build(), 1.0)
+    assert found["out/y"].tolist() == [7.0] * (SAMPLES + 1)
+    close(found["integral/y"], found["t"], 1e-12)
+
+
+def test_a_root_behind_an_absolute_value_meets_no_negative_number(run: Run) -> None:
+    """x' = -sign(x) sqrt|x| style flow: sqrt(abs(sin)) is never asked for a root of less than nothing."""
+    builder = DiagramBuilder("d")
+    root = builder.add("root", Sqrt(), builder.add("abs", Abs(), builder.add("sine", SineWave())))
+    builder.add("integral", Integrator(), root)
+    found = run(builder.build(), 4.0)
+    assert np.isfinite(found["integral/y"]).all()
+    # Beta function: the integral of sqrt(sin) over half a turn; the root's slope is infinite at the ends
+    half = math.gamma(0.75) * math.sqrt(math.pi) / math.gamma(1.25)
+    at = np.searchsorted(found["t"], math.pi)
+    assert found["integral/y"][at] == pytest.approx(half, abs=5e-3)
+
+
+def test_without_zero_crossings_there_are_no_events() -> None:
+    plain = result_of(behind(Abs(zero_crossing=False), SineWave()), 10.0)
+    assert plain.run.events == 0
+    assert result_of(behind(Abs(), SineWave()), 10.0).run.events == 3
+    assert plain["integral/y"] == pytest.approx(
+        result_of(behind(Abs(), SineWave()), 10.0)["integral/y"], abs=1e-6
+    )
+
+
+def test_what_only_changes_at_ticks_needs_no_events() -> None:
+    builder = DiagramBuilder("d")
+    held = builder.add("held", ZeroOrderHold(sample_time=0.1), builder.add("sine", SineWave()))
+    positive = builder.add("positive", CompareToZero(relation=">"), builder.add("abs", Abs(), held))
+    builder.add("integral", Integrator(), positive)
+    builder.add("delayed", UnitDelay(sample_time=0.1), positive)
+    result = result_of(builder.build(), 10.0)
+    assert result.run.events == 0
+    assert result["integral/y"][-1] == pytest.approx(9.9, abs=1e-9)
+
+
+def test_an_event_at_a_recorded_instant_shows_the_new_value(run: Run) -> None:
+    """t reaches 0.5, 1 and 1.5 exactly at samples: signals are right-continuous there."""
+    builder = DiagramBuilder("d")
+    t = builder.add("t", Clock())
+    for k, level in enumerate((0.5, 1.0, 1.5)):
+        builder.add(f"c{k}", CompareToConstant(relation=">=", constant=level), t)
+    builder.add("whole", Rounding(), t)
+    found = run(builder.build(), 2.0)
+    for k, level in enumerate((0.5, 1.0, 1.5)):
+        assert found[f"c{k}/y"].tolist() == (found["t"] >= level).tolist()
+    assert found["whole/y"].tolist() == np.floor(found["t"]).tolist()
