@@ -128,7 +128,8 @@ class Reference:
             if instant in ticks:
                 (self.z,) = self.call("update", t, self.x, ticks[instant])
             if instant == 0:
-                _, self.z = self.call("reset", t, self.x, np.zeros(self.directions.size))
+                for _ in range(self.directions.size + 1):  # a mode may depend on another one
+                    _, self.z = self.call("reset", t, self.x, np.zeros(self.directions.size))
                 self.note_signs(t)
             else:
                 self.handle_events(t)

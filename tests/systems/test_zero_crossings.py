@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from armblocks.blocks import (
     MotorDrive,
     MultiportSwitch,
     Mux,
+    Product,
     RelationalOperator,
     Rounding,
     Sign,
@@ -105,7 +107,7 @@ def time_above(level: float, t: np.ndarray) -> np.ndarray:
 def test_the_absolute_value_of_a_sine(run: Run) -> None:
     found = run(behind(Abs(), SineWave(amplitude=2.0)), 10.0)
     whole = np.floor(found["t"] / math.pi)
-    close(found["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(found["t"] - math.pi * whole)))
+    close(found["integral/y"], 4.0 * whole + 2.0 * (1.0 - np.cos(found["t"] - math.pi * whole)), 2e-8)
 
 
 def test_the_derivative_of_an_absolute_value_is_smooth_between_events(run: Run) -> None:
@@ -150,7 +152,7 @@ def test_the_greater_of_sine_and_cosine(run: Run) -> None:
     def integral(t: float) -> float:
         edges = [0.0, *[e for e in (math.pi / 4, 5 * math.pi / 4, 9 * math.pi / 4) if e < t], t]
         total = 0.0
-        for k, (a, b) in enumerate(zip(edges, edges[1:])):
+        for k, (a, b) in enumerate(pairwise(edges)):
             total += math.sin(b) - math.sin(a) if k % 2 == 0 else math.cos(a) - math.cos(b)
         return total
 
@@ -197,12 +199,9 @@ def test_roundings_of_a_sine(function: str, run: Run) -> None:
     expected = {
         "floor": above(1) + above(2) - below(0) - below(-1) - below(-2),
         "ceil": above(0) + above(1) + above(2) - below(-1) - below(-2),
-        "round": above(0.5) + above(1.5) + (above(2.5 - 1e-15) * 0) - below(-0.5) - below(-1.5),
+        "round": above(0.5) + above(1.5) - below(-0.5) - below(-1.5),
         "fix": above(1) + above(2) - below(-1) - below(-2),
     }[function]
-    if function == "round":
-        # 2.5 is reached at single instants only
-        expected = expected + 0.0
     close(found["integral/y"], expected, 2e-9)
 
 
@@ -234,7 +233,7 @@ def test_the_kinks_and_steps_of_a_table(method: str, extrapolation: str, run: Ru
 
     def integral(end: float) -> float:
         total, nodes = 0.0, [b for b in borders if b < end] + [end]
-        for a, b in zip(nodes, nodes[1:]):
+        for a, b in pairwise(nodes):
             m = (a + b) / 2  # each piece is a line
             total += (b - a) * curve(m)
         return total
@@ -266,13 +265,14 @@ def test_a_mass_between_stops(run: Run) -> None:
     qd = builder.add("qd", Integrator(initial=1.0))
     builder.connect(qd, q["u"])
     builder.connect(builder.add("stops", stops, q, qd), qd["u"])
-    found = run(builder.build(), 4.0)
+    found = run(builder.build(), 3.6)
     t, half = found["t"], math.pi / 10
     inside = 1.0 + np.sin(10 * (t - 1.0)) / 10
     back = 1.0 - (t - 1.0 - half)
     final = -1.0 - np.sin(10 * (t - 3.0 - half)) / 10
     expected = np.select([t < 1, t < 1 + half, t < 3 + half], [t, inside, back], final)
-    close(found["q/y"], expected, 2e-8)
+    # RK4 of 0.01 on a spring of 10 rad/s: (0.1)^4 / 120 of an amplitude of 0.1, a radian or six
+    close(found["q/y"], expected, 2e-6)
 
 
 def test_modes_settle_through_a_chain(run: Run) -> None:
@@ -289,8 +289,9 @@ def test_modes_settle_through_a_chain(run: Run) -> None:
     close(found["integral/y"], found["t"], 1e-12)
 
 
-def test_a_root_behind_an_absolute_value_meets_no_negative_number(run: Run) -> None:
-    """x' = -sign(x) sqrt|x| style flow: sqrt(abs(sin)) is never asked for a root of less than nothing."""
+@pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
+def test_a_root_behind_an_absolute_value_goes_past_its_zero(run: Run) -> None:
+    """With the mode as it is, a step past the zero asks for roots of negative numbers: it is cut short."""
     builder = DiagramBuilder("d")
     root = builder.add("root", Sqrt(), builder.add("abs", Abs(), builder.add("sine", SineWave())))
     builder.add("integral", Integrator(), root)
@@ -333,3 +334,31 @@ def test_an_event_at_a_recorded_instant_shows_the_new_value(run: Run) -> None:
     for k, level in enumerate((0.5, 1.0, 1.5)):
         assert found[f"c{k}/y"].tolist() == (found["t"] >= level).tolist()
     assert found["whole/y"].tolist() == np.floor(found["t"]).tolist()
+
+
+@pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
+def test_a_tank_that_empties_through_a_hole(run: Run) -> None:
+    """Torricelli: h' = -2 sqrt(h) from 1 is (1 - t)^2 up to t = 1, and then the tank stays empty."""
+    builder = DiagramBuilder("d")
+    level = builder.add("level", Integrator(initial=1.0))
+    zero = builder.add("zero", Constant(value=0.0))
+    positive = builder.add("positive", MinMax(function="max"), level, zero)
+    builder.connect(builder.add("out", Gain(gain=-2.0), builder.add("root", Sqrt(), positive)), level["u"])
+    found = run(builder.build(), 2.0)
+    # the root's slope grows without bound towards the end
+    close(found["level/y"], np.clip(1.0 - found["t"], 0.0, None) ** 2, 1e-5)
+
+
+def test_a_dip_that_is_over_within_a_step_is_seen() -> None:
+    """A parabola that is below its level for 0.02 s only, without states that would hold the steps short."""
+    for centre, width in ((3.3, 0.01), (7.77, 0.03), (9.1, 0.1)):
+        builder = DiagramBuilder("d")
+        t = builder.add("t", Clock())
+        shifted = builder.add("s", Sum(signs="+-"), t, builder.add("c", Constant(value=centre)))
+        square = builder.add("square", Product(), shifted, shifted)
+        low = builder.add("low", CompareToConstant(relation="<", constant=width**2), square)
+        builder.add("integral", Integrator(), low)
+        for solver, step in (("rk45", None), ("rk4", 0.5)):
+            result = result_of(builder.build(), 10.0, solver, step)
+            assert result["integral/y"][-1] == pytest.approx(2 * width, abs=1e-9)
+            assert result.run.events == 2

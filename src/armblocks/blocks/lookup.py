@@ -125,16 +125,17 @@ class LookupTable1D(Block):
         if not borders:
             return {}
 
-        def distance(cell: SX, position: SX, ends: list[float]) -> SX:
-            parts = (if_else(cell == float(k), position - end + JUST, 0.0) for k, end in enumerate(ends))
-            return sum(parts, SX(0.0))
+        def distance(ends: list[float]) -> Callable[..., SX]:
+            def beyond(cell: SX, position: SX) -> SX:
+                parts = (if_else(cell == float(k), position - end + JUST, 0.0) for k, end in enumerate(ends))
+                return sum(parts, SX(0.0))
+
+            return beyond
 
         # No border beyond the last: nothing is as far away as can be.
-        up, down = [*borders, math.inf], [-math.inf, *borders]
-        return {
-            "up": by_element([x["cell"], u["u"]], lambda cell, v: distance(cell, v, up)),
-            "down": by_element([x["cell"], u["u"]], lambda cell, v: distance(cell, v, down)),
-        }
+        up, down = distance([*borders, math.inf]), distance([-math.inf, *borders])
+        place = [x["cell"], u["u"]]
+        return {"up": by_element(place, up), "down": by_element(place, down)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"cell": self._cell(u["u"])} if self._borders() else {}

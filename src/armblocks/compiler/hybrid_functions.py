@@ -24,7 +24,8 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
     ``i64 watch(ptr t, ptr x, ptr reals, ptr p)`` evaluates the guards with ``trial_w`` and marks in ``fired``
     which ones fire and whether upwards; it gives their count. ``void take_signs(ptr reals, i1 only_fired)``
     notes the sides on which guards are. ``double note_events(double t, ptr reals, ptr counts)`` counts those
-    that fired and gives a bound for the next step, negative where there are too many events.
+    that fired and gives a bound for the next step, negative where there are too many events. ``i64 dips(ptr
+    reals)`` counts the guards that may have been at zero between their three last values.
     """
     if sizes.algebraic:
         emit_solve(module, workspace, sizes.algebraic)
@@ -33,6 +34,7 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
         module.define("watch", writer.watch)
         module.define("take_signs", writer.take_signs)
         module.define("note_events", writer.note_events)
+        module.define("dips", writer.dips)
 
 
 class _GuardFunctions:
@@ -74,6 +76,35 @@ class _GuardFunctions:
         w.for_each(self.count, look)
         w.do(f"ret i64 {w.get(total, 'i64')}")
         return w.text("define internal i64 @watch(ptr %t, ptr %x, ptr %reals, ptr %p)")
+
+    def dips(self) -> str:
+        """Where the parabola through three values of one sign has its extremum between them, near zero.
+
+        With A, M, B the values at the beginning, in the middle and at the end, as distances from zero, it is
+        M + (B - A) s / 2 + C s^2 / 2, C = A - 2 M + B, for s from -1 to 1.
+        """
+        w, places = Routine(self.module), self.places
+        total = w.variable("i64", "0")
+
+        def look(i: str) -> None:
+            side = w.get(self.element(w, places.signs, i))
+            A, M, B = (
+                w.multiply(side, w.get(self.element(w, place, i)))
+                for place in (places.guards_before, places.guards_middle, places.guards)
+            )
+            rise = w.subtract(B, A)
+            bend = w.add(w.subtract(A, M), w.subtract(B, M))
+            inside = w.compare("olt", w.absolute(rise), w.multiply(number_text(1.98), bend))
+            # least = M - rise^2 / (8 bend), doubtful by a quarter of the bend
+            eight = w.multiply(number_text(8.0), bend)
+            least = w.fma(eight, M, w.multiply(number_text(-1.0), w.multiply(rise, rise)))
+            near = w.compare("olt", least, w.multiply(w.multiply(number_text(0.25), bend), eight))
+            dips = w.both(inside, near)
+            w.put(w.word_op("add", w.get(total, "i64"), w.let(f"zext i1 {dips} to i64")), total, "i64")
+
+        w.for_each(self.count, look)
+        w.do(f"ret i64 {w.get(total, 'i64')}")
+        return w.text("define internal i64 @dips(ptr %reals)")
 
     def take_signs(self) -> str:
         w, places = Routine(self.module), self.places

@@ -30,6 +30,8 @@ from armblocks.compiler.runge_kutta import Loop
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
 """Two times within these factors of one another are the same instant."""
+FINEST = 2.0**-12
+"""Guards are looked at no closer than this part of a step."""
 
 
 class HybridLoop(Loop):
@@ -236,6 +238,7 @@ class HybridLoop(Loop):
         w.place(turn)
         fired = self.watch(time, places.x)
         w.do("call void @take_signs(ptr %reals, i1 false)")
+        self.copy(places.guards, places.guards_before, self.guards)
         w.branch(w.word_test("eq", fired, "0"), settled, fire)
         w.place(fire)
         w.put("1", self.counts[Count.FRESH], "i64")
@@ -273,6 +276,69 @@ class HybridLoop(Loop):
         w.put(w.minimum(length, w.get(self.kept[Real.BOUND])), self.kept[Real.STEP])
         w.place(chosen)
 
+    # Equations of a mode that end where the mode does: a root of something that is about to be mirrored.
+
+    def emit_trial(self, time: str, new_time: str) -> str:
+        """Stages of a step to ``new_time``; gives its length."""
+        self.w.put("0", self.extra_done, "i64")
+        return super().emit_trial(time, new_time)
+
+    def emit_finite_trial(self, time: str, new_time: str) -> None:
+        """A fixed step, shorter where its end would not be finite; at last one across the border."""
+        if not self.guards:
+            super().emit_finite_trial(time, new_time)
+            return
+        w, step = self.w, self.step
+        attempt, shorter, short, finite = (
+            w.fresh(stem) for stem in ("attempt", "shorter", "short", "finite")
+        )
+        end = w.variable("double", new_time)
+        w.put(new_time, end)
+        w.place(attempt)
+        self.emit_trial(time, w.get(end))
+        w.branch(step.all_finite(step.y, step.K(self.tableau.end_row)), finite, shorter)
+        w.place(shorter)
+        h = w.multiply(number_text(0.25), w.subtract(w.get(end), time))
+        w.put(w.add(time, h), end)
+        w.branch(w.compare("ogt", h, self.shortest(time)), attempt, short)
+        w.place(short)
+        self.emit_crossing(time)
+        w.place(finite)
+
+    def emit_not_finite(self, time: str, finite: str, accepted: str) -> None:
+        """Steps have become as short as they can be: go across the border of a mode, if that is the cause."""
+        if self.guards:
+            w = self.w
+            cross, on = w.fresh("cross"), w.fresh("on")
+            w.branch(finite, on, cross)
+            w.place(cross)
+            self.emit_crossing(time)
+            w.jump(accepted)
+            w.place(on)
+        else:
+            super().emit_not_finite(time, finite, accepted)
+
+    def shortest(self, time: str) -> str:
+        """A length that is as good as nothing beside the time."""
+        w = self.w
+        return w.multiply(number_text(2.0**-46), w.maximum(time, w.get(w.at("%reals", Real.SPAN))))
+
+    def emit_crossing(self, time: str) -> None:
+        """A step of next to no length along the old derivative, after which some guard must have fired."""
+        w, step = self.w, self.step
+        h = w.multiply(number_text(8.0), self.shortest(time))
+        new_time = w.minimum(w.add(time, h), w.get(self.end))
+        h = w.subtract(new_time, time)
+        w.put(new_time, self.new_time)
+        w.put(h, self.h)
+        # All stages alike, so that the values between the steps are on the same line.
+        for row in range(1, self.tableau.rows):
+            step.copy(step.K(0), step.K(row))
+        w.put("1", self.extra_done, "i64")
+        step.move((1.0,), h)
+        fired = self.watch(w.minimum(new_time, w.get(self.clamp)), self.places.y)
+        self.leave_unless(w.word_test("ne", fired, "0"), Status.NON_FINITE)
+
     def emit_next_length(self, proposed: str) -> None:
         """A step that was cut short by a tick says nothing against the length that was to be tried."""
         w = self.w
@@ -308,7 +374,6 @@ class HybridLoop(Loop):
     def emit_accepted(self) -> None:
         """Events within the step, its samples, then the new point becomes the old one."""
         w, step = self.w, self.step
-        w.put("0", self.extra_done, "i64")
         w.put("0", self.event, "i64")
         plain, instant = w.fresh("plain"), w.fresh("instant")
         time, h = w.get(self.kept[Real.TIME]), w.get(self.h)
@@ -346,23 +411,90 @@ class HybridLoop(Loop):
         w.jump(self.on_instant)
 
     def emit_search(self, time: str, h: str) -> None:
-        """If a guard fires at the end of the step, go back to the first instant at which one does.
+        """If a guard fires within the step, go back to the first instant at which one does.
 
-        Bisection on the values between the steps. What is bracketed is "some guard has fired", so that the
-        first of several is found; the step then ends on the far side of the zero, where it has fired.
+        The step is looked through in stretches, at the middle and the end of each. A stretch is as long as
+        the last ones proved to be smooth enough, and is halved where a guard may have gone to zero and come
+        back: where the parabola through its three values does so, or nearly. Then bisection: what is
+        bracketed is "some guard has fired", so that the first of several is found; the step ends on the far
+        side of the zero, where it has fired.
         """
         w, places = self.w, self.places
-        found, turn, evaluate, before, after, located, on = (
-            w.fresh(stem) for stem in ("found", "turn", "evaluate", "before", "after", "located", "on")
+        turn, second, look, halve, follow, quiet, found, on = (
+            w.fresh(stem) for stem in ("turn", "second", "look", "halve", "follow", "quiet", "found", "on")
         )
-        quiet = w.fresh("quiet")
         end = w.get(self.new_time)
-        fired = self.watch(w.minimum(end, w.get(self.clamp)), places.y)
-        w.branch(w.word_test("eq", fired, "0"), quiet, found)
+        low, high = w.variable("double", time), w.variable("double", end)
+        w.put(time, low)
+        scan = w.at("%reals", Real.SCAN)
+        w.put(w.minimum(w.get(scan), h), scan)
+        finest = w.multiply(h, number_text(FINEST))
+        self.emit_extra_stages_once(time, h)
+        w.place(turn)
+        a = w.get(low)
+        middle = w.fma(number_text(0.5), w.get(scan), a)
+        reached = w.add(a, w.get(scan))
+        # What would leave less than half a stretch goes along with it.
+        whole = w.compare("oge", w.fma(number_text(0.5), w.get(scan), reached), end)
+        middle = w.select(whole, w.fma(number_text(0.5), w.subtract(end, a), a), middle)
+        reached = w.select(whole, end, reached)
+        w.put(middle, high)
+        w.branch(w.word_test("eq", self.watch_inside(middle, time, h), "0"), second, found)
+        w.place(second)
+        self.copy(places.guards, places.guards_middle, self.guards)
+        w.put(reached, high)
+        at_end, inside, looked = w.fresh("end"), w.fresh("inside"), w.fresh("looked")
+        count = w.variable("i64", "0")
+        w.branch(w.compare("oge", reached, end), at_end, inside)
+        w.place(at_end)
+        w.put(self.watch(w.minimum(end, w.get(self.clamp)), places.y), count, "i64")
+        w.jump(looked)
+        w.place(inside)
+        w.put(self.watch_inside(reached, time, h), count, "i64")
+        w.place(looked)
+        beyond = w.fresh("beyond")
+        w.branch(w.word_test("eq", w.get(count, "i64"), "0"), look, beyond)
+        w.place(beyond)
+        w.put(middle, low)
+        w.jump(found)
+        w.place(look)
+        dips = w.word_test("ne", w.let("call i64 @dips(ptr %reals)"), "0")
+        w.branch(w.both(dips, w.compare("ogt", w.get(scan), finest)), halve, follow)
+        w.place(halve)
+        length = w.minimum(w.get(scan), w.subtract(reached, a))
+        w.put(w.multiply(number_text(0.5), length), scan)
+        w.jump(turn)
+        w.place(follow)
+        w.do("call void @take_signs(ptr %reals, i1 false)")
+        self.copy(places.guards, places.guards_before, self.guards)
+        w.put(reached, low)
+        w.put(w.multiply(number_text(2.0), w.get(scan)), scan)
+        w.branch(w.compare("oge", reached, end), quiet, turn)
         w.place(found)
         w.put("1", self.event, "i64")
-        self.emit_extra_stages_once(time, h)
-        low, high = w.variable("double", time), w.variable("double", end)
+        self.emit_bisection(low, high, time, h)
+        w.branch(w.compare("olt", w.get(high), end), moved := w.fresh("moved"), on)
+        w.place(moved)
+        self.step.interpolate(w.get(high), time, h, self.at(places.y))
+        w.put(w.get(high), self.new_time)
+        w.jump(on)
+        w.place(quiet)
+        w.place(on)
+
+    def watch_inside(self, instant: str, time: str, h: str) -> str:
+        """How many guards have fired at an instant within the step."""
+        self.step.interpolate(instant, time, h, self.at(self.places.new_x))
+        return self.watch(self.w.minimum(instant, self.w.get(self.clamp)), self.places.new_x)
+
+    def emit_bisection(self, low: str, high: str, time: str, h: str) -> None:
+        """Move ``high`` to the first instant, within 4 units in the last place, at which a guard has fired.
+
+        None has at ``low``, some has at ``high``.
+        """
+        w = self.w
+        turn, evaluate, before, after, located = (
+            w.fresh(stem) for stem in ("turn", "evaluate", "before", "after", "located")
+        )
         w.place(turn)
         a, b = w.get(low), w.get(high)
         width = w.subtract(b, a)
@@ -371,8 +503,7 @@ class HybridLoop(Loop):
         wide = w.compare("ogt", width, w.multiply(b, number_text(2.0**-50)))
         w.branch(w.both(inside, wide), evaluate, located)
         w.place(evaluate)
-        self.step.interpolate(middle, time, h, self.at(places.new_x))
-        w.branch(w.word_test("eq", self.watch(middle, places.new_x), "0"), before, after)
+        w.branch(w.word_test("eq", self.watch_inside(middle, time, h), "0"), before, after)
         w.place(before)
         w.put(middle, low)
         w.jump(turn)
@@ -380,13 +511,3 @@ class HybridLoop(Loop):
         w.put(middle, high)
         w.jump(turn)
         w.place(located)
-        b = w.get(high)
-        moved = w.fresh("moved")
-        w.branch(w.compare("olt", b, end), moved, on)
-        w.place(moved)
-        self.step.interpolate(b, time, h, self.at(places.y))
-        w.put(b, self.new_time)
-        w.jump(on)
-        w.place(quiet)
-        w.do("call void @take_signs(ptr %reals, i1 false)")
-        w.place(on)

@@ -41,7 +41,9 @@ class Real(IntEnum):
     """When the last event was, of whatever guard."""
     SPAN = 8
     """Events are told apart beside ``max(time, 1e-6 SPAN)``: the time at which the run ends."""
-    END = 9
+    SCAN = 9
+    """How far apart the guards are looked at next, at most; as far as they have proved to be smooth."""
+    END = 10
 
 
 class Count(IntEnum):
@@ -120,10 +122,11 @@ class Workspace:
     ``x`` the state of the last accepted step, ``y`` that at the end of the step being tried (and, before it,
     at each stage), ``slope(row)`` the stage derivatives; then what only hybrid systems have: ``z`` and ``w``
     as accepted, ``new_x`` and ``new_z`` what a reset or update makes of them, ``trial_w`` the unknowns of the
-    implicit equations at the point evaluated last, ``guards``, their ``signs`` (0: not known yet), ``fired``,
-    when each fired last (``last``), how long after the time before (``gap``) and how often in a row this
-    became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian`` and
-    ``before``.
+    implicit equations at the point evaluated last, ``guards``, those at the beginning and in the middle of
+    the stretch that is looked at (``guards_before``, ``guards_middle``), their ``signs`` (0: not known yet),
+    ``fired``, when each fired last (``last``), how long after the time before (``gap``) and how often in a
+    row this became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian``
+    and ``before``.
     """
 
     def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
@@ -138,7 +141,9 @@ class Workspace:
         self.new_z = self.new_x + n
         self.trial_w = self.new_z + nz
         self.guards = self.trial_w + nw
-        self.signs = self.guards + ng
+        self.guards_before = self.guards + ng
+        self.guards_middle = self.guards_before + ng
+        self.signs = self.guards_middle + ng
         self.fired = self.signs + ng
         self.last = self.fired + ng
         self.gap = self.last + ng

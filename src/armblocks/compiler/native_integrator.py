@@ -222,6 +222,7 @@ class Integration:
         self.reals[Real.TIME] = start.time
         self.reals[Real.STEP] = step
         self.reals[Real.BOUND] = np.inf
+        self.reals[Real.SCAN] = np.inf
         self.reals[Real.LAST_EVENT] = -np.inf
         self.reals[places.last : places.last + len(sizes.directions)] = -np.inf
         self.reals[places.gap : places.gap + len(sizes.directions)] = np.inf

@@ -273,7 +273,7 @@ class Loop:
         w.branch(w.compare("olt", shrunk, shortest), too_small, attempt)
         w.place(too_small)
         finite = w.compare("oeq", w.multiply(norm, number_text(0.0)), number_text(0.0))
-        self.leave_unless(finite, Status.NON_FINITE)
+        self.emit_not_finite(time, finite, accepted)
         self.leave(Status.STEP_TOO_SMALL)
         w.place(accepted)
         if isinstance(step, ExplicitStep) and step.butcher.measures_stiffness:
@@ -332,8 +332,17 @@ class Loop:
         new_time = self.bounded(time, w.select(last, end, instant))
         self.emit_checkpoint(w.compare("oge", new_time, self.last_end))
         step.prepare(time)
+        self.emit_finite_trial(time, new_time)
+
+    def emit_finite_trial(self, time: str, new_time: str) -> None:
+        """A fixed step whose end must be finite."""
         self.emit_trial(time, new_time)
-        self.leave_unless(step.all_finite(step.y, step.K(self.tableau.end_row)), Status.NON_FINITE)
+        finite = self.step.all_finite(self.step.y, self.step.K(self.tableau.end_row))
+        self.leave_unless(finite, Status.NON_FINITE)
+
+    def emit_not_finite(self, time: str, finite: str, accepted: str) -> None:
+        """Steps have become as short as they can be: give up where they are not finite."""
+        self.leave_unless(finite, Status.NON_FINITE)
 
     def passed(self, time: str, spacing: str) -> str:
         """Grid instants up to this time are behind."""

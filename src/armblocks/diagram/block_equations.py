@@ -266,7 +266,7 @@ def _answers(block: Block, asked: Sequence[Condition], t: SX, x: Signals, u: Sig
         entry.name: unflatten(SX.sym(entry.name, Slot(entry.name, entry.shape).size), entry.shape)
         for entry in asked
     }
-    quantities = block.condition_values(t, {**x, **unknown}, u, p) if asked else {}
+    quantities: Signals = block.condition_values(t, {**x, **unknown}, u, p) if asked else {}
     found: dict[str, SX] = {}
     for entry in asked:
         quantity = SX(quantities[entry.name])
