@@ -8,16 +8,183 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import armblocks as ab
+from armblocks.robot import Robot
+from armblocks.robot.geometry import robot_bodies
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "robot_examples.py"
-BUILDERS = {build.__name__: build for build in runpy.run_path(str(SCRIPT))["BUILDERS"]}
+SCRIPT_NAMES = runpy.run_path(str(SCRIPT))
+BUILDERS = {build.__name__: build for build in SCRIPT_NAMES["BUILDERS"]}
 
 
 @pytest.mark.parametrize("name", BUILDERS)
 def test_the_file_is_what_the_script_builds(name: str) -> None:
     assert ab.load_diagram(name) == BUILDERS[name]()
+
+
+def test_the_cell_is_what_the_script_builds_around_the_kr180() -> None:
+    assert ab.load_robot("kr180_cell").robot == SCRIPT_NAMES["kr180_cell"]()
+
+
+def test_dc_motor_sampled_pid_is_the_exact_recurrence() -> None:
+    """Between two ticks the motor is linear: x(k+1) = exp(A T) x(k) + what voltage and load add."""
+    found = ab.simulate("dc_motor_sampled_pid", rtol=1e-10, atol=1e-12)
+    R, L, k, J, b, T = 1.2, 5e-3, 0.25, 8e-3, 1e-3, 0.01
+    A = np.array([[-R / L, -k / L, 1 / L, 0], [k / J, -b / J, 0, -1 / J], [0, 0, 0, 0], [0, 0, 0, 0]])
+    step = expm(A * T)
+    x, integral, filtered, speeds, currents = np.zeros(2), 0.0, 0.0, [], []
+    for tick in range(401):
+        speeds.append(x[1])
+        currents.append(x[0])
+        error = (100.0 if tick >= 20 else 0.0) - x[1]
+        free = 0.6 * error + integral + 50.0 * (0.004 * error - filtered)
+        v = min(max(free, -48.0), 48.0)
+        wound = free != v and (free - v) * error > 0
+        integral += 0.0 if wound else T * 4.0 * error
+        filtered += T * 50.0 * (0.004 * error - filtered)
+        x = (step @ [*x, v, 0.5 if tick >= 200 else 0.0])[:2]
+    np.testing.assert_allclose(found["motor/w"][::5], speeds, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(found["motor/i"][::5], currents, rtol=0, atol=1e-7)
+    # at rest of the error: the current carries friction and load, the voltage current and back-EMF
+    i = (b * 100.0 + 0.5) / k
+    assert found["motor/w"][-1] == pytest.approx(100.0, abs=0.02)
+    assert found["motor/i"][-1] == pytest.approx(i, abs=0.01)
+    assert found["controller/y"][-1] == pytest.approx(R * i + k * 100.0, abs=0.02)
+    assert found["controller/y"].max() == 48.0
+
+
+def test_puma560_payload_drop_leaves_the_error_that_theory_says() -> None:
+    """At rest M(q) Kp e = the payload's gravity torque, by the mass matrix without it; then e dies out."""
+    found = ab.simulate("puma560_payload_drop", rtol=1e-9, atol=1e-12)
+    arm, error, t = ab.load_robot("puma560"), found["error/y"], found.time
+    before = int(np.flatnonzero(t == 4.0)[0]) - 1
+    q = found["arm/q"][before]
+    payload = np.array([3.0, 0.0, 0.0, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0, 0.0])
+    zeros = np.zeros(6)
+    loaded = np.ravel(ab.dynamics.trace_rne_loaded(arm.robot)(q, zeros, zeros, zeros, payload)[0])
+    expected = np.linalg.solve(arm.inertia(q), loaded - arm.gravload(q)) / 225.0
+    assert np.abs(expected).max() > 0.01
+    # from 2.5 s to 4 s the loop's slowest root, 4 / s with the payload, has died out to exp(-6)
+    np.testing.assert_allclose(error[before], expected, rtol=0, atol=2e-3 * np.abs(expected).max())
+    # e'' + 30 e' + 225 e = 0 from the drop on, sampled at 1 ms
+    since = t[t >= 4.0] - 4.0
+    free = np.outer((1.0 + 15.0 * since) * np.exp(-15.0 * since), error[before])
+    np.testing.assert_allclose(error[t >= 4.0], free, rtol=0, atol=0.02 * np.abs(expected).max())
+    assert np.abs(error[-1]).max() < 1e-9
+    drop = found["arm/qd"][before + 1] - found["arm/qd"][before]
+    assert np.abs(drop).max() < 1e-4, "the speeds do not jump"
+
+
+# -- pick and place
+
+
+CELL = 0.08
+"""m: edge of the cubes whose centres stand for the surface within them."""
+
+
+def surface_points(robot: Robot, gap: float) -> dict[int, np.ndarray]:
+    """Points by row of ``link_poses``, so that none of a body's surface is further than gap from one."""
+    rows: dict[int, list[np.ndarray]] = {}
+    longest = gap - np.sqrt(3.0) / 2.0 * CELL
+    for body in robot_bodies(robot):
+        corners = body.mesh.corners
+        while len(corners):
+            sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+            short = sides.max(axis=1) <= longest
+            rows.setdefault(body.row, []).append(np.round(corners[short].reshape(-1, 3) / CELL))
+            # the others are halved at the middle of their longest side
+            turn = sides[~short].argmax(axis=1)
+            a, b, c = (corners[~short][np.arange(len(turn)), (turn + k) % 3] for k in range(3))
+            middle = (a + b) / 2
+            corners = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+    return {row: np.unique(np.concatenate(cubes), axis=0) * CELL for row, cubes in rows.items()}
+
+
+def distance_to_box(points: np.ndarray, centre: np.ndarray, size: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.maximum(np.abs(points - centre) - size / 2, 0.0), axis=-1)
+
+
+def test_kr180_pick_and_place_touches_nothing() -> None:
+    """Every body of the arm and the load keep clear of wall, pallets and floor: proved between samples too.
+
+    The motion is looked at each 10 ms at points that leave no gap of more than 15 cm; a point that is further
+    away than that gap plus what it moves in half of 10 ms proves that nothing in between touches.
+    """
+    gap, dt = 0.15, 0.01
+    found = ab.simulate("kr180_pick_and_place", sample_time=dt)
+    cell = ab.load_robot("kr180_cell").robot
+    poses, t = found["plot/poses"], found.time
+    boxes = {}
+    for row, link in enumerate(cell.links, start=1):
+        if not link.joint.moves:
+            (box,) = link.geometry
+            boxes[link.name] = (poses[0, row] @ np.array(box.pose)[:, 3])[:3], np.array(box.size)
+    assert set(boxes) == {"pedestal", "pick pallet", "place pallet", "wall"}
+    points = surface_points(cell, gap)
+    arm = {row: points[row] for row in range(1, len(cell.links) + 1) if cell.links[row - 1].joint.moves}
+    assert len(arm) == 4
+    half = np.array([0.25, 0.25])
+    x, y, z = (np.linspace(-half[0], half[0], 9), np.linspace(-half[1], half[1], 9), np.linspace(0, 0.4, 9))
+    load = np.array(np.meshgrid(x, y, z)).reshape(3, -1).T
+    carried = (t >= 2.7 - 1e-9) & (t <= 10.7 + 1e-9)
+    least = {}
+    for name, row, body, when in (
+        *((cell.links[row - 1].name, row, body, np.full(len(t), True)) for row, body in arm.items()),
+        ("load", len(cell.links) + 1, load, carried),
+    ):
+        R, p = poses[when][:, row, :3, :3], poses[when][:, row, :3, 3]
+        places = np.einsum("tij,kj->tki", R, body) + p[:, None]
+        moved = np.linalg.norm(np.diff(places, axis=0), axis=-1).max()
+        margin = gap + moved / 2
+        for obstacle, (centre, size) in boxes.items():
+            if (name, obstacle) == ("link1", "pedestal") or (name == "load" and "pallet" in obstacle):
+                continue
+            clear = distance_to_box(places, centre, size).min()
+            least[name, obstacle] = clear
+            assert clear > margin, f"{name} comes within {clear:.3f} m of the {obstacle}"
+        if name != "load":
+            assert places[..., 2].min() > margin, f"{name} comes near the floor"
+    assert least["load", "wall"] < 1.0, "the wall is in the way of a straight path"
+
+
+def test_kr180_pick_and_place_sets_the_load_down_where_it_should() -> None:
+    """The load's lowest corner is 1 cm above the pallet where it is gripped and let go, and never lower."""
+    found = ab.simulate("kr180_pick_and_place", sample_time=0.005)
+    cell, t = ab.load_robot("kr180_cell").robot, found.time
+    tool = found["plot/poses"][:, -1]
+    corners = np.array([[x, y, 0.4, 1.0] for x in (-0.25, 0.25) for y in (-0.25, 0.25)])
+    places = np.einsum("tij,kj->tki", tool, corners)
+    carried = (t >= 2.7 - 1e-9) & (t <= 10.7 + 1e-9)
+    assert places[carried][..., 2].min() == pytest.approx(0.15, abs=1e-9)
+    for instant, name in ((2.7, "pick pallet"), (10.7, "place pallet")):
+        (k,) = np.flatnonzero(np.isclose(t, instant))
+        (box,) = cell.link(name).geometry
+        centre = np.array(box.pose)[:2, 3]
+        assert (np.abs(places[k, :, :2] - centre) < np.array(box.size[:2]) / 2).all()
+        assert not found["path/qd"][k].any(), "it rests where the load comes and goes"
+        np.testing.assert_allclose(tool[k, :3, 2], (0, 0, -1), atol=1e-12)
+        # the load's edges lie along those of the pallet
+        assert np.abs(tool[k, :2, :2]).max(axis=0) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_kr180_pick_and_place_keeps_the_limits_and_feels_its_load() -> None:
+    found = ab.simulate("kr180_pick_and_place")
+    robot, t = ab.load_robot("kr180").robot, found.time
+    q, qd = found["path/q"], found["path/qd"]
+    assert (q >= robot.qlim[:, 0]).all()
+    assert (q <= robot.qlim[:, 1]).all()
+    assert (np.abs(qd) <= robot.speed_limits).all()
+    trace = ab.dynamics.trace_rne_loaded(robot)
+    load = np.array([60.0, 0.0, 0.0, 0.2, 2.05, 2.05, 2.5, 0.0, 0.0, 0.0])
+    for k in (100, 400, 700, 1000, 1200):
+        payload = load if 2.7 <= t[k] < 10.7 else np.zeros(10)
+        (tau,) = trace(q[k], qd[k], found["path/qdd"][k], np.zeros(6), payload)
+        np.testing.assert_allclose(found["rne/tau"][k], np.ravel(tau), rtol=1e-9, atol=1e-9)
+    # gripped at rest: the shoulder's torque jumps by 60 kg times the arm of 1.6 m
+    grip = found["rne/tau"][270] - found["rne/tau"][269]
+    assert grip[1] == pytest.approx(60.0 * 9.81 * 1.6, rel=1e-9)
 
 
 def test_puma560_multirate_is_the_sampled_loops_written_out() -> None:

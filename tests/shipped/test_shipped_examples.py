@@ -11,7 +11,16 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, diagram_views
 from armblocks.formats import list_examples, load_diagram
 
-PROMISED = {"falling_pendulum", "kr180model", "puma560_computed_torque", "van_der_pol_pid"}
+PROMISED = {
+    "dc_motor_sampled_pid",
+    "falling_pendulum",
+    "kr180_pick_and_place",
+    "kr180model",
+    "puma560_computed_torque",
+    "puma560_multirate",
+    "puma560_payload_drop",
+    "van_der_pol_pid",
+}
 
 
 @pytest.fixture(params=list_examples())
