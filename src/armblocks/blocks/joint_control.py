@@ -23,7 +23,9 @@ from armblocks.diagram import (
     Port,
     Shapes,
     Signals,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     shape_of,
 )
@@ -54,6 +56,18 @@ class JacobianInverse(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "ijacob"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The pseudo-inverse of the Jacobian while an arm unfolds: the speeds that a motion asks for grow."
+        ),
+        parameters={"method": "pseudo"},
+        inputs={
+            "J": made("SubMatrix", last_row=3)
+            .named("linear rows")
+            .by(u=made("Jacob0").by(q=made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.4), tmax=8.0).named("motion")))
+        },
+        shown=("Ji",),
+    )
 
     method: str = parameter("inverse", choices=("inverse", "transpose", "pseudo", "damped"), doc="which one")
     damping: float = parameter(0.1, above=0.0, doc="damping, for 'damped' only")
@@ -95,6 +109,10 @@ class Manipulability(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "manipulability"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An arm with two links unfolds: the nearer it is to being stretched, the smaller the measure.",
+        inputs={"q": made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -114,6 +132,23 @@ class RobotEnergy(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Energy"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A double pendulum without friction: kinetic and potential energy change places, their sum stays."
+        ),
+        inputs={
+            "q": made("ForwardDynamics")
+            .named("arm")
+            .by(tau=made("Constant", value=(0.0, 0.0)).named("no torque"))
+            .at("q"),
+            "qd": made("ForwardDynamics")
+            .named("arm")
+            .by(tau=made("Constant", value=(0.0, 0.0)).named("no torque"))
+            .at("qd"),
+        },
+        shown=("kinetic", "potential", made("Sum").named("sum").by(u1="kinetic", u2="potential")),
+        stop_time=5.0,
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -143,6 +178,14 @@ class LoadedRne(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "rne with load"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The torques that hold the arm on its way with 2 kg at the tool.",
+        inputs={
+            "wrench": made("Constant", value=(0.0,) * 6).named("no force"),
+            "payload": made("Constant", value=(2.0,) + (0.0,) * 9).named("2 kg"),
+        },
+        shown=("q", "tau"),
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -164,6 +207,18 @@ class JointPD(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "PD Joint Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A PD controller alone: the arm follows, and sags under gravity by a constant error.",
+        parameters={"Kp": 200.0, "Kd": 40.0},
+        inputs={
+            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
 
     Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
     Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
@@ -195,6 +250,16 @@ class GravityCompensation(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "PD with Gravity Compensation"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="From rest to a wanted posture: gravity is compensated, so that no error remains.",
+        inputs={
+            "qr": made("Constant", value=(1.0, -0.5)).named("wanted"),
+            "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
@@ -224,6 +289,21 @@ class ComputedTorque(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Computed Torque Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The arm starts 0.2 rad beside the wanted motion; the errors vanish as those of a "
+            "critically damped oscillator."
+        ),
+        inputs={
+            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "qddr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
+            "q": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
     Kp: ArrayLike = parameter(
@@ -255,6 +335,21 @@ class FeedForward(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Feed-Forward Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The torques of the wanted motion are given beforehand; PD corrects what is left of the "
+            "start beside it."
+        ),
+        inputs={
+            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "qddr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
+            "q": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
     Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
@@ -286,6 +381,17 @@ class MotorDrive(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Motor Drive"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A wanted torque of 15 N m: the current limit holds it at 10, and with rising speed the "
+            "voltage limit takes it to 0."
+        ),
+        inputs={
+            "u": made("Constant", value=15.0).named("wanted"),
+            "w": made("Ramp", slope=12.0).named("speed"),
+        },
+        shown=("u", "y"),
+    )
 
     peak: ArrayLike = parameter(10.0, kind=ParameterKind.ARRAY, above=0.0, doc="torque at most", unit="N m")
     stall: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, above=0.0, doc="torque at rest", unit="N m")
@@ -353,6 +459,14 @@ class JointStops(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Joint Stops"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A joint runs 0.05 rad into its stops at -1 and 1 rad, which push back.",
+        inputs={
+            "q": made("SineWave", amplitude=1.05).named("q"),
+            "qd": made("Derivative").by(u=made("SineWave", amplitude=1.05).named("q")),
+        },
+        shown=("q", "tau"),
+    )
 
     lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="lower stop", unit="rad")
     upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="upper stop", unit="rad")

@@ -15,8 +15,19 @@ from casadi import SX, cos, fmax, fmin, if_else, logic_and, mtimes, sin, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
+from armblocks.blocks.example_signals import ZERO, pose_along_x, position_of
 from armblocks.blocks.orientations import pose
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
 from armblocks.errors import InputError
 from armblocks.spatial.orientation import from_quaternion, to_angle_axis
 from armblocks.trajectories import Quintic
@@ -33,6 +44,10 @@ class Trapezoidal(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "lspb"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Even ramps of the speed with a stretch of even speed between them.",
+        parameters={"q0": (0.0, 0.0), "qf": (1.0, -0.5), "tmax": 8.0},
+    )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
 
     q0: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="start (n,)", unit="rad")
@@ -87,6 +102,10 @@ class MultiSegment(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "mstraj"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Through three corners: the joint goes straight and rounds each corner within 0.6 s.",
+        parameters={"points": ((0.0,), (1.0,), (0.5,), (1.5,)), "durations": (3.0, 3.0, 3.0), "blend": 0.6},
+    )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
 
     points: ArrayLike = parameter(
@@ -160,6 +179,17 @@ class CTraj(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "ctraj"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The position goes straight from one pose to the other, by a trapezoidal profile.",
+        parameters={"tmax": 8.0},
+        inputs={
+            "T0": pose_along_x(ZERO).named("start"),
+            "T1": made("Xyz2T")
+            .named("end")
+            .by(x=made("Constant").named("one"), y=made("Constant", value=0.5).named("half"), z=ZERO),
+        },
+        shown=position_of("T"),
+    )
 
     tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
     profile: str = parameter("lspb", choices=("lspb", "quintic"), doc="how s goes from 0 to 1")
@@ -193,6 +223,10 @@ class CirclePath(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Circle Path"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A point that goes around once in ten seconds.",
+        parameters={"frequency": 0.1},
+    )
 
     radius: float = parameter(1.0, minimum=0.0, doc="radius", unit="m")
     centre: ArrayLike = parameter((0.0, 0.0, 0.0), dimensions=(1,), doc="centre (3,)", unit="m")

@@ -15,7 +15,9 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     broadcast,
+    made,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -29,6 +31,11 @@ class FirstOrderLag(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "First-Order Lag"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response: 63 % after one time constant of 2 s.",
+        parameters={"time_constant": 2.0},
+        inputs={"u": made("Step")},
+    )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
     time_constant: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="T", unit="s")
@@ -62,6 +69,11 @@ class SecondOrderLag(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Second-Order Lag"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response with a damping of 0.3: it overshoots and swings in.",
+        parameters={"natural_frequency": 2.0, "damping": 0.3},
+        inputs={"u": made("Step")},
+    )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
     natural_frequency: ArrayLike = parameter(
@@ -106,6 +118,11 @@ class LeadLag(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Lead-Lag"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A lead answers a step with more than its final value, and comes back to it.",
+        parameters={"lead_time": 2.0, "lag_time": 1.0},
+        inputs={"u": made("Step")},
+    )
 
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
     lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="T1", unit="s")
@@ -140,6 +157,11 @@ class TransferFunctionFirstOrder(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Transfer Fcn First Order"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response: every tick goes a fifth of the way that is left.",
+        parameters={"pole": 0.8},
+        inputs={"u": made("Step")},
+    )
     sampled: ClassVar[bool] = True
 
     pole: ArrayLike = parameter(0.95, kind=ParameterKind.ARRAY, doc="the pole in the z plane")
@@ -180,6 +202,11 @@ class TransferFunctionLeadOrLag(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Transfer Fcn Lead or Lag"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response goes from 1 to (1 - zero) / (1 - pole) = 2.5.",
+        parameters={"pole": 0.8, "zero": 0.5},
+        inputs={"u": made("Step")},
+    )
     sampled: ClassVar[bool] = True
 
     pole: ArrayLike = parameter(0.95, kind=ParameterKind.ARRAY, doc="the pole in the z plane")
@@ -219,6 +246,10 @@ class TransferFunctionRealZero(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Transfer Fcn Real Zero"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response: 1 for one tick, then 1 - zero = 0.25.",
+        inputs={"u": made("Step")},
+    )
     sampled: ClassVar[bool] = True
 
     zero: ArrayLike = parameter(0.75, kind=ParameterKind.ARRAY, doc="the zero in the z plane")

@@ -27,6 +27,8 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
+    made,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -42,6 +44,9 @@ class RandomNumber(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Random Number"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A new number of the normal distribution every 0.1 s; the same seed gives the same numbers.",
+    )
     sampled: ClassVar[bool] = True
 
     mean: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the mean")
@@ -77,6 +82,9 @@ class UniformRandomNumber(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Uniform Random Number"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A new number between -1 and 1 every 0.1 s; the same seed gives the same numbers.",
+    )
     sampled: ClassVar[bool] = True
 
     minimum: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, doc="the lower bound")
@@ -117,6 +125,11 @@ class BandLimitedWhiteNoise(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Band-Limited White Noise"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Noise, and what a lag of 1 s lets through of it.",
+        parameters={"noise_power": 0.05},
+        shown=("y", made("FirstOrderLag").named("lag").by(u="y")),
+    )
     sampled: ClassVar[bool] = True
 
     noise_power: ArrayLike = parameter(

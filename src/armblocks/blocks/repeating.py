@@ -26,6 +26,7 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     State,
+    WorkedExample,
     parameter,
     sample_time_parameter,
     shape_of,
@@ -46,6 +47,10 @@ class SignalGenerator(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Signal Generator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A square wave of 0.5 Hz: 1 in the first half of every period, -1 in the second.",
+        parameters={"waveform": "square", "frequency": 0.5},
+    )
 
     waveform: str = parameter("sine", choices=("sine", "square", "sawtooth"), doc="the form of the wave")
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="A, half the way from peak to peak")
@@ -96,6 +101,10 @@ class RepeatingSequence(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Repeating Sequence"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A course of four points that begins again every three seconds.",
+        parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0)},
+    )
 
     times: ArrayLike = parameter(
         (0.0, 2.0), dimensions=(1,), tunable=False, doc="instants (n,) from 0", unit="s"
@@ -153,6 +162,10 @@ class RepeatingSequenceInterpolated(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Repeating Sequence Interpolated"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A course of four points, read every 0.1 s and held in between.",
+        parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0), "sample_time": 0.1},
+    )
     sampled: ClassVar[bool] = True
 
     times: ArrayLike = parameter(
@@ -183,6 +196,9 @@ class RepeatingSequenceStair(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Repeating Sequence Stair"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Five values, one a second, then again from the first.",
+    )
     sampled: ClassVar[bool] = True
 
     values: ArrayLike = parameter((3.0, 1.0, 4.0, 2.0, 1.0), dimensions=(1,), doc="the values (n,)")
@@ -211,6 +227,10 @@ class CounterFreeRunning(Block):
 
     family: ClassVar[str] = "sources"
     title: ClassVar[str] = "Counter Free-Running"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A counter of two bits: after 3 comes 0.",
+        parameters={"bits": 2},
+    )
     sampled: ClassVar[bool] = True
 
     bits: int = parameter(16, minimum=1, maximum=52, doc="how many bits the count has")

@@ -13,6 +13,7 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks import dynamics
+from armblocks.blocks.example_signals import position_of
 from armblocks.blocks.robot_ports import apply_traced, check_joint_values, q_port, qd_port, qdd_port, tau_port
 from armblocks.diagram import (
     Block,
@@ -23,6 +24,8 @@ from armblocks.diagram import (
     State,
     View,
     ViewKind,
+    WorkedExample,
+    made,
     parameter,
     shape_of,
 )
@@ -42,6 +45,10 @@ class JTraj(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "jtraj"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two joints leave and arrive at rest; position, speed and acceleration are smooth.",
+        parameters={"tmax": 8.0, "q0": (0.0, 0.0), "qf": (1.0, -1.5)},
+    )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
 
     q0: ArrayLike = parameter((0.0,) * 6, dimensions=(1,), doc="joint coordinates at t = 0", unit="rad")
@@ -84,6 +91,11 @@ class Fkine(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "fkine"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The path of the tool of an arm with two links, in its vertical plane.",
+        across=position_of("T")[0],
+        up=position_of("T")[2],
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -103,6 +115,10 @@ class Jacob0(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "jacob0"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The linear rows of the Jacobian: how far the tool moves along x, y, z for each joint.",
+        shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -122,6 +138,10 @@ class Jacobe(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "jacobn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The linear rows of the Jacobian in the axes of the tool.",
+        shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -144,6 +164,13 @@ class Rne(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "rne"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The torques that a motion of two joints asks for; at the end they only hold the arm "
+            "against gravity."
+        ),
+        shown=("q", "tau"),
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -163,6 +190,9 @@ class Gravload(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "gravload"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The torques that hold the arm against gravity, on its way up.",
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -182,6 +212,13 @@ class Inertia(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "inertia"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The entries of the inertia matrix: the first joint feels less inertia the more the arm "
+            "is folded."
+        ),
+        inputs={"q": made("JTraj", q0=(0.0, 0.0), qf=(0.0, 2.5), tmax=8.0).named("motion")},
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -201,6 +238,10 @@ class Coriolis(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "coriolis"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The entries of the Coriolis matrix: they vanish with the speeds.",
+        shown=("qd", "C"),
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
@@ -224,6 +265,12 @@ class ForwardDynamics(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "Robot"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Let go from the horizontal without torque: a double pendulum.",
+        inputs={"tau": made("Constant", value=(0.0, 0.0)).named("no torque")},
+        shown=("q",),
+        stop_time=5.0,
+    )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -273,6 +320,9 @@ class RobotPlot(Block):
 
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "plot"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The arm at six moments of its motion, with the path of the tool.",
+    )
 
     robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 

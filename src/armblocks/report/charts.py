@@ -81,6 +81,11 @@ def time_chart(
     return picture
 
 
+def fits_beside(label: str) -> bool:
+    """Whether there is room for the label at the right end of a line."""
+    return text_width(label, SMALL_SIZE) <= _LABEL_ROOM - 31
+
+
 def thin_out(time: _Array, values: _Array, columns: int) -> tuple[_Array, _Array]:
     """At most four points a column of px: first, least, greatest and last, so that no peak is lost."""
     if len(time) <= 4 * columns:

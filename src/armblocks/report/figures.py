@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from armblocks.diagram import Diagram, View, ViewKind, diagram_views
 from armblocks.report.arm_picture import moments_picture
-from armblocks.report.charts import Panel, Trace, time_chart
+from armblocks.report.charts import Panel, Trace, fits_beside, time_chart
 from armblocks.report.motion import Motion
 from armblocks.report.numbers import axis_number, si_prefix
 from armblocks.report.path_chart import path_chart, side_by_side
@@ -192,25 +192,29 @@ def _factor(unit: str, shown_unit: str, values: _Array) -> float:
 
 def _scope(block: str, view: View, result: SimulationResult, width: float) -> Picture:
     panels: list[Panel] = []
-    for number, signal in enumerate(view.signals):
-        label = view.labels[number] if number < len(view.labels) else ""
-        path = result.resolve(f"{block}/{signal}")
-        slot = result.signals_layout[path]
-        flat = result[path].reshape(len(result.time), -1)
-        values, unit = for_people(flat[:, :_FIRST_ENTRIES], slot.unit)
-        name = label or path
-        entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
-        short = name.rpartition("/")[2]
+    for numbers in _compared(block, view, result):
+        names: list[str] = []
+        columns: list[_Array] = []
+        labels: list[str] = []
+        unit = ""
+        for number in numbers:
+            label = view.labels[number] if number < len(view.labels) else ""
+            path = result.resolve(f"{block}/{view.signals[number]}")
+            slot = result.signals_layout[path]
+            unit = slot.unit
+            name = label or path
+            names.append(name)
+            entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
+            columns.append(result[path].reshape(len(result.time), -1)[:, : len(entries)])
+            short = name if len(numbers) > 1 and fits_beside(name) else name.rpartition("/")[2]
+            labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
+        # One prefix for all of a panel, so that they can be compared.
+        values, unit = for_people(np.hstack(columns), unit)
+        first = numbers[0] if len(labels) == 1 else 0
         traces = tuple(
-            Trace(
-                label=f"{short}[{','.join(map(str, index))}]" if index else short,
-                values=values[:, k],
-                index=k if len(entries) > 1 else number,
-            )
-            for k, index in enumerate(entries)
+            Trace(label=label, values=values[:, k], index=first + k) for k, label in enumerate(labels)
         )
-        panels.append(Panel(quantity=name, unit=unit, traces=traces))
-    panels = _merged(panels)
+        panels.append(Panel(quantity=", ".join(names), unit=unit, traces=traces))
     return time_chart(
         result.time,
         panels,
@@ -221,21 +225,31 @@ def _scope(block: str, view: View, result: SimulationResult, width: float) -> Pi
     )
 
 
-def _merged(panels: list[Panel]) -> list[Panel]:
-    """Scalar traces of one unit share a panel: they are there to be compared."""
-    scalars = [panel for panel in panels if len(panel.traces) == 1]
-    if len(scalars) < 2 or len(scalars) != len(panels) or len({panel.unit for panel in scalars}) != 1:
-        return panels
-    traces = tuple(
-        Trace(label=panel.quantity, values=panel.traces[0].values, index=k) for k, panel in enumerate(scalars)
-    )
-    return [Panel(quantity=", ".join(p.quantity for p in scalars), unit=scalars[0].unit, traces=traces)]
+def _compared(block: str, view: View, result: SimulationResult) -> list[list[int]]:
+    """Which signals share a panel: scalars of one unit are there to be compared, all else stands alone."""
+    panels: list[list[int]] = []
+    by_unit: dict[str, list[int]] = {}
+    for number, signal in enumerate(view.signals):
+        slot = result.signals_layout[result.resolve(f"{block}/{signal}")]
+        if slot.size > 1:
+            panels.append([number])
+        elif slot.unit in by_unit:
+            by_unit[slot.unit].append(number)
+        else:
+            by_unit[slot.unit] = [number]
+            panels.append(by_unit[slot.unit])
+    return panels
 
 
 def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
     paths = [result.resolve(f"{block}/{signal}") for signal in view.signals[:2]]
     flats = [result[path].reshape(len(result.time), -1)[:, 0] for path in paths]
-    (x, x_unit), (y, y_unit) = (for_people(flat, result.units[path]) for flat, path in zip(flats, paths))
+    units = [result.units[path] for path in paths]
+    if units[0] == units[1]:  # one prefix for both, so that one unit is as long both ways
+        both, x_unit = for_people(np.stack(flats), units[0])
+        (x, y), y_unit = both, x_unit
+    else:
+        (x, x_unit), (y, y_unit) = (for_people(flat, unit) for flat, unit in zip(flats, units))
     labels = [
         (view.labels[k] if k < len(view.labels) and view.labels[k] else path) + (f", {unit}" if unit else "")
         for k, (path, unit) in enumerate(zip(paths, (x_unit, y_unit)))

@@ -1,0 +1,34 @@
+"""Which signals of a Scope share a panel, and in which unit they are shown."""
+
+import armblocks as ab
+from armblocks.blocks import Clock, Constant, Integrator, Saturation, Scope, SineWave
+from armblocks.diagram import Diagram, DiagramBuilder
+from armblocks.report.figures import view_figures
+from armblocks.report.picture import text_marks
+
+
+def diagram() -> Diagram:
+    builder = DiagramBuilder("scopes")
+    time = builder.add("time", Clock())
+    late = builder.add("late", Saturation(lower=0.0, upper=1e-5), time)
+    vector = builder.add("vector", SineWave(phase=(0.0, 1.0)))
+    number = builder.add("number", Integrator(), builder.add("one", Constant()))
+    builder.add("scope", Scope(inputs=4), time, vector, late, number)
+    return builder.build()
+
+
+def test_scalars_of_one_unit_share_a_panel_and_its_prefix() -> None:
+    model = diagram()
+    result = ab.simulate(model, stop_time=1.0)
+    paths = ("time/y", "vector/y", "late/y", "number/y")
+    assert [result.units[path] for path in paths] == ["s", "", "s", ""]
+    (figure,) = view_figures(model, result)
+    headings = [mark.text for mark in text_marks(figure.picture) if mark.bold]
+    assert headings == ["time/y, late/y, s", "vector/y", "number/y"]
+
+
+def test_a_figure_is_as_wide_as_it_is_asked_to_be() -> None:
+    model = diagram()
+    (figure,) = view_figures(model, ab.simulate(model, stop_time=1.0), 500.0)
+    assert figure.picture.width == 500.0
+    assert all(mark.x <= 500.0 for mark in text_marks(figure.picture))
