@@ -30,9 +30,10 @@ def test_the_worked_example_runs_and_its_python_is_the_same_diagram(kind: type[B
     assert diagram_views(diagram) or kind.type_name() == "Terminator", "something is to be seen"
     assert caption(kind).endswith((".", "…"))
     typed = run_as_typed(diagram_to_python(diagram))
-    assert typed["diagram"] == dataclasses.replace(diagram, description="")
+    assert typed["diagram"] == dataclasses.replace(diagram, description="", settings=ab.SimulationOptions())
     result = typed["result"]
     assert isinstance(result, ab.SimulationResult)
+    assert result.time[-1] == diagram.settings.stop_time
     assert result.run.complete
     assert all(np.isfinite(result[name]).all() for name in result.names)
 
