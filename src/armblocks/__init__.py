@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
     from armblocks.face.block_examples import block_example
+    from armblocks.face.diagram_run import DiagramRun
     from armblocks.face.diagrams import list_blocks, list_examples, load_diagram, save_diagram
     from armblocks.face.linearizing import linearize
-    from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
+    from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
     from armblocks.face.reporting import write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
@@ -49,6 +50,7 @@ else:
             "DhRow": "armblocks.robot",
             "Diagram": "armblocks.diagram",
             "DiagramBuilder": "armblocks.diagram",
+            "DiagramRun": "armblocks.face.diagram_run",
             "Fixed": "armblocks.robot",
             "FrictionModel": "armblocks.robot",
             "JointLimits": "armblocks.robot",
@@ -64,6 +66,7 @@ else:
             "SimulationOptions": "armblocks.equations",
             "SimulationResult": "armblocks.simulation",
             "Transform": "armblocks.spatial",
+            "begin": "armblocks.face.model",
             "block_example": "armblocks.face.block_examples",
             "blocks": "armblocks.blocks",
             "compile_diagram": "armblocks.face.model",
@@ -91,6 +94,7 @@ __all__ = [
     "DhRow",
     "Diagram",
     "DiagramBuilder",
+    "DiagramRun",
     "Fixed",
     "FrictionModel",
     "JointLimits",
@@ -106,6 +110,7 @@ __all__ = [
     "SimulationOptions",
     "SimulationResult",
     "Transform",
+    "begin",
     "block_example",
     "blocks",
     "compile_diagram",

@@ -1,10 +1,12 @@
 """Running diagrams from Python."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import armblocks as ab
-from armblocks.errors import DiagramError, LimitWarning, UnknownNameError
+from armblocks.errors import DiagramError, InputError, LimitWarning, UnknownNameError
 
 POSITIONS = {  # paper/specification.md: an independent plain-NumPy computation
     0.0: (1.95, -1.25, -1.85),
@@ -78,3 +80,43 @@ def test_a_trajectory_beyond_the_joint_limits_is_warned_of(paper: ab.Diagram) ->
 def test_a_joint_that_is_too_fast_is_warned_of(paper: ab.Diagram) -> None:
     with pytest.warns(LimitWarning, match=r"joint 'link1' is faster than allowed \(at most 105 deg/s\)"):
         ab.simulate(paper, parameters={"jtraj.tmax": 3.0}, stop_time=3.0)
+
+
+def test_a_run_is_paused_tuned_and_taken_up_again() -> None:
+    run = ab.begin("van_der_pol_pid", stop_time=30.0)
+    run.advance(10.0, exactly=True)
+    assert run.time == 10.0 and not run.finished and run.stop_time == 30.0
+    state = run.state()
+    run.set("PID.P", 4.0)
+    run.advance()
+    result = run.result()
+    rest = ab.simulate("van_der_pol_pid", stop_time=30.0, parameters={"PID.P": 4.0}, initial_state=state)
+    later = result.time > 10.0
+    np.testing.assert_array_equal(result["x1"][later], rest["x1"][rest.time > 10.0])
+    assert result.parameters["PID.P"] == 4.0 and run.parameters["PID.P"] == 4.0
+    assert run.diagram.blocks["PID"].parameter_value("P") == 4.0
+    assert run.samples(run.recorded - 5)["x1"].shape == (5,)
+
+
+def test_a_run_refuses_what_is_not_tunable() -> None:
+    run = ab.begin("van_der_pol_pid", parameters={"PID.P": 3.0})
+    assert run.parameters["PID.P"] == 3.0
+    run.advance(steps=10)
+    with pytest.raises(InputError, match=r"'error.signs' cannot take this value while the diagram runs"):
+        run.set("error.signs", "++")
+    with pytest.raises(UnknownNameError, match=r"no parameter named 'Q'"):
+        run.set("PID.Q", 1.0)
+    run.stop()
+    assert run.finished and run.result().run.message == "stopped"
+
+
+def test_a_run_begins_from_a_saved_state(tmp_path: Path) -> None:
+    first = ab.begin("van_der_pol_pid", stop_time=20.0)
+    first.advance(5.0)
+    first.state().save(tmp_path / "state.npz")
+    first.advance()
+    second = ab.begin("van_der_pol_pid", stop_time=20.0, initial_state=tmp_path / "state.npz")
+    second.advance()
+    np.testing.assert_array_equal(first.result()["x1"][-100:], second.result()["x1"][-100:])
+    with pytest.raises(UnknownNameError, match="no setting named 'stop'"):
+        ab.begin("van_der_pol_pid", stop=3.0)

@@ -43,7 +43,9 @@ class Real(IntEnum):
     """Events are told apart beside ``max(time, 1e-6 SPAN)``: the time at which the run ends."""
     SCAN = 9
     """How far apart the guards are looked at next, at most; as far as they have proved to be smooth."""
-    END = 10
+    PAUSE = 10
+    """The loop returns before the first step that would begin at this time or later."""
+    END = 11
 
 
 class Count(IntEnum):

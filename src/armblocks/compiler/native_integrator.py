@@ -101,20 +101,22 @@ class NativeIntegrator:
         max_step: float = float("inf"),
         checkpoint: Checkpoint | None = None,
         watch_stiffness: bool = False,
+        stop: float | None = None,
     ) -> Integration:
-        """A run from ``start`` to ``samples[-1]``, ready for its first step.
+        """A run from ``start`` to ``stop``, ready for its first step.
 
         ``start`` is the state ``(n,)`` at ``samples[0]``, or a point. ``samples`` (N,) s, rising strictly:
-        the instants that are recorded. ``breakpoints`` (nb,) s, in any order: a step ends exactly on each
-        that lies inside, what comes before sees ``f`` at most at the last double before it, and what comes
-        after starts anew. ``step`` s: grid of a fixed-step method (its instants are ``k step``); ``rtol``,
-        ``atol``, ``max_step`` s: for adaptive methods. With a ``checkpoint`` the run goes on from there, as
-        the run that left it would have. With ``watch_stiffness`` it pauses, :attr:`Integration.stiff`, where
-        stability has held its steps short for long. Nothing is checked.
+        the instants that are recorded, and, where no ``stop`` is said, how long the run is. ``breakpoints``
+        (nb,) s, in any order: a step ends exactly on each that lies inside, what comes before sees ``f`` at
+        most at the last double before it, and what comes after starts anew. ``step`` s: grid of a fixed-step
+        method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
+        ``checkpoint`` the run goes on from there, as the run that left it would have. With
+        ``watch_stiffness`` it pauses, :attr:`Integration.stiff`, where stability has held its steps short for
+        long. Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
-        begins, stop = start.time, float(samples[-1])
+        begins, stop = start.time, float(samples[-1]) if stop is None else stop
         if checkpoint is not None:
             begins = float(checkpoint.reals[Real.TIME])
         # A set and not np.unique, which would load all of numpy.ma for these few numbers.
@@ -133,6 +135,7 @@ class NativeIntegrator:
         run.reals[Real.ATOL] = atol
         run.reals[Real.MAX_STEP] = max_step
         run.reals[Real.SPAN] = stop
+        run.reals[Real.PAUSE] = np.inf
         run.counts[Count.WATCHING] = watch_stiffness
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
@@ -195,24 +198,34 @@ class Integration:
         clamps: Vector,
         records: tuple[Vector, Vector, Vector] | None = None,
     ) -> None:
-        sizes, workspace = integrator.sizes, integrator.workspace
+        workspace = integrator.workspace
         self.integrator = integrator
         self.reals = np.zeros(workspace.size)
         self.counts = np.zeros(workspace.counts, dtype=np.int64)
+        self.counts[Count.SEGMENTS] = ends.size
+        self.status = Status.PAUSED
+        self._saved = _checkpoint(self, np.full_like(self.reals, np.nan), np.zeros_like(self.counts))
+        # Parameters, sample instants, ends of the segments, and how late each may evaluate its derivative.
+        self.course = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
+        self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
+        self.record(samples, records)
+
+    def record(self, samples: Vector, records: tuple[Vector, Vector, Vector] | None = None) -> None:
+        """Record these instants from here on, (N,) s, in new arrays if none are given."""
+        sizes, (p, _, ends, clamps) = self.integrator.sizes, self.course
         if records is None:
             x, z, w = (np.empty((samples.size, n)) for n in (sizes.states, sizes.discrete, sizes.algebraic))
             records = x, z, w
         self.states, self.discrete, self.algebraic = records
         """At the sample instants, states ``(N, n)``, discrete variables ``(N, nz)`` and unknowns of the
         implicit equations ``(N, nw)``: valid up to ``recorded``."""
+        self.counts[Count.SAMPLE] = 0
         self.counts[Count.SAMPLES] = samples.size
-        self.counts[Count.SEGMENTS] = ends.size
-        self.status = Status.PAUSED
-        self._saved = _checkpoint(self, np.full_like(self.reals, np.nan), np.zeros_like(self.counts))
-        # Parameters, sample instants, ends of the segments, and how late each may evaluate its derivative.
-        self.course = (np.ascontiguousarray(p), np.ascontiguousarray(samples), ends, clamps)
+        self.course = (p, np.ascontiguousarray(samples), ends, clamps)
+        self._take_addresses()
+
+    def _take_addresses(self) -> None:
         arrays = (self.reals, self.counts, *self.course, self.states, self.discrete, self.algebraic)
-        self._scratch = np.empty(1 if integrator.space is None else integrator.space.length)
         arrays += (self._saved.reals, self._saved.counts, self._scratch)
         self._addresses = tuple(array.ctypes.data for array in arrays)
 
@@ -238,8 +251,21 @@ class Integration:
                 number += 1
             self.counts[Count.END + clock] = number
 
-    def advance(self, max_steps: int) -> Status:
-        """Take at most ``max_steps`` accepted steps."""
+    def cut_at(self, time: float) -> None:
+        """Let a step end exactly at a time (s), later than that reached, and the run start anew there."""
+        p, samples, *bounds = self.course
+        ends, clamps = (bound[self.counts[Count.SEGMENT] :] for bound in bounds)
+        place = int(np.searchsorted(ends, time))
+        if place == ends.size or ends[place] == time:
+            return
+        self.course = (p, samples, np.insert(ends, place, time), np.insert(clamps, place, time))
+        self.counts[Count.SEGMENT] = 0
+        self.counts[Count.SEGMENTS] = self.course[2].size
+        self._take_addresses()
+
+    def advance(self, max_steps: int, pause: float = np.inf) -> Status:
+        """Take at most ``max_steps`` accepted steps, and none that begins at ``pause`` (s) or later."""
+        self.reals[Real.PAUSE] = pause
         if self.status is Status.PAUSED:
             self.status = self.integrator.advance(self._addresses, max_steps)
         return self.status
@@ -250,6 +276,12 @@ class Integration:
         if np.isnan(self._saved.reals[Real.TIME]):
             return None
         return _checkpoint(self, self._saved.reals.copy(), self._saved.counts.copy())
+
+    def back_to(self, checkpoint: Checkpoint) -> None:
+        """Stand where :meth:`now` was taken, with what is recorded since forgotten."""
+        self.reals[:] = checkpoint.reals
+        self.counts[:] = checkpoint.counts
+        self.status = Status.PAUSED
 
     def now(self) -> Checkpoint:
         """The arrays as they are, between two calls of :meth:`advance`."""

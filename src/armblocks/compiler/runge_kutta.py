@@ -104,6 +104,7 @@ class Loop:
             p: w.variable("i64", w.get(w.at("%counts", p, "i64"), "i64")) for p in self.kept_counts
         }
         self.max_step = w.get(w.at("%reals", Real.MAX_STEP))
+        self.pause = w.get(w.at("%reals", Real.PAUSE))
         self.samples = w.get(w.at("%counts", Count.SAMPLES, "i64"), "i64")
         self.segments = w.get(w.at("%counts", Count.SEGMENTS, "i64"), "i64")
         segment = w.get(self.counts[Count.SEGMENT], "i64")
@@ -148,7 +149,9 @@ class Loop:
         w.place(self.on_start)
         self.emit_start()
         w.place(self.on_step)
-        self.leave_unless(w.word_test("slt", w.get(self.taken, "i64"), "%max_steps"), Status.PAUSED)
+        on = w.word_test("slt", w.get(self.taken, "i64"), "%max_steps")
+        on = w.both(on, w.compare("olt", w.get(self.kept[Real.TIME]), self.pause))
+        self.leave_unless(on, Status.PAUSED)
         error = self.tableau.error_row
         if error is not None:
             self.emit_adaptive_step(error)

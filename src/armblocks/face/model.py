@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.compiler.system import CompiledSystem, compile_system
-from armblocks.diagram import Diagram, flat_diagram, trace_diagram, with_parameters
+from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import UnknownNameError
+from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
-from armblocks.simulation import RunState, SimulationResult
-from armblocks.simulation import simulate as run_system
-from armblocks.simulation.simulate import Progress
+from armblocks.simulation import RunState, Simulation, SimulationResult
+from armblocks.simulation.plan import changed_parameters
+from armblocks.simulation.simulate import Progress, run_to_the_end
 
 
 class CompiledDiagram:
@@ -50,39 +51,38 @@ class CompiledDiagram:
         initial_state: RunState | None = None,
     ) -> SimulationResult:
         """Run once; see :func:`simulate`."""
-        values = None
-        if parameters:
-            changed = with_parameters(self.diagram, parameters)
-            values = self._retuned(changed, parameters)
-            if values is None:
-                return CompiledDiagram(changed).simulate(
-                    options, progress=progress, initial_state=initial_state
-                )
-        result = run_system(
-            self.compiled,
-            options or self.diagram.settings,
-            parameters=values,
-            progress=progress,
-            initial_state=initial_state,
-        )
-        if self._watch is None:
-            self._watch = LimitWatch(self.diagram, result)
-        self._watch.warn(result)
+        tuned, values = self._tuned(parameters)
+        options = options or tuned.diagram.settings
+        result = run_to_the_end(Simulation(tuned.compiled, options, values, initial_state), progress)
+        if tuned._watch is None:
+            tuned._watch = LimitWatch(tuned.diagram, result)
+        tuned._watch.warn(result)
         return result
 
-    def _retuned(self, changed: Diagram, parameters: Mapping[str, object]) -> NDArray[np.float64] | None:
-        """The parameter vector with the new values, or ``None`` where a structural parameter changes."""
-        layout, values = self.system.parameters, self.system.parameter_values.copy()
-        blocks = flat_diagram(changed).blocks
-        for path in parameters:
-            if path not in layout.ranges:
-                return None
-            block, _, name = path.rpartition(".")
-            value: NDArray[np.float64] = np.asarray(blocks[block].parameter_value(name))
-            if value.shape != layout[path].shape:
-                return None
-            values[layout.ranges[path]] = value.ravel()
-        return values
+    def begin(
+        self,
+        options: SimulationOptions | None = None,
+        *,
+        parameters: Mapping[str, object] | None = None,
+        initial_state: RunState | None = None,
+    ) -> DiagramRun:
+        """Begin a run; see :func:`begin`."""
+        tuned, values = self._tuned(parameters)
+        diagram = with_parameters(self.diagram, parameters) if parameters else self.diagram
+        options = options or diagram.settings
+        return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state))
+
+    def _tuned(
+        self, parameters: Mapping[str, object] | None
+    ) -> tuple[CompiledDiagram, NDArray[np.float64] | None]:
+        """What to run for other parameters: itself with their vector, or another where one is structural."""
+        if not parameters:
+            return self, None
+        changed = with_parameters(self.diagram, parameters)
+        tuned = tuned_parameters(self.diagram, changed)
+        if tuned is None:
+            return CompiledDiagram(changed), None
+        return self, changed_parameters(self.compiled, self.compiled.parameter_values, tuned)
 
 
 _compiled: dict[int, CompiledDiagram] = {}
@@ -143,11 +143,34 @@ def simulate(
         initial_state = _run_state(model.system, initial_state)
     if initial_state is not None and not isinstance(initial_state, RunState):
         initial_state = RunState.load(initial_state)
+    options = _options(model, settings, "simulate")
+    return model.simulate(options, parameters=parameters, progress=progress, initial_state=initial_state)
+
+
+def begin(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    *,
+    parameters: Mapping[str, object] | None = None,
+    initial_state: RunState | str | PathLike[str] | None = None,
+    **settings: Any,
+) -> DiagramRun:
+    """Begin a run of a diagram that can be paused, looked at and tuned: nothing happens before ``advance``.
+
+    Arguments are those of :func:`simulate`, and so are the errors.
+    """
+    model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
+    if initial_state is not None and not isinstance(initial_state, RunState):
+        initial_state = RunState.load(initial_state)
+    options = _options(model, settings, "begin")
+    return model.begin(options, parameters=parameters, initial_state=initial_state)
+
+
+def _options(model: CompiledDiagram, settings: Mapping[str, Any], where: str) -> SimulationOptions:
+    """The diagram's settings, some of them changed. Raises ``UnknownNameError``."""
     if not settings:
-        return model.simulate(parameters=parameters, progress=progress, initial_state=initial_state)
+        return model.diagram.settings
     known = [field.name for field in dataclasses.fields(SimulationOptions)]
     for name in settings:
         if name not in known:
-            raise UnknownNameError("setting", name, known, where="simulate")
-    options = dataclasses.replace(model.diagram.settings, **settings)
-    return model.simulate(options, parameters=parameters, progress=progress, initial_state=initial_state)
+            raise UnknownNameError("setting", name, known, where=where)
+    return dataclasses.replace(model.diagram.settings, **settings)

@@ -1,8 +1,19 @@
 """Runs compiled systems: integrators as tables, one call to simulate, results with names and units."""
 
-from armblocks.simulation.result import RunReport, SimulationResult
+from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult
 from armblocks.simulation.run_state import RunState
 from armblocks.simulation.simulate import simulate
+from armblocks.simulation.simulation import Samples, Simulation
 from armblocks.simulation.tableaux import TABLEAUX, find_tableau
 
-__all__ = ["TABLEAUX", "RunReport", "RunState", "SimulationResult", "find_tableau", "simulate"]
+__all__ = [
+    "TABLEAUX",
+    "ParameterChange",
+    "RunReport",
+    "RunState",
+    "Samples",
+    "Simulation",
+    "SimulationResult",
+    "find_tableau",
+    "simulate",
+]

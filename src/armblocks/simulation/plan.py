@@ -27,6 +27,52 @@ SMALLEST_RTOL = 1e-13
 
 
 @dataclass(frozen=True, kw_only=True)
+class Instants:
+    """The instants that a run records: ``start``, ``k sample_time`` for whole ``k`` between, and ``stop``.
+
+    Each is one product, never a sum, so no error grows. An instant within a billionth of a sample time of the
+    stop time is the stop time, and likewise at a start other than 0. Only the part that is asked for exists.
+    """
+
+    start: float
+    stop: float
+    sample_time: float
+    first: int
+    """``k`` of the first one after the start."""
+    count: int
+
+    @staticmethod
+    def between(start: float, stop: float, sample_time: float) -> Instants:
+        """The instants of a run."""
+        last, first = math.ceil(stop / sample_time - 1e-9), 1
+        if start > 0.0:
+            first = max(0, math.floor(start / sample_time) - 1)
+            while first < last and first * sample_time <= start + 1e-9 * sample_time:
+                first += 1
+        count = 1 if last == 0 else 1 + last - min(first, last) + 1
+        return Instants(start=start, stop=stop, sample_time=sample_time, first=first, count=count)
+
+    def part(self, begin: int, end: int) -> Array:
+        """Instants number ``begin`` to ``end - 1``, s."""
+        numbers = np.arange(begin, end, dtype=np.float64) + (self.first - 1.0)
+        instants: Array = numbers * self.sample_time
+        if begin == 0 < end:
+            instants[0] = self.start
+        if begin < end == self.count:
+            instants[-1] = self.stop
+        return instants
+
+    def up_to(self, time: float) -> int:
+        """How many there are until a time (s), itself included."""
+        if time >= self.stop:
+            return self.count
+        number = max(0, math.floor(time / self.sample_time) - self.first)
+        while number < self.count and self.part(number, number + 1)[0] <= time:
+            number += 1
+        return number
+
+
+@dataclass(frozen=True, kw_only=True)
 class Plan:
     """One run, settled. ``tableau`` is ``None`` where there is nothing but signals of time; ``stiff`` is what
     goes on in its place where the system turns out to be stiff, if anything."""
@@ -35,7 +81,7 @@ class Plan:
     stiff: Tableau | None
     solver: str
     reason: str
-    instants: Array
+    instants: Instants
     step: float
     max_step: float
 
@@ -83,7 +129,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions, start: float =
         stiff=STIFF if tableau is DEFAULT and options.solver.casefold() == "auto" else None,
         solver=solver,
         reason=reason,
-        instants=sample_instants(stop, sample_time, start),
+        instants=Instants.between(start, stop, sample_time),
         step=step if step is not None else sample_time,
         max_step=max_step,
     )
@@ -144,21 +190,6 @@ def _sample_time(
     return sample_time
 
 
-def sample_instants(stop: float, sample_time: float, start: float = 0.0) -> Array:
-    """``start``, ``k sample_time`` for ``k = 0, 1, …`` between, and ``stop`` itself, ``(N,)`` s.
-
-    Each is one product, never a sum, so no error grows. An instant within a billionth of a sample time of the
-    stop time is the stop time.
-    """
-    last = math.ceil(stop / sample_time - 1e-9)
-    instants: Array = np.arange(last + 1, dtype=np.float64) * sample_time
-    instants[-1] = stop
-    if start > 0.0:
-        after = instants[instants > start + 1e-9 * sample_time]
-        instants = np.concatenate([[start], after if after.size else [stop]])
-    return instants
-
-
 def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | ArrayLike | None) -> Array:
     """The flat parameters ``(np,)``: the system's own values, changed where ``given`` names others.
 
@@ -169,28 +200,41 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
         return system.parameter_values
     layout = system.parameters
     if isinstance(given, Mapping):
-        p = system.parameter_values.copy()
-        for name, value in given.items():
-            if name not in layout.ranges:
-                raise UnknownNameError("parameter", name, layout.names, where=system.name)
-            slot = layout[name]
-            array = np.asarray(value, dtype=np.float64)
-            if array.shape not in ((), slot.shape):
-                raise InputError(
-                    f"parameter '{name}' got a value of shape {array.shape}",
-                    where=system.name,
-                    allowed=f"shape {slot.shape}, or one number for all of it",
-                )
-            p[layout.ranges[name]] = np.broadcast_to(array, slot.shape).ravel()
-    else:
-        p = np.array(given, dtype=np.float64)
-        if p.shape != (layout.size,):
+        return changed_parameters(system, system.parameter_values, given)
+    p = np.array(given, dtype=np.float64)
+    if p.shape != (layout.size,):
+        raise InputError(
+            f"the parameter vector has shape {p.shape}",
+            where=system.name,
+            allowed=f"({layout.size},): one number for each of {', '.join(layout.names) or 'none'}",
+        )
+    return _finite(system, p)
+
+
+def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, ArrayLike]) -> Array:
+    """A copy of the flat parameters ``(np,)`` with the values of some by ``block.parameter``.
+
+    Raises ``UnknownNameError`` and ``InputError``.
+    """
+    layout, p = system.parameters, p.copy()
+    for name, value in given.items():
+        if name not in layout.ranges:
+            raise UnknownNameError("parameter", name, layout.names, where=system.name)
+        slot = layout[name]
+        array = np.asarray(value, dtype=np.float64)
+        if array.shape not in ((), slot.shape):
             raise InputError(
-                f"the parameter vector has shape {p.shape}",
+                f"parameter '{name}' got a value of shape {array.shape}",
                 where=system.name,
-                allowed=f"({layout.size},): one number for each of {', '.join(layout.names) or 'none'}",
+                allowed=f"shape {slot.shape}, or one number for all of it",
             )
+        p[layout.ranges[name]] = np.broadcast_to(array, slot.shape).ravel()
+    return _finite(system, p)
+
+
+def _finite(system: CompiledSystem, p: Array) -> Array:
     if not np.isfinite(p).all():
+        layout = system.parameters
         bad = next(slot.name for slot in layout if not np.isfinite(p[layout.ranges[slot.name]]).all())
         raise InputError(
             f"parameter '{bad}' is {p[layout.ranges[bad]].tolist()}",

@@ -26,6 +26,15 @@ def element_names(slot: Slot) -> tuple[str, ...]:
     return slot.elements
 
 
+def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:
+    """The path of a signal that may be called by another name. Raises ``UnknownNameError``."""
+    if name in layout.ranges:
+        return name
+    if name in aliases:
+        return aliases[name]
+    raise UnknownNameError("signal", name, [*layout.names, *aliases], where=where)
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
     """How a run went.
@@ -53,12 +62,21 @@ class RunReport:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ParameterChange:
+    """Tunable parameters, ``block.parameter``, that got other ``values`` at a ``time`` (s) of the run."""
+
+    time: float
+    values: Mapping[str, Array]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class SimulationResult:
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
-    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used;
-    ``final_state`` what a run needs to go on from here, ``None`` where it failed.
+    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
+    its end where there were ``parameter_changes``; ``final_state`` what a run needs to go
+    on from here, ``None`` where it failed.
     """
 
     name: str
@@ -72,6 +90,7 @@ class SimulationResult:
     aliases: Mapping[str, str]
     run: RunReport
     final_state: RunState | None = None
+    parameter_changes: tuple[ParameterChange, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -93,11 +112,7 @@ class SimulationResult:
 
         Raises ``UnknownNameError`` with the nearest name.
         """
-        if name in self.signals_layout.ranges:
-            return name
-        if name in self.aliases:
-            return self.aliases[name]
-        raise UnknownNameError("signal", name, [*self.names, *self.aliases], where=self.name)
+        return signal_path(name, self.signals_layout, self.aliases, self.name)
 
     def __getitem__(self, name: str) -> Array:
         path = self.resolve(name)
