@@ -128,9 +128,9 @@ def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None
                 if old != new:
                     return None
                 continue
-            value: Array = np.asarray(new, dtype=np.float64)
-            if value.shape != np.shape(old):
+            numbers: tuple[Array, Array] = (np.asarray(old), np.asarray(new))
+            if numbers[0].shape != numbers[1].shape:
                 return None
-            if value.tobytes() != np.asarray(old, dtype=np.float64).tobytes():
-                tuned[f"{name}.{rule.name}"] = value
+            if numbers[0].tobytes() != numbers[1].tobytes():
+                tuned[f"{name}.{rule.name}"] = numbers[1]
     return tuned
