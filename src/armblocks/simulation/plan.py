@@ -208,13 +208,14 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
             where=system.name,
             allowed=f"({layout.size},): one number for each of {', '.join(layout.names) or 'none'}",
         )
-    return _finite(system, p)
+    # An infinite limit is a value that the diagram itself may have.
+    return _refuse(system, p, ~np.isfinite(p) & np.isfinite(system.parameter_values))
 
 
 def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, ArrayLike]) -> Array:
     """A copy of the flat parameters ``(np,)`` with the values of some by ``block.parameter``.
 
-    Raises ``UnknownNameError`` and ``InputError``.
+    Infinite ones pass, because limits may be infinite: a block knows which. Raises ``UnknownNameError`` and ``InputError``.
     """
     layout, p = system.parameters, p.copy()
     for name, value in given.items():
@@ -229,15 +230,16 @@ def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, Arr
                 allowed=f"shape {slot.shape}, or one number for all of it",
             )
         p[layout.ranges[name]] = np.broadcast_to(array, slot.shape).ravel()
-    return _finite(system, p)
+    return _refuse(system, p, np.isnan(p))
 
 
-def _finite(system: CompiledSystem, p: Array) -> Array:
-    if not np.isfinite(p).all():
+def _refuse(system: CompiledSystem, p: Array, bad: NDArray[np.bool_]) -> Array:
+    """``p`` itself. Raises ``InputError`` naming the first parameter with a bad number."""
+    if bad.any():
         layout = system.parameters
-        bad = next(slot.name for slot in layout if not np.isfinite(p[layout.ranges[slot.name]]).all())
+        name = next(slot.name for slot in layout if bad[layout.ranges[slot.name]].any())
         raise InputError(
-            f"parameter '{bad}' is {p[layout.ranges[bad]].tolist()}",
+            f"parameter '{name}' is {p[layout.ranges[name]].tolist()}",
             where=system.name,
             allowed="finite numbers",
             fix="NaN and infinities cannot be simulated",
