@@ -215,7 +215,9 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
 def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, ArrayLike]) -> Array:
     """A copy of the flat parameters ``(np,)`` with the values of some by ``block.parameter``.
 
-    Infinite ones pass, because limits may be infinite: a block knows which. Raises ``UnknownNameError`` and ``InputError``.
+    Infinite ones pass, because limits may be infinite: a block knows which.
+
+    Raises ``UnknownNameError`` and ``InputError``.
     """
     layout, p = system.parameters, p.copy()
     for name, value in given.items():
