@@ -19,6 +19,7 @@ PROMISED = {
     "puma560_computed_torque",
     "puma560_multirate",
     "puma560_payload_drop",
+    "robertson_kinetics",
     "van_der_pol_pid",
 }
 
@@ -126,6 +127,24 @@ def test_van_der_pol_with_pid_agrees_with_scipy() -> None:
     found = [result["x1/y"][-1], result["x2/y"][-1]]
     # 100 s on a limit cycle at rtol 1e-6: the phase has drifted by some 1e-5 s.
     np.testing.assert_allclose(found, reference.y[:2, -1], atol=2e-4)
+
+
+def test_robertson_kinetics_agrees_with_published_values_and_radau() -> None:
+    """At 40 s and 400 s the values that CVODE's example program prints, to their four digits."""
+    result = ab.simulate("robertson_kinetics")
+    for t, values in {40: (7.158e-1, 9.185e-6, 2.842e-1), 400: (4.505e-1, 3.223e-6, 5.495e-1)}.items():
+        (i,) = np.flatnonzero(np.isclose(result.time, t, atol=1e-9))
+        np.testing.assert_allclose([result[name][i] for name in "ABC"], values, rtol=2e-4)
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        slow, fast, back = 0.04 * y[0], 3e7 * y[1] ** 2, 1e4 * y[1] * y[2]
+        return [back - slow, slow - back - fast, fast]
+
+    at = result.time[::50]
+    reference = solve_ivp(rates, (0, 400), [1, 0, 0], method="Radau", rtol=1e-10, atol=1e-14, t_eval=at)
+    found = np.array([result[name][::50] for name in "ABC"])
+    np.testing.assert_allclose(found, reference.y, rtol=2e-5, atol=1e-12)
+    np.testing.assert_allclose(result["total"], 1.0, rtol=1e-13)
 
 
 def test_every_example_says_what_it_shows(example: Diagram) -> None:

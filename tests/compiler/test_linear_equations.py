@@ -1,0 +1,114 @@
+"""Native linear equations of a stiff step, against NumPy: sparse, whole, and from one to the other."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+import pytest
+
+from armblocks.compiler.elimination import JacobianPattern
+from armblocks.compiler.ir_text import Module
+from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations
+from armblocks.compiler.native import load_code
+
+GAMMA, H = 0.25, 0.1
+
+
+class Solver:
+    """The native functions for one pattern, called from outside."""
+
+    def __init__(self, J: np.ndarray, states: int) -> None:
+        rows, columns = np.nonzero(J)
+        pattern = JacobianPattern(
+            states=states, size=len(J), rows=tuple(rows.tolist()), columns=tuple(columns.tolist())
+        )
+        self.space = LinearSpace(pattern)
+        module = Module()
+        emit_linear_equations(module, self.space, GAMMA)
+        plan = self.space.plan is not None
+        judged = "  %g = call i1 @solved_well(ptr %s, double %h)\n  %r = zext i1 %g to i64\n  ret i64 %r\n}"
+        for name, function in (("sparse", "factor" if plan else "factor_whole"), ("whole", "factor_whole")):
+            module.add(
+                name,
+                f"define i64 @{name}(ptr %s, double %h) {{\n  call void @{function}(ptr %s, double %h)\n"
+                "  call void @solve_linear(ptr %s)\n" + (judged if plan else "  ret i64 1\n}"),
+            )
+        self.code = load_code(("linear equations test", repr(pattern)), lambda: module.text)
+        kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_double)
+        self.functions = {name: kind(self.code.address(name)) for name in ("sparse", "whole")}
+        self.scratch = np.empty(self.space.length)
+        self.scratch[: len(rows)] = J[rows, columns]
+        E = np.zeros(len(J))
+        E[:states] = 1.0 / GAMMA
+        self.matrix = np.diag(E) - H * J
+
+    def solve(self, how: str, right: np.ndarray) -> tuple[bool, np.ndarray]:
+        """Whether it counts as well solved, and the solution."""
+        space = self.space
+        self.scratch[space.right : space.right + space.size] = right
+        good = self.functions[how](self.scratch.ctypes.data, H)
+        return bool(good), self.scratch[space.solution : space.solution + space.size].copy()
+
+
+def random_sparse(seed: int, n: int, filled: float) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    return np.where(random.random((n, n)) < filled, random.normal(size=(n, n)), 0.0)
+
+
+@pytest.mark.parametrize(("n", "filled"), [(1, 1.0), (5, 0.5), (12, 0.9), (60, 0.05)])
+def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
+    solver = Solver(random_sparse(n, n, filled) + np.eye(n), n)
+    right = np.random.default_rng(0).normal(size=n)
+    for how in ("sparse", "whole"):
+        good, found = solver.solve(how, right)
+        assert good
+        np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-10, atol=1e-12)
+
+
+def test_small_and_full_matrices_have_no_plan() -> None:
+    assert Solver(random_sparse(1, 8, 0.2), 8).space.plan is None
+    assert Solver(np.ones((20, 20)), 20).space.plan is None
+    assert Solver(np.eye(20), 20).space.plan is not None
+
+
+def test_a_vanishing_pivot_is_noticed_and_pivoting_helps() -> None:
+    """A chain whose first pivot ``1 / gamma - h J`` is a rounding error beside its neighbours."""
+    n = 40
+    J = np.diag(np.full(n - 1, 1.0), 1) + np.diag(np.full(n - 1, -2.0), -1) + np.diag(np.full(n, -1.0))
+    for k in range(0, n, 4):
+        J[k, k] = (1.0 / GAMMA - 1e-17) / H
+    solver = Solver(J, n)
+    right = np.random.default_rng(3).normal(size=n)
+    expected = np.linalg.solve(solver.matrix, right)
+    good, _ = solver.solve("sparse", right)
+    assert not good
+    good, found = solver.solve("whole", right)
+    assert good
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_the_judgement_does_not_depend_on_units() -> None:
+    """States in units from 1e-12 to 1e12: the same elimination, and as good."""
+    n = 30
+    J = random_sparse(7, n, 0.06) - np.eye(n)
+    units = 10.0 ** np.random.default_rng(1).integers(-12, 13, n)
+    right = np.random.default_rng(2).normal(size=n)
+    good, plain = Solver(J, n).solve("sparse", right)
+    assert good
+    good, scaled = Solver(J * units[:, np.newaxis] / units, n).solve("sparse", right * units)
+    assert good
+    np.testing.assert_allclose(scaled / units, plain, rtol=1e-9, atol=1e-11)
+
+
+def test_implicit_equations_are_eliminated_with_the_states() -> None:
+    """Their own places are empty: each is matched with another one's unknown."""
+    n, m = 20, 4
+    J = random_sparse(5, n + m, 0.1)
+    J[n:, n:] = np.roll(np.diag([1.0, 2.0, 3.0, 4.0]), 1, axis=0)
+    solver = Solver(J, n)
+    assert solver.space.plan is not None
+    right = np.random.default_rng(4).normal(size=n + m)
+    good, found = solver.solve("sparse", right)
+    assert good
+    np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-9)
