@@ -14,6 +14,7 @@ from pathlib import Path
 
 import paper_model
 import startup
+import stiff
 from measure import machine_lines, reachable_peak
 
 import dynamics
@@ -129,7 +130,12 @@ def startup_part(repeats: int) -> list[str]:
     return [*lines, "", f"`import numpy` alone: {numpy.median:.3f} s. Whole processes, medians."]
 
 
-PARTS = {"dynamics": dynamics_part, "diagram": diagram_part, "startup": startup_part}
+PARTS = {
+    "dynamics": dynamics_part,
+    "diagram": diagram_part,
+    "startup": startup_part,
+    "stiff": stiff.stiff_part,
+}
 
 
 def main() -> None:

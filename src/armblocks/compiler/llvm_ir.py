@@ -17,11 +17,14 @@ it out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.ir_text import Body, Module, number_text
 from armblocks.compiler.opcodes import COMPARISONS, Opcode
 from armblocks.compiler.tape import Tape
+
+MANY_CONSTANTS = 32
+"""From here on an output's constants are copied from a table."""
 
 LoadInput = Callable[[int], str]
 """Gives the value of an input register, in all lanes."""
@@ -51,16 +54,46 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
             address = body.let(f"getelementptr inbounds double, {places[register]}")
             return body.let(f"load double, ptr {address}, align 8")
 
-        registers = emit_operations(body, tape, load)
+        # Each result is stored as soon as it is known: thousands that wait for the end would be spilled and
+        # loaded again, and the compiler takes time in proportion to the square of their count.
+        outputs: dict[int, list[tuple[int, int]]] = {}
         for slot, members in enumerate(tape.outputs):
+            copied = _copy_constants(body, tape, members, slot, f"{name}.constants{slot}")
             for place, register in enumerate(members):
+                if not (copied and tape.first_constant <= register < tape.first_operation):
+                    outputs.setdefault(register, []).append((slot, place))
+
+        def store(register: int, registers: Registers) -> None:
+            for slot, place in outputs.pop(register, ()):
                 address = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {place}")
                 body.do(f"store double {registers.number(register)}, ptr {address}, align 8")
+
+        registers = emit_operations(body, tape, load, store)
+        for register in list(outputs):
+            store(register, registers)
         body.do("ret void")
         head = f"define {linkage} void @{name}({', '.join(arguments)}) nounwind {{\nentry:\n"
         return head + "\n".join(body.lines) + "\n}"
 
     module.define(name, write)
+
+
+def _copy_constants(body: Body, tape: Tape, members: Sequence[int], slot: int, symbol: str) -> bool:
+    """Write an output of which many numbers are constants (a Jacobian's) in one go; whether it was worth it.
+
+    LLVM would look for neighbours of each constant store, which takes long.
+    """
+    span = range(tape.first_constant, tape.first_operation)
+    values = [tape.constants[k - span.start] if k in span else 0.0 for k in members]
+    if sum(k in span for k in members) < MANY_CONSTANTS:
+        return False
+    module = body.module
+    numbers = ", ".join(f"double {number_text(value)}" for value in values)
+    module.add(symbol, f"@{symbol} = internal constant [{len(values)} x double] [{numbers}]")
+    module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
+    size = f"i64 {8 * len(values)}, i1 false"
+    body.do(f"call void @llvm.memcpy.p0.p0.i64(ptr align 8 %o{slot}, ptr align 8 @{symbol}, {size})")
+    return True
 
 
 class Registers:
@@ -110,8 +143,13 @@ class Registers:
         return value
 
 
-def emit_operations(body: Body, tape: Tape, load: LoadInput) -> Registers:
-    """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read."""
+def emit_operations(
+    body: Body, tape: Tape, load: LoadInput, written: Callable[[int, Registers], None] | None = None
+) -> Registers:
+    """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read.
+
+    ``written(register, registers)`` is called after each operation.
+    """
     from armblocks.compiler import elementary  # not needed where code comes from the disk cache
 
     registers = Registers(body, tape, load)
@@ -132,6 +170,8 @@ def emit_operations(body: Body, tape: Tape, load: LoadInput) -> Registers:
         else:
             values = [registers.number(operand) for operand in operands]
             registers.set_number(target, _emit_number(body, opcode, values))
+        if written is not None:
+            written(target, registers)
     return registers
 
 
