@@ -48,13 +48,16 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 def puma560_multirate() -> Diagram:
     """Six axes with a position loop of 1 kHz around a current loop of 10 kHz in each motor.
 
-    The current loop: PI with zero at R / L, crossing over at 3000 rad/s, of the voltage supply's 40 V.
+    The current loop: PI with zero at R / L, crossing over at 3000 rad/s, of a supply of 40 V.
+    At the start the currents hold the arm against gravity.
     """
-    robot = load_robot("puma560").robot.nofriction(viscous=False)
+    puma = load_robot("puma560")
+    robot = puma.robot.nofriction(viscous=False)
     k = np.array([0.19, 0.22, 0.20, 0.075, 0.066, 0.066])
     R = np.array([2.1, 2.1, 2.1, 6.7, 6.7, 6.7])
     L = R * 1e-3
     crossover = 3000.0
+    hold = puma.gravload(np.zeros(6)) / (robot.gear_ratios * k)
     builder = DiagramBuilder(
         "puma560_multirate",
         description="a Puma with a 1 kHz position and a 10 kHz current loop",
@@ -78,11 +81,13 @@ def puma560_multirate() -> Diagram:
             lower=-40.0,
             upper=40.0,
             anti_windup="clamping",
+            initial_integral=R * hold,
             sample_time=1e-4,
         ),
         error,
     )
-    motors = builder.add("motors", MotorWinding(R=R, L=L, k=k, gear_ratio=robot.gear_ratios))
+    winding = MotorWinding(R=R, L=L, k=k, gear_ratio=robot.gear_ratios, initial_current=hold)
+    motors = builder.add("motors", winding)
     builder.connect(current, motors["v"])
     builder.connect(arm["qd"], motors["w"])
     builder.connect(motors["tau"], arm)
@@ -92,9 +97,9 @@ def puma560_multirate() -> Diagram:
     builder.add("Tracking error", Scope(), lag)
     builder.add("Currents", Scope(), motors["i"])
     builder.add("Voltages", Scope(), current)
+    builder.place(position, 200, 150, width=130)
     for name, x, y in (
         ("path", 40, 160),
-        ("position loop", 220, 160),
         ("1 kHz", 400, 180),
         ("to current", 520, 180),
         ("current error", 660, 180),
@@ -173,9 +178,9 @@ def puma560_payload_drop() -> Diagram:
     builder.add("Joint angles", Scope(), arm["q"])
     builder.add("Joint torques", Scope(), held)
     builder.add("Tool path", XYGraph(), tool["x"], tool["z"])
+    builder.place(control, 200, 150, width=130)
     for name, x, y in (
         ("path", 40, 160),
-        ("computed torque", 220, 160),
         ("1 kHz", 420, 190),
         ("payload", 420, 300),
         ("arm", 600, 200),

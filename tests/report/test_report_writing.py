@@ -9,13 +9,25 @@ import numpy as np
 import pytest
 
 import armblocks as ab
-from armblocks.blocks import Constant, Display, Integrator, JTraj, Rne, RobotPlot, Scope, SineWave, XYGraph
+from armblocks.blocks import (
+    Constant,
+    Display,
+    Fkine,
+    Integrator,
+    JTraj,
+    Rne,
+    RobotPlot,
+    Scope,
+    SineWave,
+    T2xyz,
+    XYGraph,
+)
 from armblocks.diagram import DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, LimitWarning, UnknownNameError
 from armblocks.report import write_report
 from armblocks.report.figures import file_name, for_people
-from armblocks.robot import JointLimits, Robot
+from armblocks.robot import JointLimits, Robot, serial_chain, standard_dh
 
 VOID = {"meta", "br", "img", "link", "rect", "path", "circle", "image"}
 
@@ -69,6 +81,21 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     diagram = ab.load_diagram("kr180model")
     write_report(folder, diagram, ab.simulate(diagram))
     return folder
+
+
+def test_an_xy_graph_of_two_lengths_has_one_scale(tmp_path: Path) -> None:
+    """0.5 m beside 2 m: both in m, where 0.5 m alone would be 500 mm."""
+    arm = serial_chain([standard_dh("reach", a=0.5, d=2.0)])
+    builder = ab.DiagramBuilder("reach")
+    q = builder.add("q", Constant(value=(0.0,)))
+    pose = builder.add("pose", Fkine(robot=Robot(name="reach", links=arm)), q)
+    place = builder.add("place", T2xyz(), pose)
+    builder.add("Side", XYGraph(), place["x"], place["z"])
+    diagram = builder.build()
+    write_report(tmp_path, diagram, ab.simulate(diagram))
+    figure = (tmp_path / "figures" / "xy-side.svg").read_text()
+    assert "place/x, m<" in figure
+    assert "place/z, m<" in figure
 
 
 def test_the_papers_report_is_complete(paper: Path) -> None:

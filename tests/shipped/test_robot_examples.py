@@ -194,7 +194,9 @@ def test_puma560_multirate_is_the_sampled_loops_written_out() -> None:
     motors, path = diagram.blocks["motors"], diagram.blocks["path"]
     R, L, k = (np.array(motors.parameter_value(name)) for name in "RLk")
     G = arm.robot.gear_ratios
-    integral, x, tau = np.zeros(6), np.zeros(18), np.zeros(6)
+    integral = np.array(diagram.blocks["current loop"].parameter_value("initial_integral"))
+    x, tau = np.zeros(18), np.zeros(6)
+    x[12:] = motors.parameter_value("initial_current")
     for tick in range(200):
         t = tick * 1e-4
         q, qd, i = np.split(x, 3)

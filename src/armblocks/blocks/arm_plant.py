@@ -58,7 +58,7 @@ class ArmPlant(Block):
     """
 
     family: ClassVar[str] = "robots"
-    title: ClassVar[str] = "Robot with Dry Friction and Stops"
+    title: ClassVar[str] = "Arm Plant"
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The Puma falls onto the end stop of its shoulder and, by the friction of its motors, to rest.",

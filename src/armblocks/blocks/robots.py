@@ -259,6 +259,9 @@ class Coriolis(Block):
 class ForwardDynamics(Block):
     """The robot moved by torques: q'' = accel(q, q', tau), from q(0) = q0 at speed qd0.
 
+    Where joints come to rest against Coulomb friction, its equations jump at every turn and steps become
+    tiny: take ArmPlant there, whose joints stick, or a robot without that friction.
+
     This is the toolbox's block Robot. There, q0 is the start since the tags 9.7 (2013); before, the
     parameter was not connected and the robot started at zero. qd0 is zero there.
     """

@@ -76,7 +76,7 @@ def face_size(block: Block) -> tuple[FaceShape, float, float]:
             return FaceShape.CARD, 104.0, max(40.0, 24.0 * block.inputs + 8)
         case kinds.Scope() | kinds.XYGraph():
             return FaceShape.CARD, 72.0, 60.0
-        case kinds.JTraj() | kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics():
+        case kinds.JTraj() | kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
             return FaceShape.CARD, 84.0, 64.0
         case kinds.Terminator():
             return FaceShape.CARD, 34.0, 34.0
@@ -139,7 +139,7 @@ def face(block: Block, room: Room, trend: Trend | None) -> list[Mark]:
             return _display(room, block.inputs, trend)
         case kinds.ToWorkspace():
             return _words(room, block.variable, size=11)
-        case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics():
+        case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
             return _robot(room, block.robot, caption)
         case _:
