@@ -88,6 +88,44 @@ def frequency_response(system: LinearSystem, frequencies: Array) -> Complex:
     return evaluate(system, on_the_edge(system, frequencies))
 
 
+def gain_and_phase(system: LinearSystem, frequencies: Array) -> tuple[Array, Array]:
+    """Magnitude and continuous phase in degrees, (N, ny, nu) each, at rising frequencies (rad/s).
+
+    The phase starts at the multiple of 360 degrees that puts it next to -90 degrees for every integrator.
+    An undamped pole turns it by -180 degrees, an undamped zero by +180, as if they were hardly damped.
+    """
+    response = frequency_response(system, frequencies)
+    phase = np.degrees(np.unwrap(np.angle(response), axis=0))
+    for row in range(phase.shape[1]):
+        for column in range(phase.shape[2]):
+            part = system.select([system.outputs[row]], [system.inputs[column]]).minimal()
+            _mend_phase(part, frequencies, phase[:, row, column])
+    return np.abs(response), phase
+
+
+def _mend_phase(part: LinearSystem, frequencies: Array, phase: Array) -> None:
+    """Put right, in place, what unwrapping alone cannot know."""
+    integrators = 0
+    for roots, way in ((part.poles(), -1.0), (part.zeros(), 1.0)):
+        s = as_continuous(part, roots)
+        size = max(float(np.abs(s).max(initial=0.0)), 1e-300)
+        integrators -= int(way) * sum(abs(root) <= 1e-7 * size for root in s.tolist())
+        undamped = (np.abs(s.real) <= 1e-9 * np.abs(s)) & (s.imag > 1e-7 * size)
+        for frequency in s.imag[undamped].tolist():
+            k = int(np.searchsorted(frequencies, float(frequency)))
+            if 0 < k < len(phase) and way * (phase[k] - phase[k - 1]) < -90.0:
+                phase[k:] += way * 360.0
+    expected = -90.0 * integrators - 1e-6  # of +180 and -180 degrees the lower one
+    phase += 360.0 * round((expected - float(phase[0])) / 360.0)
+
+
+def as_continuous(system: LinearSystem, roots: Complex) -> Complex:
+    """The roots in rad/s: of a sampled system ``log(z) / dt``, without those at ``z = 0``."""
+    if not system.is_discrete:
+        return roots
+    return np.asarray(np.log(roots[roots != 0.0]) / system.dt, dtype=np.complex128)
+
+
 def dcgain(system: LinearSystem) -> Array:
     """The response at rest of what lies between each input and each output."""
     place = np.array([1.0 if system.is_discrete else 0.0], dtype=np.complex128)

@@ -207,7 +207,7 @@ class _Search:
         residuals = self.residuals(point)
         damping, scale = 1e-3, np.zeros(len(self.unknowns))
         for iteration in range(MOST_ITERATIONS):
-            if not residuals.size or not residuals.any():
+            if float(np.abs(residuals).max(initial=0.0)) <= 1e-6 * self.problem.tolerance:
                 return point, iteration
             slopes = self.slopes(point)
             if not np.isfinite(slopes).all() or not np.isfinite(residuals).all():

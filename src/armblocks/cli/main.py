@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from armblocks.cli import bench, blocks, listing, run, show
+from armblocks.cli import bench, blocks, linearize, listing, run, show, trim
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
@@ -47,6 +47,8 @@ app = typer.Typer(
     help="Industrial arms and block diagrams, traced once and compiled to native code.",
 )
 app.command("run")(run.run)
+app.command("linearize")(linearize.linearize)
+app.command("trim")(trim.trim)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)

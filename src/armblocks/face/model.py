@@ -101,8 +101,9 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
     return known
 
 
-def _run_state(system: HybridSystem, point: OperatingPoint) -> RunState:
+def state_at(diagram: Diagram | CompiledDiagram, point: OperatingPoint) -> RunState:
     """The state of a run that stands at an operating point."""
+    system = (diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)).system
     layouts = (system.states, system.discrete, system.algebraic)
     parts = (point.states, point.discrete, point.algebraic)
     states, discrete, algebraic = (layout.pack(part) for layout, part in zip(layouts, parts))
@@ -140,7 +141,7 @@ def simulate(
     """
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
     if isinstance(initial_state, OperatingPoint):
-        initial_state = _run_state(model.system, initial_state)
+        initial_state = state_at(model, initial_state)
     if initial_state is not None and not isinstance(initial_state, RunState):
         initial_state = RunState.load(initial_state)
     options = _options(model, settings, "simulate")

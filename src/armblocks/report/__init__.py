@@ -2,6 +2,10 @@
 
 from armblocks.report.arm_picture import arm_picture, arm_picture_svg, moments_picture
 from armblocks.report.diagram_drawing import block_picture, diagram_picture, diagram_svg
+from armblocks.report.frequency_charts import bode_picture, nyquist_picture
+from armblocks.report.linear_report import write_linear_report
+from armblocks.report.response_charts import impulse_picture, step_picture
+from armblocks.report.root_charts import pole_zero_picture, root_locus_picture
 from armblocks.report.writing import ReportFiles, write_report
 
 __all__ = [
@@ -9,8 +13,15 @@ __all__ = [
     "arm_picture",
     "arm_picture_svg",
     "block_picture",
+    "bode_picture",
     "diagram_picture",
     "diagram_svg",
+    "impulse_picture",
     "moments_picture",
+    "nyquist_picture",
+    "pole_zero_picture",
+    "root_locus_picture",
+    "step_picture",
+    "write_linear_report",
     "write_report",
 ]

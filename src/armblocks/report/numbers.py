@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MINUS = "\u2212"
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 
@@ -30,6 +31,37 @@ def nice_ticks(low: float, high: float, count: int, *, degrees: bool = False) ->
     first = math.ceil(low / step - 1e-9)
     last = math.floor(high / step + 1e-9)
     return [k * step + 0.0 for k in range(first, last + 1)]
+
+
+def log_ticks(low: float, high: float) -> tuple[list[float], list[float]]:
+    """Places on a logarithmic axis: those with a number (powers of ten; 1, 2 and 5 times on a short axis),
+    and finer ones without."""
+    first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
+    inside = [
+        factor * 10.0**power
+        for power in range(first, last + 1)
+        for factor in range(1, 10)
+        if low * (1 - 1e-9) <= factor * 10.0**power <= high * (1 + 1e-9)
+    ]
+    decades = math.log10(high / low)
+    step = max(1, math.ceil(decades / 9.0))
+    named = (1, 2, 5) if decades < 2.0 else (1,)
+
+    def is_named(value: float) -> bool:
+        power = math.floor(math.log10(value) + 1e-9)
+        return round(value / 10.0**power) in named and power % step == 0
+
+    labels = [value for value in inside if is_named(value)]
+    finer = [value for value in inside if value not in labels] if decades < 7.0 else []
+    return labels, finer
+
+
+def power_of_ten(value: float) -> str:
+    """``0.01``, ``100``, and ``1e5`` written with a raised exponent where plain digits would be long."""
+    power = math.log10(value)
+    if abs(power - round(power)) < 1e-9 and not -3 <= round(power) <= 4:
+        return "10" + str(round(power)).translate(_RAISED)
+    return axis_number(value)
 
 
 def axis_number(value: float, digits: int = 6) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,28 @@ class Scale:
     def array(self, values: _Array) -> _Array:
         """The map over an array."""
         return self.start + (values - self.low) * self.factor
+
+
+@dataclass(frozen=True)
+class LogScale:
+    """Logarithmic map from a range of positive numbers to a range of px."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        return self.start + (math.log10(value) - math.log10(self.low)) * self.factor
+
+    @property
+    def factor(self) -> float:
+        """px per decade."""
+        return (self.end - self.start) / (math.log10(self.high) - math.log10(self.low))
+
+    def array(self, values: _Array) -> _Array:
+        """The map over an array."""
+        return self.start + (np.log10(values) - math.log10(self.low)) * self.factor
 
 
 def padded(values: _Array, share: float) -> tuple[float, float]:

@@ -54,7 +54,7 @@ def write_report(
         if name not in DATA_FORMATS:
             raise UnknownNameError("data format", name, DATA_FORMATS, where="write_report")
     place = Path(folder)
-    _make_folder(place / "figures")
+    make_folder(place / "figures")
     found = motions(diagram, result) if result.time.size > 1 else ()
     summaries = tuple(_summary(motion) for motion in found)
     figures = _figures(diagram, result, found)
@@ -112,7 +112,8 @@ def _encoded(figure: Figure, kind: str) -> bytes:
     return picture_png(figure.picture)
 
 
-def _make_folder(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
+    """Make a folder if absent. Raises ``FormatError`` where that cannot be."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

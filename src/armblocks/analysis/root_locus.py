@@ -1,0 +1,116 @@
+"""Where the poles of a closed loop go while its gain grows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+MOST_GAINS = 3000
+FINEST = 1e-7
+"""Neighbouring gains are not brought nearer to each other than by this share."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RootLocus:
+    """``roots`` (N, nx) of ``1 + gain L`` at ``gains`` (N,), each column one branch from a pole of L."""
+
+    system: LinearSystem
+    gains: Array
+    roots: Complex
+    zeros: Complex
+
+
+def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
+    """The branches of a loop with negative feedback; ``gains`` ``None``: from 0 on, as far as things happen.
+
+    Gains lie closer where the roots move fast, so that branches are told apart where they meet. Raises
+    ``InputError`` for more than one input or output, and where there is no state.
+    """
+    if not system.is_siso or not system.order:
+        raise InputError(
+            f"a root locus of {system.D.shape[1]} inputs, {system.D.shape[0]} outputs and {system.order} "
+            "states is asked for",
+            where=system.name,
+            allowed="one input, one output, and one state or more",
+            fix="choose with system.select(output, input)",
+        )
+    loop = system.minimal()
+    zeros = loop.zeros()
+    if gains is not None:
+        chosen = np.asarray(gains, dtype=np.float64)
+        rows = [_roots(loop, float(gain)) for gain in chosen]
+    else:
+        chosen, rows = _adapted(loop, zeros)
+    return RootLocus(system=loop, gains=chosen, roots=_tracked(rows), zeros=zeros)
+
+
+def extent(loop: LinearSystem, zeros: Complex) -> float:
+    """How far from the origin the picture of a locus reaches."""
+    if loop.is_discrete:
+        return 1.5
+    return 3.0 * max(float(np.abs(np.concatenate([loop.poles(), zeros])).max(initial=0.0)), 1e-9)
+
+
+def _roots(loop: LinearSystem, gain: float) -> Complex:
+    from scipy.linalg import eigvals
+
+    direct = 1.0 + gain * float(loop.D[0, 0])
+    if direct == 0.0:  # at this gain alone a root is infinite
+        return _roots(loop, gain * (1.0 + FINEST))
+    return eigvals(loop.A - (gain / direct) * (loop.B @ loop.C))
+
+
+def _adapted(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
+    """Gains up to where every root is next to a zero or out of the picture."""
+    reach = extent(loop, zeros)
+    last = 1e-6 / max(float(np.abs(loop.B).max() * np.abs(loop.C).max()), 1e-12)
+    for _ in range(120):
+        roots = _roots(loop, last)
+        near = np.abs(roots[:, None] - zeros[None, :]).min(axis=1, initial=np.inf) < 0.01 * reach
+        if bool((near | (np.abs(roots) > 1.3 * reach)).all()):
+            break
+        last *= 2.0
+    gains = [0.0, *np.geomspace(last * 1e-6, last, 80).tolist()]
+    rows = [_roots(loop, gain) for gain in gains]
+    k = 0
+    while k + 1 < len(gains) and len(gains) < MOST_GAINS:
+        apart = gains[k + 1] - gains[k] > FINEST * gains[k + 1]
+        if apart and _moved(rows[k], rows[k + 1], reach) > 0.02 * reach:
+            between = (gains[k] + gains[k + 1]) / 2.0
+            gains.insert(k + 1, between)
+            rows.insert(k + 1, _roots(loop, between))
+        else:
+            k += 1
+    return np.array(gains), rows
+
+
+def _pairs(before: Complex, after: Complex) -> NDArray[np.intp]:
+    from scipy.optimize import linear_sum_assignment
+
+    return linear_sum_assignment(np.abs(before[:, None] - after[None, :]))[1]
+
+
+def _moved(before: Complex, after: Complex, reach: float) -> float:
+    """The farthest that a root went which is in the picture."""
+    partners = after[_pairs(before, after)]
+    seen = (np.abs(before) < 1.3 * reach) | (np.abs(partners) < 1.3 * reach)
+    return float((np.abs(partners - before) * seen).max(initial=0.0))
+
+
+def _tracked(rows: list[Complex]) -> Complex:
+    """Each root in the column of its nearest predecessor, all columns considered together."""
+    tracked = [rows[0]]
+    for row in rows[1:]:
+        tracked.append(row[_pairs(tracked[-1], row)])
+    return np.array(tracked)

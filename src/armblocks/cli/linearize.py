@@ -1,0 +1,158 @@
+"""``armblocks linearize``: the linear system of a diagram, in numbers and figures."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from armblocks.cli.assignments import parse_assignments
+from armblocks.cli.terminal import STRONG, results_console, table
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks import LinearSystem, OperatingPoint
+
+SECTION = 12
+"""Poles that are listed; more are counted."""
+
+
+def linearize(
+    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--input", metavar="SIGNAL", help="A signal or parameter that is moved; may be repeated."
+        ),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option("--output", metavar="SIGNAL", help="A signal that is looked at; may be repeated."),
+    ] = None,
+    opened: Annotated[
+        list[str] | None,
+        typer.Option("--open", metavar="SIGNAL", help="A signal whose loop is cut; may be repeated."),
+    ] = None,
+    at: Annotated[float, typer.Option(help="Time of the run to linearize at, s.")] = 0.0,
+    trimmed: Annotated[
+        bool, typer.Option("--trim", help="Linearize where the diagram rests, sought from there.")
+    ] = False,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--free", metavar="BLOCK.PARAMETER", help="With --trim: a parameter that is sought too."
+        ),
+    ] = None,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
+    ] = None,
+    save: Annotated[Path | None, typer.Option(help="Also write a .json, .npz or .mat file.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Folder for all figures.")] = None,
+    hertz: Annotated[bool, typer.Option("--hertz", help="Frequencies in Hz, not in rad/s.")] = False,
+) -> None:
+    """Print the exact linear system of a diagram: matrices, poles, zeros, margins.
+
+    A loop that is opened where it is moved and looked at is shown as the L of 1 + L, so with its sign turned.
+    """
+    import armblocks as ab
+
+    if free and not trimmed:
+        raise InputError(
+            "--free is given without --trim", allowed="--free with --trim only", fix="add --trim"
+        )
+    diagram = ab.load_diagram(model)
+    parameters = parse_assignments(assignments or [])
+    place: float | OperatingPoint = at
+    if trimmed:
+        place = ab.trim(diagram, free=free or (), at=at, parameters=parameters).point
+    system: LinearSystem = ab.linearize(
+        diagram, inputs or (), outputs or (), at=place, open=opened or (), parameters=parameters
+    )
+    loop = bool(opened) and opened == inputs == outputs and system.is_siso
+    shown = -system if loop else system
+    console = results_console()
+    print_system(shown, console, loop=loop, hertz=hertz)
+    if save is not None:
+        shown.save(save)
+        console.print(f"saved: {save}", soft_wrap=True)
+    if report is not None:
+        from armblocks.report import write_linear_report
+
+        files = write_linear_report(report, shown, loop=loop, hertz=hertz)
+        console.print(f"report: {report}, {len(files)} files", soft_wrap=True)
+
+
+def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: bool) -> None:
+    """Heading, matrices, poles, zeros and, of a single channel, what is told by numbers."""
+    from armblocks.analysis.text import complex_number, heading, matrices, matrix_lines
+
+    console.print(heading(system), style=STRONG)
+    for letter, matrix, rows, columns in matrices(system):
+        console.print()
+        console.print(letter, style=STRONG)
+        console.print("\n".join(matrix_lines(matrix, rows, columns)), soft_wrap=True)
+    if system.order:
+        _print_poles(system, console, hertz=hertz)
+    if system.inputs and system.outputs:
+        zeros = ", ".join(complex_number(zero) for zero in system.zeros().tolist()[:SECTION])
+        console.print(f"zeros: {zeros or 'none'}", soft_wrap=True)
+    if not system.is_siso:
+        return
+    console.print(f"gain at rest: {float(system.dcgain()[0, 0]):.6g}")
+    if loop:
+        _print_margins(system, console, hertz=hertz)
+    elif system.is_stable and math.isfinite(float(system.dcgain()[0, 0])) and system.dcgain()[0, 0]:
+        width = system.bandwidth()
+        if math.isfinite(width):
+            console.print(f"bandwidth (3 dB): {_frequency(width, hertz)}")
+
+
+def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None:
+    from armblocks.analysis.text import complex_number
+
+    unit = "Hz" if hertz else "rad/s"
+    rows = table(
+        ("pole", "left"), (f"frequency, {unit}", "right"), ("damping", "right"), ("time constant, s", "right")
+    )
+    modes = system.damp()
+    for mode in modes[:SECTION]:
+        rows.add_row(
+            complex_number(mode.pole),
+            f"{mode.frequency / (2 * math.pi if hertz else 1.0):.5g}",
+            f"{mode.damping:.4g}",
+            "-" if math.isinf(mode.time_constant) else f"{mode.time_constant:.4g}",
+        )
+    console.print()
+    console.print(rows)
+    if len(modes) > SECTION:
+        console.print(f"and {len(modes) - SECTION} more, faster ones")
+    console.print()
+
+
+def _print_margins(system: LinearSystem, console: Console, *, hertz: bool) -> None:
+    found = system.margins()
+    rows = table(("margin of 1 + L", "left"), ("", "right"), ("at", "right"))
+    if math.isfinite(found.gain):
+        text = f"{found.gain_decibels:.4g} dB (factor {found.gain:.4g})"
+        rows.add_row("gain", text, _frequency(found.gain_frequency, hertz))
+    else:
+        rows.add_row("gain", "infinite", "")
+    if math.isfinite(found.phase):
+        rows.add_row("phase", f"{found.phase:.4g} deg", _frequency(found.phase_frequency, hertz))
+        rows.add_row("delay", f"{found.delay:.4g} s", _frequency(found.delay_frequency, hertz))
+    else:
+        rows.add_row("phase", "infinite", "")
+    rows.add_row("distance from -1", f"{found.modulus:.4g}", _frequency(found.modulus_frequency, hertz))
+    console.print()
+    console.print(rows)
+    console.print("closed loop: " + ("stable" if found.stable else "unstable"))
+
+
+def _frequency(value: float, hertz: bool) -> str:
+    if math.isinf(value):
+        return "infinite frequency"
+    return f"{value / (2 * math.pi):.5g} Hz" if hertz else f"{value:.5g} rad/s"

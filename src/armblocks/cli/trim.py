@@ -1,0 +1,130 @@
+"""``armblocks trim``: the operating point at which a diagram rests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from armblocks.cli.assignments import parse_assignments, parse_value
+from armblocks.cli.terminal import STRONG, results_console, table
+from armblocks.errors import InputError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.trim import TrimResult
+
+
+def trim(
+    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    fixed: Annotated[
+        list[str] | None,
+        typer.Option("--fix", metavar="STATE=VALUE", help="A state with a given value; may be repeated."),
+    ] = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option("--free", metavar="BLOCK.PARAMETER", help="A parameter that is sought too."),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option("--output", metavar="SIGNAL=VALUE", help="A signal that has to have a value."),
+    ] = None,
+    moving: Annotated[
+        list[str] | None,
+        typer.Option("--moving", metavar="STATE", help="A state that need not rest; may be repeated."),
+    ] = None,
+    guess: Annotated[
+        list[str] | None,
+        typer.Option("--guess", metavar="NAME=VALUE", help="Where the search starts; may be repeated."),
+    ] = None,
+    bounds: Annotated[
+        list[str] | None,
+        typer.Option("--bound", metavar="NAME=LOW,HIGH", help="Range of a state or free parameter."),
+    ] = None,
+    at: Annotated[float, typer.Option(help="Time of the run to start the search at, s.")] = 0.0,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Save the point, for armblocks run --from-state, as .npz.")
+    ] = None,
+) -> None:
+    """Find the operating point at which a diagram rests, and print it."""
+    import armblocks as ab
+
+    diagram = ab.load_diagram(model)
+    parameters = parse_assignments(assignments or [])
+    found = ab.trim(
+        diagram,
+        states=_pairs(fixed, "--fix"),
+        free=free or (),
+        outputs=_pairs(outputs, "--output"),
+        moving=moving or (),
+        guess=_pairs(guess, "--guess"),
+        bounds={name: _ends(name, value) for name, value in _pairs(bounds, "--bound").items()},
+        at=at,
+        parameters=parameters,
+    )
+    console = results_console()
+    print_trim(found, console)
+    if save is not None:
+        from armblocks.face.model import state_at
+
+        state_at(diagram, found.point).save(save)
+        console.print(f"saved: {save}", soft_wrap=True)
+
+
+def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
+    """Values by name, from ``NAME=VALUE``."""
+    values: dict[str, Any] = {}
+    for text in texts or ():
+        name, equals, value = text.partition("=")
+        if not (equals and name.strip() and value.strip()):
+            raise InputError(
+                f"'{text}' does not say which name gets which value", where=option, allowed="NAME=VALUE"
+            )
+        parsed = parse_value(value.strip(), where=f"{option} {name}")
+        if isinstance(parsed, str | bool):
+            raise InputError(f"'{value.strip()}' is no number", where=f"{option} {name}", allowed="numbers")
+        values[name.strip()] = parsed
+    return values
+
+
+def _ends(name: str, value: object) -> tuple[float, float]:
+    numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    if numbers.shape != (2,):
+        raise InputError(
+            f"the range of '{name}' has {numbers.size} numbers",
+            where="--bound",
+            allowed="NAME=LOW,HIGH",
+            fix="give the lower and the upper end",
+        )
+    return float(numbers[0]), float(numbers[1])
+
+
+def print_trim(found: TrimResult, console: Console) -> None:
+    """How well it rests, then the values of all that was sought."""
+    console.print(
+        f"{found.point.name} at {found.point.time:g} s: at rest, {len(found.residuals)} equations to "
+        f"{found.largest_residual:.2g} in {found.iterations} iterations",
+        style=STRONG,
+    )
+    for title, values in (
+        ("free parameter", found.free),
+        ("state", found.point.states),
+        ("discrete", found.point.discrete),
+        ("unknown", found.point.algebraic),
+    ):
+        if not values:
+            continue
+        rows = table((title, "left"), ("value", "left"))
+        for name, value in values.items():
+            rows.add_row(name, " ".join(f"{number:.9g}" for number in np.ravel(value).tolist()))
+        console.print()
+        console.print(rows)
+    if found.at_bounds:
+        console.print(f"at an end of the range: {', '.join(found.at_bounds)}", soft_wrap=True)

@@ -1,0 +1,69 @@
+"""All figures of a linear system in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
+
+from armblocks.analysis.linear_system import LinearSystem
+from armblocks.errors import UnknownNameError
+from armblocks.files import write_atomically
+from armblocks.report.frequency_charts import bode_picture, nyquist_picture
+from armblocks.report.picture import Picture
+from armblocks.report.png import picture_png
+from armblocks.report.response_charts import impulse_picture, step_picture
+from armblocks.report.root_charts import pole_zero_picture, root_locus_picture
+from armblocks.report.svg import svg_file
+from armblocks.report.writing import FIGURE_FORMATS, make_folder
+
+
+def linear_figures(
+    system: LinearSystem, *, loop: bool = False, hertz: bool = False
+) -> dict[str, Callable[[], Picture]]:
+    """What there is to draw, by file name. ``loop``: the system is the open loop of ``1 + L``, whose margins,
+    Nyquist diagram and root locus mean something."""
+    if not system.inputs or not system.outputs:
+        return {"poles-and-zeros": lambda: pole_zero_picture(system)} if system.order else {}
+    figures: dict[str, Callable[[], Picture]] = {
+        "bode": lambda: bode_picture(system, margins=loop and system.is_siso, hertz=hertz),
+        "step": lambda: step_picture(system),
+        "impulse": lambda: impulse_picture(system),
+    }
+    if system.order:
+        figures["poles-and-zeros"] = lambda: pole_zero_picture(system)
+    if loop and system.is_siso:
+        figures["nyquist"] = lambda: nyquist_picture(system)
+        if system.order:
+            figures["root-locus"] = lambda: root_locus_picture(system)
+    return figures
+
+
+def write_linear_report(
+    folder: str | PathLike[str],
+    system: LinearSystem,
+    *,
+    loop: bool = False,
+    hertz: bool = False,
+    formats: Sequence[str] = FIGURE_FORMATS,
+) -> tuple[Path, ...]:
+    """Write each figure, and ``linear-system.json``, into a folder, made if absent.
+
+    Raises ``UnknownNameError`` for a format that is not svg or png, ``FormatError`` where the folder cannot
+    be written.
+    """
+    for name in formats:
+        if name not in FIGURE_FORMATS:
+            raise UnknownNameError("figure format", name, FIGURE_FORMATS, where="write_linear_report")
+    place = Path(folder)
+    make_folder(place)
+    written: list[Path] = []
+    for name, draw in linear_figures(system, loop=loop, hertz=hertz).items():
+        picture = draw()
+        for kind in formats:
+            path = place / f"{name}.{kind}"
+            data = svg_file(picture).encode() if kind == "svg" else picture_png(picture)
+            write_atomically(path, data)
+            written.append(path)
+    system.save(place / "linear-system.json")
+    return (*written, place / "linear-system.json")

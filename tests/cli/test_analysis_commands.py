@@ -1,0 +1,57 @@
+"""What ``armblocks linearize`` and ``armblocks trim`` say and leave behind."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from typer.testing import Result
+
+Invoke = Callable[..., Result]
+
+
+def test_a_loop_is_shown_with_its_margins_and_figures(invoke: Invoke, tmp_path: Path) -> None:
+    result = invoke(
+        "linearize", "van_der_pol_pid", "--input", "PID", "--output", "PID", "--open", "PID",
+        "--report", "figures", "--save", "loop.json",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    for words in (
+        "van_der_pol_pid at 0 s: continuous, 4 states",
+        "phase",
+        "16.18 deg",
+        "closed loop: stable",
+    ):
+        assert words in result.stdout
+    assert (tmp_path / "figures" / "nyquist.png").is_file()
+    saved = json.loads((tmp_path / "loop.json").read_text())
+    assert saved["states"] == ["PID/integral", "PID/filter", "x1/x", "x2/x"]
+
+
+def test_a_channel_is_shown_with_gain_and_bandwidth(invoke: Invoke) -> None:
+    result = invoke("linearize", "van_der_pol_pid", "--input", "PID", "--output", "x1", "--hertz", "--trim")
+    assert result.exit_code == 0, result.output
+    assert "frequency, Hz" in result.stdout
+    assert "zeros: 0, -100" in result.stdout
+
+
+def test_a_point_is_found_and_saved_and_runs_from_there(invoke: Invoke, tmp_path: Path) -> None:
+    result = invoke("trim", "falling_pendulum", "--guess", "pendulum/q=-1.2", "--save", "rest.npz")
+    assert result.exit_code == 0, result.output
+    assert "at rest" in result.stdout
+    assert "-1.57079633" in result.stdout
+    assert (tmp_path / "rest.npz").is_file()
+    again = invoke("run", "falling_pendulum", "--from-state", "rest.npz", "--stop-time", "1", "--no-figures")
+    assert again.exit_code == 0, again.output
+
+
+def test_what_cannot_be_read_is_refused(refused: Callable[..., str]) -> None:
+    assert "--free is given without --trim" in refused("linearize", "falling_pendulum", "--free", "a.b")
+    assert "does not say which name gets which value" in refused("trim", "falling_pendulum", "--fix", "q")
+    assert "'up' is no number" in refused("trim", "falling_pendulum", "--fix", "pendulum/q=up")
+    assert "the range of 'pendulum/q' has 1 numbers" in refused(
+        "trim", "falling_pendulum", "--bound", "pendulum/q=1"
+    )
+    assert "no operating point was found" in refused("trim", "falling_pendulum")
+    assert "there is no block named 'nothing'" in refused(
+        "linearize", "falling_pendulum", "--input", "nothing"
+    )
