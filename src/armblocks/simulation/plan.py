@@ -109,6 +109,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions, start: float =
                 allowed=f"above 0, at most the stop time {stop:g} s",
                 fix="choose a smaller step",
             )
+        _resolvable("step", step, stop, system.name)
     tableau, reason = _choose(system, options)
     sample_time = _sample_time(system, options, stop, None if tableau is None or tableau.adaptive else step)
     rtol, atol = options.rtol, options.atol
@@ -123,6 +124,7 @@ def make_plan(system: CompiledSystem, options: SimulationOptions, start: float =
     max_step = math.inf
     if options.max_step is not None:
         max_step = _number("max_step", options.max_step, "a time in s above 0", above=0.0)
+        _resolvable("max_step", max_step, stop, system.name)
     solver = "none" if tableau is None or system.states.size == 0 else tableau.name
     return Plan(
         tableau=tableau,
@@ -133,6 +135,18 @@ def make_plan(system: CompiledSystem, options: SimulationOptions, start: float =
         step=step if step is not None else sample_time,
         max_step=max_step,
     )
+
+
+def _resolvable(name: str, step: float, stop: float, where: str) -> None:
+    """Raise ``InputError`` for a step that the rounding of the times near the end would swallow."""
+    least = 4.0 * math.ulp(stop)
+    if step < least:
+        raise InputError(
+            f"{name} is {step:g} s, and times near {stop:g} s are {math.ulp(stop):.2g} s apart",
+            where=where,
+            allowed=f"at least {least:.2g} s here",
+            fix="choose a larger step, or count the time from another origin",
+        )
 
 
 def _number(
