@@ -1,0 +1,127 @@
+"""What every block promises within a diagram: its worked example is kept, run, retuned and refused alike.
+
+The diagrams are the worked examples, so that a new block is tested by existing.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Diagram, Parameter, ParameterKind
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.face.block_examples import example_block
+from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning"),
+    pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS),
+]
+
+STOP_TIME = 2.0
+SI_UNIT = re.compile(
+    r"(?:1|(?:kg|g|m|s|rad|deg|A|V|N|J|W|Hz|ohm|K|mol|%|H|Pa|C|F)[2-9]?)"
+    r"(?:[ /](?:kg|m|s|rad|A|V|N|J|W|K|mol|H)[2-9]?)*"
+)
+
+
+def changed(rule: Parameter, value: object) -> np.ndarray:
+    """Another value of a tunable parameter, within its bounds and of the same order; no limit stays none."""
+    given = np.asarray(value, dtype=np.float64)
+    finite = np.where(np.isfinite(given), given, 0.0)
+    return np.where(
+        np.isfinite(given), np.clip(given + 1e-3 * (1.0 + np.abs(finite)), rule.minimum, rule.maximum), given
+    )
+
+
+def test_its_units_are_those_of_si(kind: type[Block]) -> None:
+    block = example_block(kind)
+    ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
+    for unit in (*(port.unit for port in ports), *(rule.unit for rule in kind.parameters())):
+        assert not unit or SI_UNIT.fullmatch(unit), unit
+
+
+def test_its_example_survives_a_file(kind: type[Block]) -> None:
+    diagram = ab.block_example(kind)
+    data = diagram_to_bytes(diagram, load_robot)
+    again = diagram_from_bytes(data, "example", BLOCKS, load_robot)
+    assert again == diagram
+    assert diagram_to_bytes(again, load_robot) == data
+
+
+def test_a_fixed_step_gives_what_an_adaptive_one_gives(kind: type[Block]) -> None:
+    """Smooth flow between located events: rk4 with 0.5 ms against rtol 1e-9."""
+    diagram = ab.block_example(kind)
+    fixed = ab.simulate(diagram, stop_time=STOP_TIME, sample_time=0.1, solver="rk4", step=0.0005)
+    adaptive = ab.simulate(diagram, stop_time=STOP_TIME, sample_time=0.1, rtol=1e-9, atol=1e-12)
+    assert fixed.run.complete and adaptive.run.complete
+    for name in fixed.names:
+        assert np.isfinite(fixed[name]).all()
+        np.testing.assert_allclose(fixed[name], adaptive[name], rtol=1e-6, atol=1e-6, err_msg=name)
+
+
+def test_a_retuned_run_is_that_of_the_diagram_built_with_the_values(kind: type[Block]) -> None:
+    diagram = ab.block_example(kind)
+    block = diagram.blocks[diagram.name]
+    values = {
+        f"{diagram.name}.{rule.name}": changed(rule, block.parameter_value(rule.name))
+        for rule in kind.parameters()
+        if rule.tunable
+    }
+    if not values:
+        return
+    retuned = ab.simulate(diagram, parameters=values, stop_time=STOP_TIME, sample_time=0.1)
+    rebuilt = ab.simulate(rebuilt_with(diagram, values), stop_time=STOP_TIME, sample_time=0.1)
+    for name in rebuilt.names:
+        np.testing.assert_array_equal(retuned[name], rebuilt[name], err_msg=name)
+
+
+def rebuilt_with(diagram: Diagram, values: dict[str, np.ndarray]) -> Diagram:
+    """The diagram with a new block in place of the old one, which knows no other values."""
+    block = diagram.blocks[diagram.name]
+    own = {path.rpartition(".")[2]: value for path, value in values.items()}
+    return dataclasses.replace(
+        diagram, blocks={**diagram.blocks, diagram.name: dataclasses.replace(block, **own)}
+    )
+
+
+def wrong_values(rule: Parameter) -> Iterator[object]:
+    """Values that the rule of a parameter forbids, one of each sort."""
+    numeric = rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER)
+    yield object()
+    if numeric:
+        yield from (
+            "text",
+            None,
+            True if rule.kind is not ParameterKind.ARRAY else [[1.0], [1.0, 2.0]],
+            float("nan"),
+        )
+        bounds = [rule.minimum - 1.0, rule.maximum + 1.0] + ([] if rule.above is None else [rule.above])
+        yield from (bound for bound in bounds if np.isfinite(bound))
+    if numeric and rule.finite:
+        yield float("inf")
+    if rule.kind is ParameterKind.INTEGER:
+        yield 1.5
+    if rule.kind is ParameterKind.ARRAY:
+        yield np.zeros((1,) * (max(rule.dimensions) + 1))
+        if not rule.roots:  # a polynomial may have none
+            yield []
+    if rule.kind is ParameterKind.CHOICE:
+        yield "no such choice"
+    if rule.kind is ParameterKind.BOOLEAN:
+        yield 1
+
+
+def test_a_wrong_value_is_refused_by_the_parameters_name(kind: type[Block]) -> None:
+    block = example_block(kind)
+    for rule in kind.parameters():
+        for value in wrong_values(rule):
+            with pytest.raises((InputError, UnknownNameError)) as caught:
+                dataclasses.replace(block, **{rule.name: value})
+            assert f"{kind.type_name()}.{rule.name}" in str(caught.value), f"{rule.name} = {value!r}"
