@@ -180,13 +180,18 @@ class CTraj(Block):
     family: ClassVar[str] = "robots"
     title: ClassVar[str] = "ctraj"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The position goes straight from one pose to the other, by a trapezoidal profile.",
+        shows="From one pose straight to another that is turned by 90 degrees, by a trapezoidal profile.",
         parameters={"tmax": 8.0},
         inputs={
             "T0": pose_along_x(ZERO).named("start"),
-            "T1": made("Xyz2T")
+            "T1": made("Rp2T")
             .named("end")
-            .by(x=made("Constant").named("one"), y=made("Constant", value=0.5).named("half"), z=ZERO),
+            .by(
+                R=made("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))).named(
+                    "turned"
+                ),
+                p=made("Constant", value=(1.0, 0.5, 0.0)).named("p"),
+            ),
         },
         shown=position_of("T"),
     )
