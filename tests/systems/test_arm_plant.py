@@ -273,6 +273,20 @@ def test_an_impact_at_a_hard_stop_is_felt_by_the_other_joint(solver: str) -> Non
     np.testing.assert_allclose(balance, expected, rtol=0, atol=1e-8)
 
 
+def test_energy_of_a_falling_puma_goes_into_friction_and_elastic_stops(puma560: Robot) -> None:
+    """Six joints that stick, slip and meet their stops: only friction and dampers take energy."""
+    plant = ArmPlant(robot=puma560, q0=(0.3, 0.9, 0.4, 0.5, 0.8, 0.2), stops="elastic")
+    torques = [
+        SineWave(amplitude=a, frequency=f) for a, f in ((30, 2), (60, 3), (20, 1), (1, 4), (1, 5), (1, 3))
+    ]
+    found = driven(plant, *torques, stop=4.0)
+    assert found.run.events > 20
+    assert (found["arm/qd"] == 0.0).any()
+    balance = energy_balance(found)
+    # some 1000 J go through, at rtol 1e-10
+    np.testing.assert_allclose(balance, balance[0], rtol=0, atol=1e-5)
+
+
 # -- loads
 
 
@@ -320,7 +334,7 @@ def test_a_count_that_is_not_the_robots_is_refused() -> None:
 def test_pulses_of_torque_move_a_joint_in_jerks() -> None:
     """0.5 N m beyond friction for half of each second: each pulse gives and takes the same distance."""
     robot = wheel(gear_ratio=1.0, coulomb_friction=(0.5, -0.5))
-    pulses = PulseGenerator(amplitude=1.0, period=2.0, width=25.0, delay=0.3)
+    pulses = PulseGenerator(amplitude=1.0, period=2.0, width=25.0)
     found = driven(ArmPlant(robot=robot), pulses, stop=8.0)
     # 0.25 rad/s2 for 0.5 s, then -0.25 until rest: 2 * 0.25 * 0.5^2 / 2 a pulse
     moved = found["arm/q"][found.time.searchsorted([1.5, 3.5, 5.5, 7.5]), 0]
