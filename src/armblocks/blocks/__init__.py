@@ -12,6 +12,8 @@ from armblocks.blocks import (
     discrete_filters,
     drives,
     dry_friction,
+    dynamic_limits,
+    edges,
     expression,
     joint_control,
     joint_paths,
@@ -31,6 +33,7 @@ from armblocks.blocks import (
     repeating,
     robots,
     routing,
+    second_order,
     selection,
     sinks,
     sources,
@@ -75,6 +78,22 @@ from armblocks.blocks.discrete_filters import (
 )
 from armblocks.blocks.drives import DcMotor, MotorWinding
 from armblocks.blocks.dry_friction import Backlash, CoulombFriction, StickSlipFriction
+from armblocks.blocks.dynamic_limits import (
+    DeadZoneDynamic,
+    HitCrossing,
+    RateLimiterContinuous,
+    SaturationDynamic,
+    WrapToZero,
+)
+from armblocks.blocks.edges import (
+    Counter,
+    DFlipFlop,
+    EdgeDetection,
+    JKFlipFlop,
+    MinMaxRunningResettable,
+    SRFlipFlop,
+    VariableIntegerDelay,
+)
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.joint_control import (
     ComputedTorque,
@@ -199,6 +218,7 @@ from armblocks.blocks.robots import (
     RobotPlot,
 )
 from armblocks.blocks.routing import Demux, Mux
+from armblocks.blocks.second_order import SecondOrderIntegrator, SecondOrderIntegratorLimited
 from armblocks.blocks.selection import (
     Assignment,
     IndexVector,
@@ -261,6 +281,9 @@ BLOCKS = BlockLibrary(
         drives,
         arm_plant,
         expression,
+        second_order,
+        dynamic_limits,
+        edges,
     )
     for kind in _defined_in(family)
 )
@@ -295,12 +318,15 @@ __all__ = [
     "Constant",
     "Coriolis",
     "CoulombFriction",
+    "Counter",
     "CounterFreeRunning",
     "CounterLimited",
     "CrossProduct",
     "CumulativeSum",
+    "DFlipFlop",
     "DcMotor",
     "DeadZone",
+    "DeadZoneDynamic",
     "DegreesToRadians",
     "Delay",
     "Delta2Tr",
@@ -324,6 +350,7 @@ __all__ = [
     "Display",
     "Divide",
     "DotProduct",
+    "EdgeDetection",
     "Encoder",
     "Eul2T",
     "Expression",
@@ -340,6 +367,7 @@ __all__ = [
     "GravityCompensation",
     "Gravload",
     "Ground",
+    "HitCrossing",
     "Hypot",
     "IndexVector",
     "Inertia",
@@ -349,6 +377,7 @@ __all__ = [
     "InterpolationUsingPrelookup",
     "IntervalTest",
     "IntervalTestDynamic",
+    "JKFlipFlop",
     "JTraj",
     "Jacob0",
     "Jacobe",
@@ -374,6 +403,7 @@ __all__ = [
     "MatrixPower",
     "MatrixProduct",
     "MinMax",
+    "MinMaxRunningResettable",
     "Modulo",
     "MotorDrive",
     "MotorWinding",
@@ -403,6 +433,7 @@ __all__ = [
     "Ramp",
     "RandomNumber",
     "RateLimiter",
+    "RateLimiterContinuous",
     "RateTransition",
     "RelationalOperator",
     "Relay",
@@ -417,9 +448,13 @@ __all__ = [
     "Rounding",
     "Rp2T",
     "Rpy2T",
+    "SRFlipFlop",
     "SampledJointPID",
     "Saturation",
+    "SaturationDynamic",
     "Scope",
+    "SecondOrderIntegrator",
+    "SecondOrderIntegratorLimited",
     "SecondOrderLag",
     "Selector",
     "Sign",
@@ -459,6 +494,8 @@ __all__ = [
     "UnaryMinus",
     "UniformRandomNumber",
     "UnitDelay",
+    "VariableIntegerDelay",
+    "WrapToZero",
     "XYGraph",
     "Xyz2T",
     "ZeroOrderHold",

@@ -1,0 +1,291 @@
+"""Second-order integrators, moving limits, limited rates and sampled logic, against closed forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from stepwise_reference import run_reference
+
+from armblocks.blocks import (
+    BLOCKS,
+    Clock,
+    Constant,
+    Counter,
+    DeadZoneDynamic,
+    DFlipFlop,
+    EdgeDetection,
+    FromTable,
+    Gain,
+    HitCrossing,
+    Integrator,
+    JKFlipFlop,
+    MinMaxRunningResettable,
+    RateLimiterContinuous,
+    SaturationDynamic,
+    SecondOrderIntegrator,
+    SecondOrderIntegratorLimited,
+    SineWave,
+    SRFlipFlop,
+    Step,
+    Sum,
+    VariableIntegerDelay,
+    WrapToZero,
+)
+from armblocks.compiler.system import compile_system
+from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
+from armblocks.equations import SimulationOptions
+from armblocks.errors import DiagramError
+from armblocks.simulation import simulate
+
+Run = Callable[[Diagram, float], dict[str, np.ndarray]]
+SAMPLES = 100
+
+
+def native(solver: str, step: float | None = None) -> Run:
+    def run(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+        options = SimulationOptions(
+            stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
+        )
+        result = simulate(compile_system(trace_diagram(diagram)), options)
+        return {name: result[name] for name in result.names} | {"t": result.time}
+
+    return run
+
+
+def by_reference(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+    times = np.arange(SAMPLES + 1) * (stop / SAMPLES)
+    return run_reference(diagram, times.tolist(), step=stop / SAMPLES / 3) | {"t": times}
+
+
+RUNS = {"adaptive": native("rk45"), "fixed": native("rk4", 0.01), "reference": by_reference}
+NATIVE = pytest.mark.parametrize("run", [RUNS["adaptive"], RUNS["fixed"]], ids=["adaptive", "fixed"])
+
+
+@pytest.fixture(params=RUNS.values(), ids=RUNS)
+def run(request: pytest.FixtureRequest) -> Run:
+    return request.param
+
+
+def close(found: np.ndarray, expected: np.ndarray, tolerance: float = 5e-9) -> None:
+    # rtol 1e-10 over a few hundred steps; RK4 of 0.01 on sines: h^4/120 = 1e-10
+    assert found == pytest.approx(expected, abs=tolerance)
+
+
+def ball(rest_speed: float = 1e-6, height: float = 1.0, speed: float = 0.0, keeps: float = 0.7) -> Diagram:
+    builder = DiagramBuilder("d")
+    motion = SecondOrderIntegratorLimited(
+        initial=height, initial_speed=speed, lower=0.0, reinitialize=True, rest_speed=rest_speed
+    )
+    ball = builder.add("ball", motion, builder.add("gravity", Constant(value=-9.81)))
+    builder.connect(builder.add("bounce", Gain(gain=-keeps), ball["dx"]), ball["dx0"])
+    return builder.build()
+
+
+@NATIVE
+def test_a_spring_of_one_block(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    mass = builder.add("mass", SecondOrderIntegrator(initial=1.0, initial_speed=2.0))
+    builder.connect(builder.add("spring", Gain(gain=-4.0), mass["x"]), mass["u"])
+    found = run(builder.build(), 10.0)
+    close(found["mass/x"], np.cos(2 * found["t"]) + np.sin(2 * found["t"]), 2e-7)
+    close(found["mass/dx"], 2 * np.cos(2 * found["t"]) - 2 * np.sin(2 * found["t"]), 4e-7)
+
+
+@NATIVE
+def test_a_ball_bounces_comes_to_rest_and_time_goes_on(run: Run) -> None:
+    """Its bounces would end at t1 (1 + e) / (1 - e); below the rest speed it lies still, exactly."""
+    found = run(ball(), 4.0)
+    t, first = found["t"], math.sqrt(2 / 9.81)
+    starts, speed, start = [], 9.81 * first, first
+    while start < 4.0 and speed * 0.7 > 1e-6:
+        speed *= 0.7
+        starts.append((start, speed))
+        start += 2 * speed / 9.81
+    assert start == pytest.approx(2.55863396558581, abs=1e-6)  # the published end of the bounces
+    expected = np.where(t < first, 1 - 9.81 * t**2 / 2, 0.0)
+    for begins, v in starts:
+        within = (t >= begins) & (t < begins + 2 * v / 9.81)
+        expected = np.where(within, v * (t - begins) - 9.81 * (t - begins) ** 2 / 2, expected)
+    close(found["ball/x"], expected, 1e-8)
+    rests = t > start + 1e-9
+    assert rests.sum() > 30
+    assert not found["ball/x"][rests].any()
+    assert not found["ball/dx"][rests].any()
+
+
+@NATIVE
+def test_a_ball_at_rest_is_thrown_up_again(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    motion = SecondOrderIntegratorLimited(initial=0.5, lower=0.0)
+    push = builder.add("push", Step(time=1.0, initial=-1.0, final=2.0))
+    builder.add("mass", motion, push)
+    found = run(builder.build(), 3.0)
+    t = found["t"]
+    close(found["mass/x"], np.where(t < 1.0, 0.5 - t**2 / 2, (t - 1.0) ** 2), 1e-9)
+    builder = DiagramBuilder("d")
+    builder.add("mass", motion, builder.add("push", Step(time=2.0, initial=-1.0, final=2.0)))
+    found = run(builder.build(), 3.0)
+    t = found["t"]
+    close(found["mass/x"], np.where(t < 1.0, 0.5 - t**2 / 2, np.clip(t - 2.0, 0, None) ** 2), 1e-9)
+
+
+def test_speed_and_position_have_limits(run: Run) -> None:
+    """u = 1: speed 1 from t = 1, limit 2 reached at t = 2.5; u = -1 from t = 4."""
+    builder = DiagramBuilder("d")
+    mass = SecondOrderIntegratorLimited(upper=2.0, lower=-10.0, upper_speed=1.0, lower_speed=-0.5)
+    builder.add("mass", mass, builder.add("u", Step(time=4.0, initial=1.0, final=-1.0)))
+    found = run(builder.build(), 6.0)
+    t = found["t"]
+    rise = np.select([t < 1, t < 2.5, t < 4, t < 4.5], [t**2 / 2, t - 0.5, 2.0, 2 - (t - 4) ** 2 / 2])
+    close(found["mass/x"], np.where(t < 4.5, rise, 1.875 - 0.5 * (t - 4.5)), 1e-9)
+    speed = np.select([t < 1, t < 2.5, t < 4, t < 4.5], [t, 1.0, 0.0, 4.0 - t], -0.5)
+    assert found["mass/dx"][(abs(t - 2.5) > 0.01)] == pytest.approx(speed[abs(t - 2.5) > 0.01], abs=1e-9)
+
+
+def test_moving_limits(run: Run) -> None:
+    """The integral of a ramp that meets the falling limit 2 - t/2 at t = 4/3."""
+    for kind, name in ((SaturationDynamic, "held"), (DeadZoneDynamic, "rest")):
+        builder = DiagramBuilder("d")
+        t = builder.add("t", Clock())
+        falling = builder.add("f", Gain(gain=-0.5), t)
+        upper = builder.add("upper", Sum(signs="++"), builder.add("two", Constant(value=2.0)), falling)
+        lower = builder.add("lower", Constant(value=-5.0))
+        builder.add("integral", Integrator(), builder.add(name, kind(), upper, t, lower))
+        found = run(builder.build(), 5.0)
+        time, meets = found["t"], 4.0 / 3.0
+        after = np.clip(time - meets, 0.0, None)
+        held = np.minimum(time, meets) ** 2 / 2 + meets * after - after**2 / 4
+        expected = held if kind is SaturationDynamic else time**2 / 2 - held
+        close(found["integral/y"], expected, 1e-10)
+
+
+def test_a_ramp_wraps_to_zero(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    wrapped = builder.add("wrapped", WrapToZero(threshold=2.0), builder.add("t", Clock()))
+    builder.add("integral", Integrator(), wrapped)
+    found = run(builder.build(), 5.0)
+    close(found["integral/y"], np.minimum(found["t"], 2.0) ** 2 / 2, 1e-11)
+
+
+def test_crossings_are_counted_and_timed(run: Run) -> None:
+    for direction, expected in (("either", 6), ("rising", 3), ("falling", 3)):
+        builder = DiagramBuilder("d")
+        builder.add("hits", HitCrossing(offset=0.5, direction=direction), builder.add("u", SineWave()))
+        builder.add("keeps the steps short", Integrator(), builder.add("v", SineWave()))
+        found = run(builder.build(), 6 * math.pi)
+        assert found["hits/count"][-1] == expected
+        last = 4 * math.pi + (math.pi / 6 if direction == "rising" else 5 * math.pi / 6)
+        assert found["hits/last"][-1] == pytest.approx(last, abs=1e-9)
+
+
+def test_a_sine_whose_rate_is_limited(run: Run) -> None:
+    """sin t rises at 0.5 from 0 until it meets sin again; where |cos| <= 0.5 it follows."""
+    builder = DiagramBuilder("d")
+    limited = builder.add(
+        "limited", RateLimiterContinuous(rising=0.5, falling=-0.5), builder.add("u", SineWave())
+    )
+    builder.add("integral", Integrator(), limited)
+    found = run(builder.build(), 6.0)
+
+    def meets(start: float, value: float, rate: float, guess: float) -> float:
+        for _ in range(60):
+            gap = math.sin(guess) - value - rate * (guess - start)
+            guess -= gap / (math.cos(guess) - rate)
+        return guess
+
+    up = meets(0.0, 0.0, 0.5, 1.9)
+    leaves = 2 * math.pi / 3  # cos = -0.5
+    down = meets(leaves, math.sin(leaves), -0.5, 5.0)
+    t = found["t"]
+    expected = np.select(
+        [t < up, t < leaves, t < down], [0.5 * t, np.sin(t), math.sin(leaves) - 0.5 * (t - leaves)], np.sin(t)
+    )
+    # after meeting sin at `down` it rises faster than 0.5 at once: 0.5 again
+    value = math.sin(down)
+    after = np.minimum(np.sin(t), value + 0.5 * (t - down)) if math.cos(down) > 0.5 else np.sin(t)
+    close(found["limited/y"], np.where(t < down, expected, after), 2e-6)
+
+
+def test_a_jump_becomes_a_ramp(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    builder.add("limited", RateLimiterContinuous(rising=2.0), builder.add("u", Step(time=1.0, final=3.0)))
+    found = run(builder.build(), 4.0)
+    close(found["limited/y"], np.clip(2.0 * (found["t"] - 1.0), 0.0, 3.0), 1e-9)
+
+
+# -- sampled logic -----------------------------------------------------------------------------------------
+
+
+def at_ticks(block: Block, *courses: list[float]) -> dict[str, list[float]]:
+    """Outputs of a block with the period 1 s for inputs that are given tick by tick."""
+    builder = DiagramBuilder("d")
+    n = len(courses[0])
+    fed = [
+        builder.add(f"u{k}", FromTable(times=np.arange(n), values=course, method="flat"))
+        for k, course in enumerate(courses)
+    ]
+    builder.add("block", block, *fed)
+    options = SimulationOptions(stop_time=float(n - 1), sample_time=1.0)
+    result = simulate(compile_system(trace_diagram(builder.build())), options)
+    return {port.name: result[f"block/{port.name}"].tolist() for port in block.output_ports()}
+
+
+U = [0.0, 1.0, 1.0, 0.0, -1.0, -1.0, 0.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("edge", "expected"),
+    [
+        ("change", [0, 1, 0, 1, 1, 0, 1, 1]),
+        ("increase", [0, 1, 0, 0, 0, 0, 1, 1]),
+        ("decrease", [0, 0, 0, 1, 1, 0, 0, 0]),
+        ("rise positive", [0, 1, 0, 0, 0, 0, 0, 1]),
+        ("rise nonnegative", [0, 0, 0, 0, 0, 0, 1, 0]),
+        ("fall negative", [0, 0, 0, 0, 1, 0, 0, 0]),
+        ("fall nonpositive", [0, 0, 0, 1, 0, 0, 0, 0]),
+    ],
+)
+def test_edges(edge: str, expected: list[float]) -> None:
+    assert at_ticks(EdgeDetection(edge=edge, sample_time=1.0), U)["y"] == expected
+
+
+def test_flip_flops() -> None:
+    S, R = [0, 1, 0, 0, 1, 0, 0], [0, 0, 0, 1, 1, 0, 0]
+    found = at_ticks(SRFlipFlop(sample_time=1.0), S, R)
+    assert found["Q"] == [0, 1, 1, 0, 0, 0, 0]
+    assert found["not_Q"] == [1, 0, 0, 1, 0, 1, 1]
+    D, clock = [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], [0, 1, 1, 0, 1, 0, 1]
+    found = at_ticks(DFlipFlop(sample_time=1.0), D, clock)
+    assert found["Q"] == [0, 4, 4, 4, 7, 7, 9]
+    assert found["not_Q"] == [1, 0, 0, 0, 0, 0, 0]
+    assert at_ticks(DFlipFlop(sample_time=1.0, trigger="level"), D, clock)["Q"] == [0, 4, 5, 5, 7, 7, 9]
+    J, K = [1, 1, 0, 0, 1, 1, 1, 1], [0, 0, 1, 1, 1, 1, 1, 1]
+    pulses = [1, 0, 1, 0, 1, 0, 1, 0]
+    found = at_ticks(JKFlipFlop(sample_time=1.0), J, pulses, K)
+    assert found["Q"] == [0, 1, 1, 0, 0, 1, 1, 0]
+    assert found["not_Q"] == [1, 0, 0, 1, 1, 0, 0, 1]
+
+
+def test_counters_and_running_extremes() -> None:
+    reset = [0, 0, 0, 0, 0, 1, 0, 0]
+    assert at_ticks(Counter(sample_time=1.0, initial=10.0), U, reset)["y"] == [10, 11, 11, 11, 11, 10, 10, 11]
+    highest = at_ticks(MinMaxRunningResettable(function="max", initial=0.5, sample_time=1.0), U, reset)
+    assert highest["y"] == [0.5, 1, 1, 1, 1, 0.5, 0.5, 2]
+
+
+def test_a_delay_of_variable_length() -> None:
+    u, d = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [0.0, 1.0, 1.9, 3.0, 9.0, -1.0]
+    delayed = at_ticks(VariableIntegerDelay(longest=3, initial=-1.0, sample_time=1.0), u, d)
+    assert delayed["y"] == [1, 1, 2, 1, 2, 6]
+    builder = DiagramBuilder("d")
+    matrix = builder.add("m", Constant(value=np.eye(2)))
+    builder.add("block", VariableIntegerDelay(sample_time=1.0), matrix, builder.add("d", Constant(value=1.0)))
+    with pytest.raises(DiagramError, match="a delay of variable length got an input of shape"):
+        builder.build()
+
+
+def test_they_are_in_the_library() -> None:
+    assert {"SecondOrderIntegratorLimited", "RateLimiterContinuous", "EdgeDetection"} <= set(BLOCKS)
