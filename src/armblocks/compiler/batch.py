@@ -116,7 +116,22 @@ def _emit_block(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Non
             loaded.setdefault(start + first + k, value)
         return loaded[register]
 
-    registers = emit_operations(body, tape, load)
+    def load_entry(first: int, behind: str) -> str:
+        slot, place = tape.input_place(first)
+        kind, size = layout.inputs[slot], tape.input_sizes[slot]
+
+        def address(entry: str, lane: int) -> str:
+            there = body.let(f"add nsw i64 {entry}, {place}")
+            if kind is not Layout.SHARED:
+                own = body.let(f"add nsw i64 {sample}, {lane}")
+                line, across = (there, "%columns") if kind is Layout.COLUMNS else (own, str(size))
+                begin = body.let(f"mul nsw i64 {line}, {across}")
+                there = body.let(f"add nsw i64 {begin}, {own if kind is Layout.COLUMNS else there}")
+            return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {there}")
+
+        return body.gather(address, behind)
+
+    registers = emit_operations(body, tape, load, load_entry)
     for slot, (members, kind) in enumerate(zip(tape.outputs, layout.outputs)):
         if kind is Layout.COLUMNS:
             for place, register in enumerate(members):

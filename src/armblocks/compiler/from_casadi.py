@@ -104,11 +104,29 @@ def _translate(builder: TapeBuilder, function: Function, k: int, work: list[int]
         return builder.add(Opcode.DIVIDE, builder.constant(1.0), operands[0])
     if number == casadi.OP_IF_ELSE_ZERO:
         return builder.add(Opcode.SELECT, operands[0], operands[1], builder.constant(0.0))
-    if number in (casadi.OP_ASSIGN, casadi.OP_LIFT):
+    if number == casadi.OP_ASSIGN:
         return operands[0]
+    if number == casadi.OP_PRINTME:
+        return _read(builder, *operands, name)
     raise CompileError(
         f"the equations use the operation {_NAMES.get(number, number)}",
         where=name,
         allowed="CasADi SX operations with a scalar meaning, such as +, sin, if_else",
         fix="write it with other operations",
     )
+
+
+def _read(builder: TapeBuilder, table: int, second: int, name: str) -> int:
+    """An indexed read, as :mod:`armblocks.equations.table_reading` writes it."""
+    count = builder.value(second)
+    if count is not None and count < 0.0:
+        return builder.add(Opcode.READ, table, builder.constant(-count), builder.constant(0.0))
+    start = builder.operands_of(table, Opcode.READ)
+    if start is None or not builder.is_input(start[0]):
+        raise CompileError(
+            "a table is read that is no parameter of the system",
+            where=name,
+            allowed="tables that are parameters themselves, not worked out from others",
+            fix="give the numbers of the table to the block",
+        )
+    return builder.add(Opcode.READ, start[0], start[1], second)

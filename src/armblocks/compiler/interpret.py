@@ -40,11 +40,25 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
     registers += [np.full(lead, value) for value in tape.constants]
     with np.errstate(all="ignore"):
         for opcode, operands in tape.operations:
+            if opcode is Opcode.READ:
+                registers.append(_read(registers, tape, *operands))
+                continue
             registers.append(evaluate(opcode, [registers[operand] for operand in operands], fused=fused))
     return [
         np.stack([registers[register] for register in slot], axis=-1) if slot else np.empty((*lead, 0))
         for slot in tape.outputs
     ]
+
+
+def _read(registers: Sequence[Values], tape: Tape, first: int, count: int, index: int) -> Values:
+    """The entries of a table at the indices."""
+    size = int(tape.constants[count - tape.first_constant])
+    places = np.clip(np.nan_to_num(np.trunc(registers[index]), nan=0.0), 0, size - 1).astype(np.intp)
+    found = np.empty(places.shape)
+    for place in np.unique(places):
+        chosen = places == place
+        found[chosen] = registers[first + int(place)][chosen]
+    return found
 
 
 def evaluate(opcode: Opcode, values: Sequence[Values], *, fused: bool = True) -> Values:

@@ -137,6 +137,32 @@ class Body:
         self.module.declare(self.real, symbol, *[self.real] * len(operands))
         return self.let(f"call {self.real} @{symbol}({', '.join(f'{self.real} {x}' for x in operands)})")
 
+    def held_index(self, a: str, size: int) -> str:
+        """``a`` cut to a 64-bit integer and held in 0 … size - 1, whatever it is (0 for a NaN)."""
+        kind = "i64" if self.lanes == 1 else f"v{self.lanes}i64"
+        real = "f64" if self.lanes == 1 else f"v{self.lanes}f64"
+        to_word = f"llvm.fptosi.sat.{kind}.{real}"
+        self.module.declare(self.word, to_word, self.real)
+        found = self.let(f"call {self.word} @{to_word}({self.real} {a})")
+        for name, bound in (("smax", 0), ("smin", size - 1)):
+            symbol = f"llvm.{name}.{kind}"
+            self.module.declare(self.word, symbol, self.word, self.word)
+            found = self.let(
+                f"call {self.word} @{symbol}({self.word} {found}, {self.word} {self.integer(bound)})"
+            )
+        return found
+
+    def gather(self, addresses: Callable[[str, int], str], places: str) -> str:
+        """One double for each lane, from the address that ``addresses`` emits for its integer and lane."""
+        if self.lanes == 1:
+            return self.let(f"load double, ptr {addresses(places, 0)}, align 8")
+        found = "poison"
+        for lane in range(self.lanes):
+            place = self.let(f"extractelement {self.word} {places}, i64 {lane}")
+            value = self.let(f"load double, ptr {addresses(place, lane)}, align 8")
+            found = self.let(f"insertelement {self.real} {found}, double {value}, i64 {lane}")
+        return found
+
     def absolute(self, a: str) -> str:
         """``|a|``."""
         return self.intrinsic("fabs", a)

@@ -28,6 +28,8 @@ MANY_CONSTANTS = 32
 
 LoadInput = Callable[[int], str]
 """Gives the value of an input register, in all lanes."""
+LoadEntry = Callable[[int, str], str]
+"""Gives the value of the input register that lies so many (an integer in each lane) behind another."""
 
 
 def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "internal") -> None:
@@ -44,14 +46,16 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
         body = Body(module)
         arguments = [f"ptr noalias readonly %i{k}" for k in range(len(tape.input_sizes))]
         arguments += [f"ptr noalias %o{k}" for k in range(len(tape.outputs))]
-        places = {
-            start + place: f"ptr %i{slot}, i64 {place}"
-            for slot, (start, size) in enumerate(zip(tape.input_starts, tape.input_sizes))
-            for place in range(size)
-        }
 
         def load(register: int) -> str:
-            address = body.let(f"getelementptr inbounds double, {places[register]}")
+            slot, place = tape.input_place(register)
+            address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {place}")
+            return body.let(f"load double, ptr {address}, align 8")
+
+        def load_entry(first: int, behind: str) -> str:
+            slot, place = tape.input_place(first)
+            entry = body.let(f"add nsw i64 {behind}, {place}")
+            address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {entry}")
             return body.let(f"load double, ptr {address}, align 8")
 
         # Each result is stored as soon as it is known: thousands that wait for the end would be spilled and
@@ -68,7 +72,7 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
                 address = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {place}")
                 body.do(f"store double {registers.number(register)}, ptr {address}, align 8")
 
-        registers = emit_operations(body, tape, load, store)
+        registers = emit_operations(body, tape, load, load_entry, store)
         for register in list(outputs):
             store(register, registers)
         body.do("ret void")
@@ -144,7 +148,11 @@ class Registers:
 
 
 def emit_operations(
-    body: Body, tape: Tape, load: LoadInput, written: Callable[[int, Registers], None] | None = None
+    body: Body,
+    tape: Tape,
+    load: LoadInput,
+    load_entry: LoadEntry,
+    written: Callable[[int, Registers], None] | None = None,
 ) -> Registers:
     """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read.
 
@@ -162,6 +170,11 @@ def emit_operations(
             condition = registers.condition(operands[0])
             yes, no = registers.number(operands[1]), registers.number(operands[2])
             registers.set_number(target, body.select(condition, yes, no))
+        elif opcode is Opcode.READ:
+            first, count, index = operands
+            size = int(tape.constants[count - tape.first_constant])
+            behind = body.held_index(registers.number(index), size)
+            registers.set_number(target, load_entry(first, behind))
         elif target in partners:
             if not registers.has_number(target):
                 pair = elementary.sine_cosine(body, registers.number(operands[0]))

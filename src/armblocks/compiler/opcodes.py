@@ -11,6 +11,8 @@ Every operation works on IEEE 754 doubles and rounds to nearest. Where the sourc
 * ``SELECT c a b`` is ``a`` where ``c`` holds, else ``b``; the value not chosen has no influence, be it NaN.
 * ``MODULO`` is C's ``fmod`` (sign of the dividend, exact); ``REMAINDER`` is IEEE's (nearest quotient, ties to
   even, exact).
+* ``READ x n i`` is entry ``i``, cut to an integer and held in 0 … n - 1 (0 for a NaN), of the ``n`` scalars
+  from input ``x`` on, all of one slot; ``n`` is a constant.
 * ``POWER`` follows C99: ``x**0`` and ``1**y`` are 1 even with NaN.
 """
 
@@ -68,6 +70,7 @@ class Opcode(IntEnum):
     POWER = auto()
     HYPOT = auto()
     ERF = auto()
+    READ = auto()
 
     @property
     def arity(self) -> int:
@@ -85,14 +88,14 @@ COMPARISONS = frozenset(
 )
 """Operations whose result is 1.0 or 0.0."""
 
-ELEMENTARY = frozenset(opcode for opcode in Opcode if opcode >= Opcode.SIN) | {
+ELEMENTARY = frozenset(opcode for opcode in Opcode if Opcode.SIN <= opcode <= Opcode.ERF) | {
     Opcode.MODULO,
     Opcode.REMAINDER,
 }
 """Operations that are worked out by a function of :mod:`armblocks.compiler.elementary`."""
 
 _ARITY = {
-    **dict.fromkeys((Opcode.FMA, Opcode.FMS, Opcode.FNMA, Opcode.SELECT), 3),
+    **dict.fromkeys((Opcode.FMA, Opcode.FMS, Opcode.FNMA, Opcode.SELECT, Opcode.READ), 3),
     **dict.fromkeys(
         (
             Opcode.ADD,

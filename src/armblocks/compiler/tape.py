@@ -8,6 +8,7 @@ register ``size of inputs + count of constants + k``.
 from __future__ import annotations
 
 import struct
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -83,6 +84,11 @@ class Tape:
     def input_starts(self) -> tuple[int, ...]:
         """First register of each input slot, and at the end the first register after the inputs."""
         return (0, *(int(end) for end in np.cumsum(self.input_sizes)))
+
+    def input_place(self, register: int) -> tuple[int, int]:
+        """The slot of an input register, and its place there."""
+        slot = bisect_right(self.input_starts, register) - 1
+        return slot, register - self.input_starts[slot]
 
     @property
     def first_constant(self) -> int:

@@ -71,56 +71,62 @@ class TapeBuilder:
         rule = rules.get(opcode)
         return rule(*operands) if rule else None
 
-    def _is(self, handle: int, opcode: Opcode) -> tuple[int, ...] | None:
+    def operands_of(self, handle: int, opcode: Opcode) -> tuple[int, ...] | None:
+        """The operands of a value, if ``opcode`` gives it."""
         node = self._nodes[handle]
         return node[1] if isinstance(node, tuple) and node[0] is opcode else None
 
-    def _value(self, handle: int) -> float | None:
+    def is_input(self, handle: int) -> bool:
+        """Whether a value is an input."""
+        return self._nodes[handle] is None
+
+    def value(self, handle: int) -> float | None:
+        """A value's number, if it is a constant."""
         node = self._nodes[handle]
         return node if isinstance(node, float) else None
 
     def _simplify_add(self, a: int, b: int) -> int | None:
         for x, y in ((a, b), (b, a)):
-            number = self._value(y)
+            number = self.value(y)
             if number is not None and _is_zero(number, -1.0):  # x + -0 is x; x + 0 is not when x is -0
                 return x
-            if negated := self._is(y, Opcode.NEGATE):
+            if negated := self.operands_of(y, Opcode.NEGATE):
                 return self.add(Opcode.SUBTRACT, x, negated[0])
         merged = self._merge_branches(a, b)
         return self._merge_branches(b, a) if merged is None else merged
 
     def _merge_branches(self, a: int, b: int) -> int | None:
         """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0), here (c ? yes : 0) + (c ? 0 : no)."""
-        first, second = self._is(a, Opcode.SELECT), self._is(b, Opcode.SELECT)
+        first, second = self.operands_of(a, Opcode.SELECT), self.operands_of(b, Opcode.SELECT)
         if first is None or second is None or first[0] != second[0]:
             return None
-        if self._value(first[2]) != 0.0 or self._value(second[1]) != 0.0:
+        if self.value(first[2]) != 0.0 or self.value(second[1]) != 0.0:
             return None
         return self.add(Opcode.SELECT, first[0], first[1], second[2])
 
     def _simplify_subtract(self, a: int, b: int) -> int | None:
-        number = self._value(b)
+        number = self.value(b)
         if number is not None and _is_zero(number, 1.0):
             return a
-        if negated := self._is(b, Opcode.NEGATE):
+        if negated := self.operands_of(b, Opcode.NEGATE):
             return self.add(Opcode.ADD, a, negated[0])
         return None
 
     def _simplify_multiply(self, a: int, b: int) -> int | None:
         for x, y in ((a, b), (b, a)):
-            number = self._value(y)
+            number = self.value(y)
             if number == 1.0:
                 return x
             if number == -1.0:
                 return self.add(Opcode.NEGATE, x)
-            negated = self._is(x, Opcode.NEGATE)
+            negated = self.operands_of(x, Opcode.NEGATE)
             if number is not None and negated:
                 return self.add(Opcode.MULTIPLY, negated[0], self.constant(-number))
-        left, right = self._is(a, Opcode.NEGATE), self._is(b, Opcode.NEGATE)
+        left, right = self.operands_of(a, Opcode.NEGATE), self.operands_of(b, Opcode.NEGATE)
         return self.add(Opcode.MULTIPLY, left[0], right[0]) if left and right else None
 
     def _simplify_divide(self, a: int, b: int) -> int | None:
-        number = self._value(b)
+        number = self.value(b)
         if number is None or number == 0.0 or not math.isfinite(number):
             return None
         if number == 1.0:
@@ -132,22 +138,22 @@ class TapeBuilder:
         return None
 
     def _simplify_negate(self, a: int) -> int | None:
-        if negated := self._is(a, Opcode.NEGATE):
+        if negated := self.operands_of(a, Opcode.NEGATE):
             return negated[0]
-        product = self._is(a, Opcode.MULTIPLY)
+        product = self.operands_of(a, Opcode.MULTIPLY)
         for x, y in ((product[0], product[1]), (product[1], product[0])) if product else ():
-            number = self._value(y)
+            number = self.value(y)
             if number is not None:
                 return self.add(Opcode.MULTIPLY, x, self.constant(-number))
         return None
 
     def _simplify_select(self, condition: int, yes: int, no: int) -> int | None:
-        number = self._value(condition)
+        number = self.value(condition)
         if number is not None:
             return yes if number != 0.0 else no
         if yes == no:
             return yes
-        if inverse := self._is(condition, Opcode.NOT):
+        if inverse := self.operands_of(condition, Opcode.NOT):
             return self.add(Opcode.SELECT, inverse[0], no, yes)
         return None
 

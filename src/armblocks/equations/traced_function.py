@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.equations.signatures import Signature
 from armblocks.equations.symbols import flatten, matrix_shape, unflatten
+from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
 from armblocks.errors import InputError
 
 
@@ -55,5 +56,6 @@ class TracedFunction:
     def __call__(self, *values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
         """Evaluate through CasADi's own interpreter: slow, and independent of the compiler."""
         flat = [np.asarray(value, dtype=np.float64).reshape(-1) for value in values]
-        results = self.casadi_function().call(flat)
+        function = self.casadi_function()
+        results = evaluate_with_reads(function, flat) if reads_tables(function) else function.call(flat)
         return tuple(np.asarray(value).reshape(slot.shape) for value, slot in zip(results, self.outputs))

@@ -1,0 +1,82 @@
+"""Reading an entry of a table at an index that is only known when the program runs.
+
+CasADi's scalar expressions have no indexed read, so a table of n entries would cost n operations. This one is
+written with its operation ``printme(x, y)``, which is x and which nothing else here uses, as
+``printme(printme(first, -n), index)``: ``first`` is the symbol of the table's first entry. The compiler makes
+one load of it, and nothing is printed. A table has to be an input of the function (a parameter of the
+system), so that its entries lie one after another.
+
+To CasADi the derivative in the index is 0, which is right: an index is a whole number. It knows of no
+derivative in the entries but the first, so that sensitivities to entries of such tables are not to be had.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX, Function, fmax, fmin, if_else
+from numpy.typing import NDArray
+
+
+def read_entry(table: SX, index: SX) -> SX:
+    """Entry ``index`` (a whole number from 0, held within the table) of a vector of symbols."""
+    count = table.numel()
+    first = SX.binary(casadi.OP_PRINTME, table[0], SX(-float(count)))
+    return SX.binary(casadi.OP_PRINTME, first, fmin(fmax(index, 0.0), count - 1.0))
+
+
+def last_at_or_below(table: SX, value: SX) -> SX:
+    """The index of the last of rising entries that is not above ``value``; -1 below all of them.
+
+    A binary search without branches: log2(n) reads.
+    """
+    step = 1 << (table.numel().bit_length() - 1)
+    place = SX(-1.0)
+    while step:
+        there = place + float(step)
+        fits = casadi.logic_and(there < float(table.numel()), read_entry(table, there) <= value)
+        place = if_else(fits, there, place)
+        step >>= 1
+    return place
+
+
+def reads_tables(function: Function) -> bool:
+    """Whether the function has such reads, which CasADi's own interpreter gets wrong."""
+    return any(function.instruction_id(k) == casadi.OP_PRINTME for k in range(function.n_instructions()))
+
+
+def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[Any]:
+    """The values of a function that reads tables: every operation by CasADi, every read here. Slow."""
+    outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
+    places = [function.sparsity_out(k).row() for k in range(function.n_out())]
+    work = [0.0] * function.sz_w()
+    origins: dict[int, tuple[int, int]] = {}  # which input a work slot holds now
+    for k in range(function.n_instructions()):
+        number, sources = function.instruction_id(k), function.instruction_input(k)
+        target = function.instruction_output(k)
+        if number == casadi.OP_OUTPUT:
+            outputs[target[0]][places[target[0]][target[1]]] = work[sources[0]]
+            continue
+        origin = None
+        if number == casadi.OP_CONST:
+            value = function.instruction_constant(k)
+        elif number == casadi.OP_INPUT:
+            origin, value = (sources[0], sources[1]), float(arguments[sources[0]][sources[1]])
+        elif number == casadi.OP_PRINTME:
+            slot, place = origins[sources[0]]
+            if work[sources[1]] < 0.0:
+                origin, value = (slot, place), work[sources[0]]
+            else:
+                value = float(arguments[slot][place + int(work[sources[1]])])
+        elif len(sources) == 1:
+            value = float(SX.unary(number, SX(work[sources[0]])))
+        else:
+            value = float(SX.binary(number, SX(work[sources[0]]), SX(work[sources[1]])))
+        work[target[0]] = value
+        origins.pop(target[0], None)
+        if origin is not None:
+            origins[target[0]] = origin
+    return outputs
