@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from armblocks.face.robots import list_robots, load_robot, save_robot
     from armblocks.face.trajectory import JointTrajectory, jtraj
     from armblocks.face.trimming import trim
+    from armblocks.formats import load_table
     from armblocks.robot import (
         DhRow,
         Fixed,
@@ -78,6 +79,7 @@ else:
             "list_robots": "armblocks.face.robots",
             "load_diagram": "armblocks.face.diagrams",
             "load_robot": "armblocks.face.robots",
+            "load_table": "armblocks.formats",
             "modified_dh": "armblocks.robot",
             "save_diagram": "armblocks.face.diagrams",
             "save_robot": "armblocks.face.robots",
@@ -122,6 +124,7 @@ __all__ = [
     "list_robots",
     "load_diagram",
     "load_robot",
+    "load_table",
     "modified_dh",
     "save_diagram",
     "save_robot",

@@ -15,6 +15,7 @@ from armblocks.blocks import (
     dynamic_limits,
     edges,
     expression,
+    from_file,
     joint_control,
     joint_paths,
     joint_pid,
@@ -95,6 +96,7 @@ from armblocks.blocks.edges import (
     VariableIntegerDelay,
 )
 from armblocks.blocks.expression import Expression
+from armblocks.blocks.from_file import FromFile
 from armblocks.blocks.joint_control import (
     ComputedTorque,
     FeedForward,
@@ -270,6 +272,7 @@ BLOCKS = BlockLibrary(
         logic,
         lookup,
         waveforms,
+        from_file,
         repeating,
         noise,
         orientations,
@@ -361,6 +364,7 @@ __all__ = [
     "Fkine",
     "ForwardDynamics",
     "From",
+    "FromFile",
     "FromTable",
     "Gain",
     "Goto",

@@ -107,7 +107,7 @@ def _translate(builder: TapeBuilder, function: Function, k: int, work: list[int]
     if number == casadi.OP_ASSIGN:
         return operands[0]
     if number == casadi.OP_PRINTME:
-        return _read(builder, *operands, name)
+        return _read(builder, operands[0], operands[1], name)
     raise CompileError(
         f"the equations use the operation {_NAMES.get(number, number)}",
         where=name,

@@ -20,6 +20,7 @@ from armblocks.diagram.port import Condition, Guard, Port, PortRef, State, View,
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
 from armblocks.diagram.structure import Inport, Outport, Subsystem
+from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
 from armblocks.diagram.variation import with_parameters
@@ -60,6 +61,7 @@ __all__ = [
     "SlotKind",
     "State",
     "Subsystem",
+    "TimeTable",
     "View",
     "ViewKind",
     "WorkedExample",

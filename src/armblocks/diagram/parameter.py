@@ -12,6 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from armblocks.diagram.time_table import TimeTable
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -33,6 +34,7 @@ class ParameterKind(Enum):
     BOOLEAN = "boolean"
     ROBOT = "robot"
     DIAGRAM = "diagram"
+    TABLE = "table"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +45,7 @@ class Parameter:
     is part of the structure). ``dimensions``: how many axes an array may have (0 is a plain number).
     ``minimum``, ``above``, ``maximum`` bound every entry; ``finite`` refuses infinities (NaN always is).
     ``roots``: an array of zeros or poles, which may be empty; complex ones become rows (real, imaginary).
-    ``of_type``: the class that an object of kind ``ROBOT`` or ``DIAGRAM`` must have.
+    ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM`` or ``TABLE`` must have.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Parameter:
             ParameterKind.BOOLEAN: "true or false",
             ParameterKind.ROBOT: "a Robot",
             ParameterKind.DIAGRAM: "a Diagram",
+            ParameterKind.TABLE: "a table of instants and values",
         }[self.kind]
         bounds = [
             f"{sign} {bound:g}"
@@ -211,6 +214,16 @@ def _check_object(rule: Parameter, value: object, where: str) -> object:
     return value
 
 
+def _check_table(rule: Parameter, value: object, where: str) -> TimeTable:
+    if isinstance(value, TimeTable):
+        return value
+    try:
+        rows = np.asarray(cast("Any", value), dtype=np.float64)
+    except (TypeError, ValueError):
+        raise _refuse(rule, value, where) from None
+    return TimeTable(rows)
+
+
 _CHECKS: dict[ParameterKind, Callable[[Parameter, object, str], Value]] = {
     ParameterKind.NUMBER: _check_number,
     ParameterKind.ARRAY: _check_array,
@@ -220,4 +233,5 @@ _CHECKS: dict[ParameterKind, Callable[[Parameter, object, str], Value]] = {
     ParameterKind.BOOLEAN: _check_boolean,
     ParameterKind.ROBOT: _check_object,
     ParameterKind.DIAGRAM: _check_object,
+    ParameterKind.TABLE: _check_table,
 }

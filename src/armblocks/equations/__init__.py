@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from armblocks.equations.options import SimulationOptions
     from armblocks.equations.signatures import Shape, Signature, Slot, signature
     from armblocks.equations.symbols import flatten, matrix_shape, unflatten
+    from armblocks.equations.table_reading import last_at_or_below, read_entry
     from armblocks.equations.traced_function import TracedFunction
 else:
     __getattr__ = lazy_exports(
@@ -26,7 +27,9 @@ else:
             "TracedFunction": "armblocks.equations.traced_function",
             "continuous_system": "armblocks.equations.continuous",
             "flatten": "armblocks.equations.symbols",
+            "last_at_or_below": "armblocks.equations.table_reading",
             "matrix_shape": "armblocks.equations.symbols",
+            "read_entry": "armblocks.equations.table_reading",
             "signature": "armblocks.equations.signatures",
             "trace_flow_jacobian": "armblocks.equations.flow_jacobian",
             "unflatten": "armblocks.equations.symbols",
@@ -44,7 +47,9 @@ __all__ = [
     "TracedFunction",
     "continuous_system",
     "flatten",
+    "last_at_or_below",
     "matrix_shape",
+    "read_entry",
     "signature",
     "trace_flow_jacobian",
     "unflatten",

@@ -28,16 +28,19 @@ def read_entry(table: SX, index: SX) -> SX:
     return SX.binary(casadi.OP_PRINTME, first, fmin(fmax(index, 0.0), count - 1.0))
 
 
-def last_at_or_below(table: SX, value: SX) -> SX:
+def last_at_or_below(table: SX, value: SX, count: int | None = None, stride: int = 1) -> SX:
     """The index of the last of rising entries that is not above ``value``; -1 below all of them.
 
-    A binary search without branches: log2(n) reads.
+    A binary search without branches: log2(n) reads. ``count`` and ``stride``: of every how many entries only
+    the first is meant, such as the first column of a table that lies row by row.
     """
-    step = 1 << (table.numel().bit_length() - 1)
+    count = count or table.numel()
+    step = 1 << (count.bit_length() - 1)
     place = SX(-1.0)
     while step:
         there = place + float(step)
-        fits = casadi.logic_and(there < float(table.numel()), read_entry(table, there) <= value)
+        entry = read_entry(table, float(stride) * there)
+        fits = casadi.logic_and(there < float(count), entry <= value)
         place = if_else(fits, there, place)
         step >>= 1
     return place

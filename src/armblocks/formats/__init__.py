@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from armblocks.formats.robot_format import RobotFormat
     from armblocks.formats.robot_json import read_robot, write_robot
     from armblocks.formats.robot_references import ResolveRobot
+    from armblocks.formats.table_files import load_table
 else:
     __getattr__ = lazy_exports(
         __name__,
@@ -28,6 +29,7 @@ else:
             "list_robots": "armblocks.formats.robot_files",
             "load_diagram": "armblocks.formats.diagram_files",
             "load_robot": "armblocks.formats.robot_files",
+            "load_table": "armblocks.formats.table_files",
             "read_diagram": "armblocks.formats.diagram_files",
             "read_robot": "armblocks.formats.robot_json",
             "read_script": "armblocks.formats.matlab_script",
@@ -48,6 +50,7 @@ __all__ = [
     "list_robots",
     "load_diagram",
     "load_robot",
+    "load_table",
     "read_diagram",
     "read_robot",
     "read_script",

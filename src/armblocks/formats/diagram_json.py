@@ -41,6 +41,7 @@ from armblocks.diagram import (
     ParameterKind,
     Placement,
     PortRef,
+    TimeTable,
 )
 from armblocks.equations import SimulationOptions
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError, FormatError, UnknownNameError
@@ -159,6 +160,8 @@ class _Writer:
     def _value(self, rule: Parameter, value: object) -> object:
         if isinstance(value, Robot):
             return self.robots.reference(value)
+        if isinstance(value, TimeTable):
+            return self.robots.table_reference(value)
         return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
 
 
@@ -313,6 +316,8 @@ def _parameter(rule: Parameter, node: Node, robots: RobotReader) -> object:
     """The checked value of one parameter, so that what is wrong is said at its own line."""
     if rule.kind is ParameterKind.ROBOT:
         return robots.robot(node)
+    if rule.kind is ParameterKind.TABLE and isinstance(node.value, str):
+        return robots.table(node)
     value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value
     with _located(node):
         return rule.check(value, "")

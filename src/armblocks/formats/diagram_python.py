@@ -13,7 +13,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar, cast
 
-from armblocks.diagram import Block, Connection, Diagram, Port, PortRef
+import numpy as np
+
+from armblocks.diagram import Block, Connection, Diagram, Port, PortRef, TimeTable
 from armblocks.errors import FormatError
 from armblocks.formats.robot_files import list_robots, load_robot
 from armblocks.formats.robot_references import shortest_reference
@@ -164,6 +166,8 @@ def _construction(block: Block, robots: Mapping[Robot, str]) -> str:
 
 
 def _value(value: object) -> str:
+    if isinstance(value, TimeTable):
+        return f"ab.load_table({_text(value.source)})" if value.source else _value(_nested(value))
     if isinstance(value, tuple):
         return f"[{', '.join(_value(entry) for entry in cast('tuple[object, ...]', value))}]"
     if isinstance(value, float):
@@ -171,6 +175,10 @@ def _value(value: object) -> str:
             return f'float("{value}")'
         return str(int(value)) + ".0" if value.is_integer() and abs(value) < 1e15 else repr(value)
     return _text(value) if isinstance(value, str) else repr(value)
+
+
+def _nested(table: TimeTable) -> tuple[object, ...]:
+    return tuple(tuple(row) for row in np.asarray(table).tolist())
 
 
 def _text(text: str) -> str:

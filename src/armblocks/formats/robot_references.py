@@ -1,4 +1,4 @@
-"""How a diagram file says which robot a block means.
+"""How a diagram file says which robot a block means, and which table of values.
 
 A block's parameter names a robot: ``"kr180"`` a shipped one; ``"arms/mine.m"`` a robot file, relative to the
 diagram's folder; or a robot of the diagram's own table ``robots``, so that what several blocks share is said
@@ -12,6 +12,8 @@ once::
 An entry is a whole robot document, or a variant: ``robot`` a shipped name or a path; ``friction`` ``"none"``,
 ``"viscous"`` (only viscous friction is kept) or ``"coulomb"`` (only Coulomb friction is kept);
 ``friction_model`` the name of the formula.
+
+A table of values at instants is the path of its file, relative to the diagram's folder, or its rows.
 """
 
 from __future__ import annotations
@@ -20,14 +22,21 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from armblocks.errors import ArmblocksError, UnknownNameError
+import numpy as np
+
+from armblocks.diagram import TimeTable
+from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.formats.robot_files import is_path, list_robots, shipped_robot
 from armblocks.formats.robot_json import robot_from, robot_to
+from armblocks.formats.table_files import load_table
 from armblocks.robot import FrictionModel, Robot
 
 ResolveRobot = Callable[[str], Robot]
 """From a shipped name or a path to a robot: ``load_robot``."""
+
+MOST_INLINE = 10_000
+"""Numbers of a table that a diagram may hold itself."""
 
 OWN = "#"
 """What the ``source`` of a robot of the diagram's own table starts with; the rest is its key there."""
@@ -40,7 +49,7 @@ _FRICTION: dict[str, Callable[[Robot], Robot]] = {
 
 
 class RobotReader:
-    """Finds the robots of one document. Raises ``FormatError`` or ``UnknownNameError`` with file and line."""
+    """Finds the robots and tables of one document. Errors have file and line."""
 
     def __init__(self, table: Node | None, folder: Path | None, resolve_robot: ResolveRobot) -> None:
         self._folder = folder
@@ -53,6 +62,15 @@ class RobotReader:
         """The robot that a block's parameter means."""
         name = node.text()
         return self._own[name] if name in self._own else self._resolved(node)
+
+    def table(self, node: Node) -> TimeTable:
+        """The table of a file beside the document."""
+        place = Path(node.text()) if self._folder is None else self._folder / node.text()
+        try:
+            return load_table(place)
+        except ArmblocksError as error:
+            what = f"{error.where}: {error.what}" if error.where else error.what
+            raise node.error(what, allowed=error.allowed, fix=error.fix) from error
 
     def _entry(self, node: Node) -> Robot:
         if "robot" not in node.members():
@@ -99,6 +117,25 @@ class RobotWriter:
                 self._known[robot] = self._new_key(robot)
                 self.table[self._known[robot]] = entry
         return self._known[robot]
+
+    def table_reference(self, table: TimeTable) -> object:
+        """The path of the table's file where it still gives the same, else its rows."""
+        if table.source and Path(table.source).is_file():
+            try:
+                same = load_table(table.source) == table
+            except ArmblocksError:
+                same = False
+            if same:
+                return _relative(table.source, self._folder)
+        rows = np.asarray(table)
+        if rows.size > MOST_INLINE:
+            raise FormatError(
+                f"a table of {rows.shape[0]} rows stands in no file",
+                where=table.source,
+                allowed=f"tables of up to {MOST_INLINE} numbers, or a file that holds the same",
+                fix="write the rows to a .csv or .npz file and give what load_table makes of it",
+            )
+        return rows.tolist()
 
     def _new_key(self, robot: Robot) -> str:
         """The key that the robot had, or its name, made unlike every other robot that can be meant."""
