@@ -93,8 +93,8 @@ def _members(contents: Mapping[str, Any]) -> dict[str, Any]:
 def _read_parquet(data: bytes) -> Columns:
     import pandas as pd
 
-    read: Callable[..., Any] = pd.read_parquet  # pyright: ignore[reportUnknownMemberType]
-    frame: Any = read(io.BytesIO(data)).reset_index()
+    pandas: Any = pd
+    frame = pandas.read_parquet(io.BytesIO(data)).reset_index()
     return _columns({str(name): frame[name].to_numpy() for name in frame.columns if name != "index"})
 
 
