@@ -8,7 +8,17 @@ from collections.abc import Iterable, Iterator
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Block, Diagram, Parameter, ParameterKind, Port, State, ViewKind, infer_shapes
+from armblocks.diagram import (
+    Block,
+    Diagram,
+    Parameter,
+    ParameterKind,
+    Port,
+    State,
+    ViewKind,
+    diagram_views,
+    infer_shapes,
+)
 from armblocks.face.block_examples import caption, example_block
 from armblocks.formats import diagram_to_bytes, diagram_to_python, load_robot
 from armblocks.report import block_picture, diagram_picture
@@ -231,7 +241,7 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     """The example's drawing, what a run of it gives, and both its forms."""
     result = ab.simulate(diagram)
     figures = list(view_figures(diagram, result, FIGURE_WIDTH))
-    if any(view.kind is ViewKind.ROBOT for _, view in diagram.views()):
+    if any(view.kind is ViewKind.ROBOT for _, view in diagram_views(diagram)):
         figures += [next(motion_figures(motion, "")) for motion in motions(diagram, result)]
     drawing = diagram_picture(diagram, result)
     lines = ["## Example", "", prose(caption(kind)), ""]
