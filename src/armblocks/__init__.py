@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from armblocks.face.payload import Payload
     from armblocks.face.reporting import write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
+    from armblocks.face.sensitivity import SensitivityResult, sensitivity
     from armblocks.face.trajectory import JointTrajectory, jtraj
     from armblocks.face.trimming import trim
     from armblocks.formats import load_table
@@ -64,6 +65,7 @@ else:
             "Prismatic": "armblocks.robot",
             "Revolute": "armblocks.robot",
             "Robot": "armblocks.robot",
+            "SensitivityResult": "armblocks.face.sensitivity",
             "SimulationOptions": "armblocks.equations",
             "SimulationResult": "armblocks.simulation",
             "Transform": "armblocks.spatial",
@@ -83,6 +85,7 @@ else:
             "modified_dh": "armblocks.robot",
             "save_diagram": "armblocks.face.diagrams",
             "save_robot": "armblocks.face.robots",
+            "sensitivity": "armblocks.face.sensitivity",
             "simulate": "armblocks.face.model",
             "standard_dh": "armblocks.robot",
             "trim": "armblocks.face.trimming",
@@ -109,6 +112,7 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "Robot",
+    "SensitivityResult",
     "SimulationOptions",
     "SimulationResult",
     "Transform",
@@ -128,6 +132,7 @@ __all__ = [
     "modified_dh",
     "save_diagram",
     "save_robot",
+    "sensitivity",
     "simulate",
     "standard_dh",
     "trim",
