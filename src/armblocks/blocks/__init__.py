@@ -16,6 +16,7 @@ from armblocks.blocks import (
     edges,
     expression,
     from_file,
+    gains,
     joint_control,
     joint_paths,
     joint_pid,
@@ -30,6 +31,7 @@ from armblocks.blocks import (
     orientations,
     pid,
     poses,
+    python_function,
     reductions,
     repeating,
     robots,
@@ -97,6 +99,7 @@ from armblocks.blocks.edges import (
 )
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.from_file import FromFile
+from armblocks.blocks.gains import SineWaveFunction, SliderGain, WeightedSampleTime
 from armblocks.blocks.joint_control import (
     ComputedTorque,
     FeedForward,
@@ -192,6 +195,7 @@ from armblocks.blocks.poses import (
     TransformPoint,
     TransformTwist,
 )
+from armblocks.blocks.python_function import PythonFunction
 from armblocks.blocks.reductions import (
     CumulativeSum,
     DotProduct,
@@ -266,6 +270,7 @@ BLOCKS = BlockLibrary(
         robots,
         sinks,
         arithmetic,
+        gains,
         reductions,
         matrices,
         selection,
@@ -284,6 +289,7 @@ BLOCKS = BlockLibrary(
         drives,
         arm_plant,
         expression,
+        python_function,
         second_order,
         dynamic_limits,
         edges,
@@ -427,6 +433,7 @@ __all__ = [
     "ProductOfElements",
     "Pulse",
     "PulseGenerator",
+    "PythonFunction",
     "Quantizer",
     "Quaternion2T",
     "QuaternionInverse",
@@ -464,7 +471,9 @@ __all__ = [
     "Sign",
     "SignalGenerator",
     "SineWave",
+    "SineWaveFunction",
     "Skew",
+    "SliderGain",
     "Sqrt",
     "StateSpace",
     "Step",
@@ -499,6 +508,7 @@ __all__ = [
     "UniformRandomNumber",
     "UnitDelay",
     "VariableIntegerDelay",
+    "WeightedSampleTime",
     "WrapToZero",
     "XYGraph",
     "Xyz2T",

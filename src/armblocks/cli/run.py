@@ -59,6 +59,9 @@ def run(
     figures: Annotated[
         bool, typer.Option("--figures/--no-figures", help="Also write each figure as a file.")
     ] = True,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the Python files whose functions the diagram names.")
+    ] = False,
     open_report: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
 ) -> None:
     """Simulate a diagram and write a report: figures, numbers, data."""
@@ -66,7 +69,7 @@ def run(
     from armblocks.cli.summary import print_displays, print_files, print_motions, print_run
 
     parameters = parse_assignments(assignments or [])
-    diagram = ab.load_diagram(model)
+    diagram = ab.load_diagram(model, trust=trust)
     settings: dict[str, Any] = {
         name: value
         for name, value in {

@@ -23,6 +23,7 @@ from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
+from armblocks.diagram.user_function import UserFunction
 from armblocks.diagram.variation import with_parameters
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
@@ -62,6 +63,7 @@ __all__ = [
     "State",
     "Subsystem",
     "TimeTable",
+    "UserFunction",
     "View",
     "ViewKind",
     "WorkedExample",

@@ -13,6 +13,7 @@ from typing import Any, cast
 import numpy as np
 
 from armblocks.diagram.time_table import TimeTable
+from armblocks.diagram.user_function import UserFunction
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -35,6 +36,7 @@ class ParameterKind(Enum):
     ROBOT = "robot"
     DIAGRAM = "diagram"
     TABLE = "table"
+    FUNCTION = "function"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +47,7 @@ class Parameter:
     is part of the structure). ``dimensions``: how many axes an array may have (0 is a plain number).
     ``minimum``, ``above``, ``maximum`` bound every entry; ``finite`` refuses infinities (NaN always is).
     ``roots``: an array of zeros or poles, which may be empty; complex ones become rows (real, imaginary).
-    ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM`` or ``TABLE`` must have.
+    ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM``, ``TABLE`` or ``FUNCTION`` must have.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Parameter:
             ParameterKind.ROBOT: "a Robot",
             ParameterKind.DIAGRAM: "a Diagram",
             ParameterKind.TABLE: "a table of instants and values",
+            ParameterKind.FUNCTION: "a Python function",
         }[self.kind]
         bounds = [
             f"{sign} {bound:g}"
@@ -224,6 +227,14 @@ def _check_table(rule: Parameter, value: object, where: str) -> TimeTable:
     return TimeTable(rows)
 
 
+def _check_function(rule: Parameter, value: object, where: str) -> UserFunction:
+    if isinstance(value, UserFunction):
+        return value
+    if not callable(value):
+        raise _refuse(rule, value, where)
+    return UserFunction(value)
+
+
 _CHECKS: dict[ParameterKind, Callable[[Parameter, object, str], Value]] = {
     ParameterKind.NUMBER: _check_number,
     ParameterKind.ARRAY: _check_array,
@@ -234,4 +245,5 @@ _CHECKS: dict[ParameterKind, Callable[[Parameter, object, str], Value]] = {
     ParameterKind.ROBOT: _check_object,
     ParameterKind.DIAGRAM: _check_object,
     ParameterKind.TABLE: _check_table,
+    ParameterKind.FUNCTION: _check_function,
 }

@@ -10,9 +10,13 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram
 
 
-def load_diagram(name_or_path: str | PathLike[str]) -> Diagram:
-    """A shipped example by name (``"kr180model"``), or a diagram from a ``.json`` file."""
-    return formats.load_diagram(name_or_path, BLOCKS)
+def load_diagram(name_or_path: str | PathLike[str], *, trust: bool = False) -> Diagram:
+    """A shipped example by name (``"kr180model"``), or a diagram from a ``.json`` file.
+
+    A diagram may name functions in Python files beside it. With ``trust`` those files are run; without it,
+    such a diagram is refused.
+    """
+    return formats.load_diagram(name_or_path, BLOCKS, trust=trust)
 
 
 def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:

@@ -1,4 +1,5 @@
-"""Files and descriptions: robots and diagrams, read and written. Nothing in a file is ever executed."""
+"""Files and descriptions: robots and diagrams, read and written. Nothing in a file is executed,
+but for Python functions of a diagram that is expressly trusted."""
 
 from typing import TYPE_CHECKING
 

@@ -21,24 +21,33 @@ def list_examples() -> tuple[str, ...]:
 
 
 def load_diagram(
-    name_or_path: str | PathLike[str], library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
+    name_or_path: str | PathLike[str],
+    library: BlockLibrary,
+    resolve_robot: ResolveRobot = load_robot,
+    *,
+    trust: bool = False,
 ) -> Diagram:
     """A shipped diagram by its name, ``"kr180model"``, or a diagram file by its path.
 
     What holds a path separator or ends in ``.json`` is a path, everything else a name. Raises
-    ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`.
+    ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`. With ``trust`` the
+    files of Python functions that the diagram names are run; without, such a diagram is refused.
     """
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
-        return read_diagram(text, library, resolve_robot)
+        return read_diagram(text, library, resolve_robot, trust=trust)
     known = list_examples()
     if text not in known:
         raise UnknownNameError("shipped diagram", text, known)
-    return read_diagram(shipped_folder("examples") / f"{text}{SUFFIX}", library, resolve_robot)
+    return read_diagram(shipped_folder("examples") / f"{text}{SUFFIX}", library, resolve_robot, trust=trust)
 
 
 def read_diagram(
-    path: str | PathLike[str], library: BlockLibrary, resolve_robot: ResolveRobot = load_robot
+    path: str | PathLike[str],
+    library: BlockLibrary,
+    resolve_robot: ResolveRobot = load_robot,
+    *,
+    trust: bool = False,
 ) -> Diagram:
     """The checked diagram of a file; ``library`` holds the block types that it may use.
 
@@ -48,7 +57,9 @@ def read_diagram(
     diagram that cannot be built. All name the file, and the line where the fault has one.
     """
     data = read_bounded(fspath(path), MOST_BYTES)
-    return diagram_from_bytes(data, fspath(path), library, resolve_robot, folder=Path(path).parent)
+    return diagram_from_bytes(
+        data, fspath(path), library, resolve_robot, folder=Path(path).parent, trust=trust
+    )
 
 
 def write_diagram(

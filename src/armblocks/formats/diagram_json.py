@@ -42,6 +42,7 @@ from armblocks.diagram import (
     Placement,
     PortRef,
     TimeTable,
+    UserFunction,
 )
 from armblocks.equations import SimulationOptions
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError, FormatError, UnknownNameError
@@ -73,19 +74,26 @@ Extras = dict[str, dict[str, object]]
 
 
 def diagram_from_bytes(
-    data: bytes, name: str, library: BlockLibrary, resolve_robot: ResolveRobot, *, folder: Path | None = None
+    data: bytes,
+    name: str,
+    library: BlockLibrary,
+    resolve_robot: ResolveRobot,
+    *,
+    folder: Path | None = None,
+    trust: bool = False,
 ) -> Diagram:
     """The checked diagram of a document; ``library`` holds the block types that it may use.
 
     ``name`` is what messages call the file; a robot's path is relative to ``folder``, and ``resolve_robot``
-    turns a shipped name or a path into a robot. Raises ``FormatError`` for what the format forbids,
+    turns a shipped name or a path into a robot. Python functions that the diagram names are only loaded,
+    which runs their file, with ``trust``. Raises ``FormatError`` for what the format forbids,
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, and ``DiagramError`` for a
     diagram that cannot be built. All name the file, and the line where the fault has one.
     """
     root = read_document(data, name, MOST_BYTES, DEEPEST)
     members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
-    reader = _Reader(library, RobotReader(members.get("robots"), folder, resolve_robot))
+    reader = _Reader(library, RobotReader(members.get("robots"), folder, resolve_robot, trust=trust))
     return reader.diagram(root, _DOCUMENT_KEYS, Path(name).stem)
 
 
@@ -160,6 +168,8 @@ class _Writer:
     def _value(self, rule: Parameter, value: object) -> object:
         if isinstance(value, Robot):
             return self.robots.reference(value)
+        if isinstance(value, UserFunction):
+            return "" if value == rule.check(rule.default, "") else self.robots.function_reference(value)
         if isinstance(value, TimeTable):
             return self.robots.table_reference(value)
         return _with_texts_for_infinities(value) if rule.kind in _NUMERIC else value
@@ -316,6 +326,8 @@ def _parameter(rule: Parameter, node: Node, robots: RobotReader) -> object:
     """The checked value of one parameter, so that what is wrong is said at its own line."""
     if rule.kind is ParameterKind.ROBOT:
         return robots.robot(node)
+    if rule.kind is ParameterKind.FUNCTION:
+        return robots.function(node) if node.value else rule.default
     if rule.kind is ParameterKind.TABLE and isinstance(node.value, str):
         return robots.table(node)
     value = _with_infinities(node.value) if rule.kind in _NUMERIC else node.value

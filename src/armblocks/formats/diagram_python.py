@@ -15,7 +15,7 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from armblocks.diagram import Block, Connection, Diagram, Port, PortRef, TimeTable
+from armblocks.diagram import Block, Connection, Diagram, Port, PortRef, TimeTable, UserFunction
 from armblocks.errors import FormatError
 from armblocks.formats.robot_files import list_robots, load_robot
 from armblocks.formats.robot_references import shortest_reference
@@ -166,6 +166,12 @@ def _construction(block: Block, robots: Mapping[Robot, str]) -> str:
 
 
 def _value(value: object) -> str:
+    if isinstance(value, UserFunction):
+        raise FormatError(
+            f"the function {value.name} has no place in a listing",
+            allowed="diagrams without Python functions",
+            fix="write the diagram as JSON, which names the function's file",
+        )
     if isinstance(value, TimeTable):
         return f"ab.load_table({_text(value.source)})" if value.source else _value(_nested(value))
     if isinstance(value, tuple):

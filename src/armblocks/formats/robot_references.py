@@ -14,6 +14,7 @@ An entry is a whole robot document, or a variant: ``robot`` a shipped name or a 
 ``friction_model`` the name of the formula.
 
 A table of values at instants is the path of its file, relative to the diagram's folder, or its rows.
+A Python function is ``file.py:name``, and is loaded for those who trust the diagram only.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from pathlib import Path
 
 import numpy as np
 
-from armblocks.diagram import TimeTable
+from armblocks.diagram import TimeTable, UserFunction
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.formats.json_document import Node, closed_members
+from armblocks.formats.python_functions import load_function
 from armblocks.formats.robot_files import is_path, list_robots, shipped_robot
 from armblocks.formats.robot_json import robot_from, robot_to
 from armblocks.formats.table_files import load_table
@@ -51,7 +53,10 @@ _FRICTION: dict[str, Callable[[Robot], Robot]] = {
 class RobotReader:
     """Finds the robots and tables of one document. Errors have file and line."""
 
-    def __init__(self, table: Node | None, folder: Path | None, resolve_robot: ResolveRobot) -> None:
+    def __init__(
+        self, table: Node | None, folder: Path | None, resolve_robot: ResolveRobot, *, trust: bool = False
+    ) -> None:
+        self._trust = trust
         self._folder = folder
         self._resolve_robot = resolve_robot
         self._own: dict[str, Robot] = {}
@@ -71,6 +76,20 @@ class RobotReader:
         except ArmblocksError as error:
             what = f"{error.where}: {error.what}" if error.where else error.what
             raise node.error(what, allowed=error.allowed, fix=error.fix) from error
+
+    def function(self, node: Node) -> UserFunction:
+        """The Python function of a file beside the document, if code is trusted."""
+        reference = node.text()
+        if not self._trust:
+            raise node.error(
+                f"'{reference}' is Python code, and files run no code unasked",
+                allowed="a diagram without Python functions, or one that is trusted",
+                fix="read the code, then use load_diagram(..., trust=True) or --trust",
+            )
+        try:
+            return load_function(reference, self._folder)
+        except ArmblocksError as error:
+            raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
 
     def _entry(self, node: Node) -> Robot:
         if "robot" not in node.members():
@@ -117,6 +136,17 @@ class RobotWriter:
                 self._known[robot] = self._new_key(robot)
                 self.table[self._known[robot]] = entry
         return self._known[robot]
+
+    def function_reference(self, function: UserFunction) -> str:
+        """The file and the name of a function."""
+        file, _, name = function.source.rpartition(":")
+        if not file:
+            raise FormatError(
+                f"the function {function.name} stands in no file of its own",
+                allowed="functions at the top of a .py file, whose place a diagram can name",
+                fix="move it to a file and import it",
+            )
+        return f"{_relative(file, self._folder)}:{name}"
 
     def table_reference(self, table: TimeTable) -> object:
         """The path of the table's file where it still gives the same, else its rows."""

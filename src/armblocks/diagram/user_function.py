@@ -1,0 +1,68 @@
+"""A function of the user's own, in Python, as the value of a block's parameter."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FunctionType
+
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class UserFunction:
+    """A Python function; two are equal where they are the same, or the same code without surroundings.
+
+    Raises ``InputError`` where its arguments cannot be listed.
+    """
+
+    function: Callable[..., object]
+
+    def __post_init__(self) -> None:
+        try:
+            kinds = [entry.kind for entry in inspect.signature(self.function).parameters.values()]
+        except (TypeError, ValueError):
+            kinds = [inspect.Parameter.VAR_POSITIONAL]
+        plain = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+        if not all(kind in plain for kind in kinds):
+            raise InputError(
+                f"the arguments of {self.name} cannot be listed",
+                allowed="a function with named arguments, such as def law(u, t)",
+                fix="write a function around it",
+            )
+
+    @property
+    def name(self) -> str:
+        """What the function is called."""
+        return str(getattr(self.function, "__name__", "the function"))
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """The arguments that have to be given, in order."""
+        listed = inspect.signature(self.function).parameters.values()
+        return tuple(entry.name for entry in listed if entry.default is inspect.Parameter.empty)
+
+    @property
+    def source(self) -> str:
+        """``file.py:name`` of a function that stands at the top of a file, else ``""``."""
+        function = self.function
+        if not isinstance(function, FunctionType) or "<" in function.__qualname__:
+            return ""
+        file = function.__code__.co_filename
+        return f"{file}:{function.__qualname__}" if file.endswith(".py") else ""
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, UserFunction):
+            return NotImplemented
+        return self.function == other.function or (self._code is not None and self._code == other._code)
+
+    def __hash__(self) -> int:
+        return hash(self._code or self.function)
+
+    @property
+    def _code(self) -> tuple[object, ...] | None:
+        function = self.function
+        if not isinstance(function, FunctionType) or function.__closure__ or not self.source:
+            return None
+        return (function.__code__, repr(function.__defaults__), repr(function.__kwdefaults__))

@@ -1,0 +1,35 @@
+"""Python functions that trusted diagrams name: the only place where a file's code is run."""
+
+from __future__ import annotations
+
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+from armblocks.diagram import UserFunction
+from armblocks.errors import FormatError
+
+
+def load_function(reference: str, folder: Path | None) -> UserFunction:
+    """The function that ``file.py:name`` means. **Runs the file.**
+
+    The path is relative to ``folder``. Raises ``FormatError`` where there is no such file or function, or the
+    file's code fails.
+    """
+    path, _, name = reference.rpartition(":")
+    file = Path(path) if folder is None else folder / path
+    if not path.endswith(".py") or not name.isidentifier() or not file.is_file():
+        raise FormatError(
+            f"'{reference}' names no function of a file", allowed="file.py:name, relative to the diagram"
+        )
+    spec = spec_from_file_location(file.stem, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise FormatError(f"the code of {path} fails: {type(error).__name__}: {error}"[:300]) from error
+    found = vars(module).get(name)
+    if not callable(found):
+        raise FormatError(f"{path} has no function named '{name}'", fix="correct the name")
+    return UserFunction(found)
