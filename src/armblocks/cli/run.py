@@ -70,18 +70,9 @@ def run(
 
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
-    settings: dict[str, Any] = {
-        name: value
-        for name, value in {
-            "stop_time": stop_time,
-            "solver": solver,
-            "step": step,
-            "sample_time": sample_time,
-            "rtol": rtol,
-            "atol": atol,
-        }.items()
-        if value is not None
-    }
+    settings = _stated(
+        stop_time=stop_time, solver=solver, step=step, sample_time=sample_time, rtol=rtol, atol=atol
+    )
     folder = _writable_folder(out or Path(f"{diagram.name}-report"))
     settings.update(parameters=parameters, initial_state=from_state)
     result, failure = _simulate(diagram, settings)
@@ -108,6 +99,11 @@ def run(
         raise failure
     if not result.run.complete:
         raise KeyboardInterrupt
+
+
+def _stated(**settings: Any) -> dict[str, Any]:
+    """The settings that the command line states; the model's own stand for the others."""
+    return {name: value for name, value in settings.items() if value is not None}
 
 
 def _simulate(diagram: Diagram, settings: dict[str, Any]) -> tuple[SimulationResult, SimulationError | None]:
