@@ -146,7 +146,9 @@ def _margin_marks(
         ends = (below.up(value - found.phase), below.up(value))
         word = f"phase margin {table_number(found.phase, 3)} deg"
         level = below.up(value - found.phase)
-        marks += _margin_stroke(x, ends, level + (15 if found.phase > 0.0 else -7), word, (left, right))
+        # The curve falls: what is below it to the left is free.
+        base = level + (15 if found.phase > 0.0 else -7)
+        marks += _margin_stroke(x, ends, base, word, (left, right), to_the_left=True)
         marks.append(Polyline([(left, level), (right, level)], Tone.ACCENT, 1.0, (5.0, 4.0)))
     marks.append(Polyline([(left, above.up(0.0)), (right, above.up(0.0))], Tone.ACCENT, 1.0, (5.0, 4.0)))
     box = (*above.box[:2], *below.box[2:])
@@ -161,10 +163,16 @@ def _inside(mark: Mark, box: tuple[float, float, float, float]) -> bool:
 
 
 def _margin_stroke(
-    x: float, ends: tuple[float, float], base: float, word: str, span: tuple[float, float]
+    x: float,
+    ends: tuple[float, float],
+    base: float,
+    word: str,
+    span: tuple[float, float],
+    *,
+    to_the_left: bool = False,
 ) -> list[Mark]:
     width = text_width(word, SMALL_SIZE, bold=True)
-    fits = x + 10 + width < span[1]
+    fits = x + 10 + width < span[1] and not (to_the_left and x - 10 - width > span[0])
     return [
         Polyline([(x, ends[0]), (x, ends[1])], Tone.ACCENT, 2.2),
         Disc(x, ends[1], 3.4, fill=Tone.ACCENT),
