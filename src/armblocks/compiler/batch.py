@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import load_rows, store_rows
 from armblocks.compiler.layout import BatchLayout, Layout
-from armblocks.compiler.llvm_ir import Registers, emit_operations
+from armblocks.compiler.llvm_ir import Inputs, Registers, emit_operations
+from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.tape import Tape
 
 __all__ = ["BatchLayout", "Layout", "emit_batch"]
@@ -24,14 +27,14 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     declared = ", ".join(
         ["i64 %columns"] + [f"ptr noalias {'readonly ' if p.startswith('%i') else ''}{p}" for p in pointers]
     )
-    sample = Body(module)
-    _emit_block(sample, tape, layout, "%k")
+    sample = _block(module, tape, layout, 1, f"{name}.sample", "%k", pointers)
     module.add(
         f"{name}.sample",
         "\n".join(
             [
                 f"define internal void @{name}.sample(i64 %k, {declared}) nounwind noinline {{",
                 "entry:",
+                *sample.room,
                 *sample.lines,
                 "  ret void\n}",
             ]
@@ -41,15 +44,15 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     if lanes == 1:
         lines = ["  br label %tail.enter", *_loop("tail", "%start", "%stop", 1, call)]
     else:
-        block = Body(module, lanes)
-        _emit_block(block, tape, layout, "%vector")
-        again = _retry(block, name, passed)
+        block = _block(module, tape, layout, lanes, f"{name}.lanes", "%vector", pointers)
+        again = _retry(block, name, passed, lanes)
         lines = [
+            *block.room,
             "  %count = sub i64 %stop, %start",
             f"  %odd = and i64 %count, {lanes - 1}",
             "  %first = sub i64 %stop, %odd",
             "  br label %vector.enter",
-            *_loop("vector", "%start", "%first", lanes, block.lines + again),
+            *_loop("vector", "%start", "%first", lanes, [*block.lines, *again]),
             "  br label %tail.enter",
             *_loop("tail", "%first", "%stop", 1, call),
         ]
@@ -75,29 +78,81 @@ def _loop(name: str, start: str, stop: str, step: int, body: list[str]) -> list[
     ]
 
 
-def _retry(block: Body, name: str, passed: str) -> list[str]:
+def _retry(block: _Block, name: str, passed: str, lanes: int) -> list[str]:
     """Text that evaluates the block's samples one by one if a function was undecided in any lane."""
-    if block.undecided is None:
+    if block.doubtful is None:
         return []
     lines = [
-        f"  %doubt = bitcast {block.bit} {block.undecided} to i{block.lanes}",
-        f"  %doubtful = icmp ne i{block.lanes} %doubt, 0",
+        f"  %doubtful = icmp ne i{lanes} {block.doubtful}, 0",
         "  br i1 %doubtful, label %retry.enter, label %retry.done",
     ]
     body = [
         "  %retry.place = add i64 %vector, %retry",
         f"  call void @{name}.sample(i64 %retry.place, {passed})",
     ]
-    return lines + _loop("retry", "0", str(block.lanes), 1, body)
+    return lines + _loop("retry", "0", str(lanes), 1, body)
 
 
-def _emit_block(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> None:
+@dataclass(frozen=True, kw_only=True)
+class _Block:
+    """Text that evaluates as many samples as lanes; ``doubtful``: the lanes to be done again, as bits."""
+
+    room: tuple[str, ...] = ()
+    lines: tuple[str, ...]
+    doubtful: str | None
+
+
+def _block(
+    module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str, sample: str, pointers: list[str]
+) -> _Block:
     """Load the samples from ``sample`` on, one per lane, evaluate the tape, store the outputs."""
-    bases = {
-        slot: body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {_row(body, sample, size)}")
-        for slot, (size, kind) in enumerate(zip(tape.input_sizes, layout.inputs))
-        if kind is Layout.ROWS
-    }
+    groups = _groups(tape, layout, lanes)
+    stores = {k: registers for k, (_, _, registers) in enumerate(groups)}
+
+    def inputs_of(body: Body) -> Inputs:
+        return _inputs(body, tape, layout, sample)
+
+    def store(body: Body, registers: Registers, k: int) -> None:
+        slot, first, members = groups[k]
+        columns = [registers.number(register) for register in members]
+        if layout.outputs[slot] is Layout.COLUMNS:
+            address = _column(body, f"%o{slot}", first, sample)
+            body.do(f"store {body.real} {columns[0]}, ptr {address}, align 8")
+            return
+        size = len(tape.outputs[slot])
+        base = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {_row(body, sample, size)}")
+        store_rows(body, base, size, first, columns)
+
+    if is_long(tape):
+        declared = [("i64", sample), ("i64", "%columns")]
+        declared += [(f"ptr noalias{' readonly' if p.startswith('%i') else ''}", p) for p in pointers]
+        calls = emit_pieces(module, tape, name, lanes, declared, stores, inputs_of, store)
+        return _Block(room=(calls.room,), lines=calls.lines, doubtful=calls.doubtful)
+    body = Body(module, lanes)
+    registers = emit_operations(body, tape, inputs_of(body))
+    for k in stores:
+        store(body, registers, k)
+    doubtful = None
+    if body.undecided is not None:
+        doubtful = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
+    return _Block(lines=tuple(body.lines), doubtful=doubtful)
+
+
+def _groups(tape: Tape, layout: BatchLayout, lanes: int) -> list[tuple[int, int, tuple[int, ...]]]:
+    """Slot, first place and registers of what is stored together: a column, or as many of a row as lanes."""
+    groups: list[tuple[int, int, tuple[int, ...]]] = []
+    for slot, (members, kind) in enumerate(zip(tape.outputs, layout.outputs)):
+        if kind is Layout.COLUMNS:
+            groups += [(slot, place, (register,)) for place, register in enumerate(members)]
+            continue
+        for chunk in range(0, len(members), lanes):
+            first = min(chunk, max(0, len(members) - lanes))
+            groups.append((slot, first, members[first : first + lanes]))
+    return groups
+
+
+def _inputs(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Inputs:
+    bases: dict[int, str] = {}
     loaded: dict[int, str] = {}
 
     def load(register: int) -> str:
@@ -111,6 +166,9 @@ def _emit_block(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Non
             return body.broadcast(body.let(f"load double, ptr {address}, align 8"))
         if kind is Layout.COLUMNS:
             return body.let(f"load {body.real}, ptr {_column(body, f'%i{slot}', place, sample)}, align 8")
+        if slot not in bases:
+            row = _row(body, sample, size)
+            bases[slot] = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {row}")
         first = min(place - place % body.lanes, max(0, size - body.lanes))
         for k, value in enumerate(load_rows(body, bases[slot], size, first)[:size]):
             loaded.setdefault(start + first + k, value)
@@ -131,23 +189,7 @@ def _emit_block(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Non
 
         return body.gather(address, behind)
 
-    registers = emit_operations(body, tape, load, load_entry)
-    for slot, (members, kind) in enumerate(zip(tape.outputs, layout.outputs)):
-        if kind is Layout.COLUMNS:
-            for place, register in enumerate(members):
-                address = _column(body, f"%o{slot}", place, sample)
-                body.do(f"store {body.real} {registers.number(register)}, ptr {address}, align 8")
-        else:
-            _store_slot(body, slot, members, registers, sample)
-
-
-def _store_slot(body: Body, slot: int, members: tuple[int, ...], registers: Registers, sample: str) -> None:
-    size = len(members)
-    base = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {_row(body, sample, size)}")
-    for chunk in range(0, size, body.lanes):
-        first = min(chunk, max(0, size - body.lanes))
-        columns = [registers.number(register) for register in members[first : first + body.lanes]]
-        store_rows(body, base, size, first, columns)
+    return Inputs(load, load_entry)
 
 
 def _row(body: Body, sample: str, size: int) -> str:

@@ -18,6 +18,7 @@ it out.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body, Module, number_text
 from armblocks.compiler.opcodes import COMPARISONS, Opcode
@@ -27,9 +28,17 @@ MANY_CONSTANTS = 32
 """From here on an output's constants are copied from a table."""
 
 LoadInput = Callable[[int], str]
-"""Gives the value of an input register, in all lanes."""
+"""Gives the value of a register that is not written here, in all lanes."""
 LoadEntry = Callable[[int, str], str]
 """Gives the value of the input register that lies so many (an integer in each lane) behind another."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """How a body reads what it does not work out itself."""
+
+    load: LoadInput
+    load_entry: LoadEntry
 
 
 def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "internal") -> None:
@@ -42,11 +51,10 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
     whose address is asked for.
     """
 
-    def write() -> str:
-        body = Body(module)
-        arguments = [f"ptr noalias readonly %i{k}" for k in range(len(tape.input_sizes))]
-        arguments += [f"ptr noalias %o{k}" for k in range(len(tape.outputs))]
+    pointers = [("ptr noalias readonly", f"%i{k}") for k in range(len(tape.input_sizes))]
+    pointers += [("ptr noalias", f"%o{k}") for k in range(len(tape.outputs))]
 
+    def inputs_of(body: Body) -> Inputs:
         def load(register: int) -> str:
             slot, place = tape.input_place(register)
             address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {place}")
@@ -58,25 +66,45 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
             address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {entry}")
             return body.let(f"load double, ptr {address}, align 8")
 
-        # Each result is stored as soon as it is known: thousands that wait for the end would be spilled and
-        # loaded again, and the compiler takes time in proportion to the square of their count.
-        outputs: dict[int, list[tuple[int, int]]] = {}
+        return Inputs(load, load_entry)
+
+    def write() -> str:
+        from armblocks.compiler.pieces import emit_pieces, is_long
+
+        body = Body(module)
+        outputs: dict[int, list[str]] = {}
         for slot, members in enumerate(tape.outputs):
             copied = _copy_constants(body, tape, members, slot, f"{name}.constants{slot}")
             for place, register in enumerate(members):
                 if not (copied and tape.first_constant <= register < tape.first_operation):
-                    outputs.setdefault(register, []).append((slot, place))
+                    outputs.setdefault(register, []).append(f"ptr %o{slot}, i64 {place}")
 
-        def store(register: int, registers: Registers) -> None:
-            for slot, place in outputs.pop(register, ()):
-                address = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {place}")
+        def store(body: Body, registers: Registers, register: int) -> None:
+            for place in outputs[register]:
+                address = body.let(f"getelementptr inbounds double, {place}")
                 body.do(f"store double {registers.number(register)}, ptr {address}, align 8")
 
-        registers = emit_operations(body, tape, load, load_entry, store)
-        for register in list(outputs):
-            store(register, registers)
+        if is_long(tape):
+            groups = {register: (register,) for register in outputs}
+            calls = emit_pieces(module, tape, name, 1, pointers, groups, inputs_of, store)
+            body.lines += [calls.room, *calls.lines]
+        else:
+            # Each result is stored as soon as it is known: thousands that wait for the end would be spilled
+            # and loaded again, and the compiler takes time in proportion to the square of their count.
+            known: set[int] = set()
+
+            def written(register: int, registers: Registers) -> None:
+                if register in outputs:
+                    known.add(register)
+                    store(body, registers, register)
+
+            registers = emit_operations(body, tape, inputs_of(body), written)
+            for register in outputs:
+                if register not in known:
+                    store(body, registers, register)
         body.do("ret void")
-        head = f"define {linkage} void @{name}({', '.join(arguments)}) nounwind {{\nentry:\n"
+        arguments = ", ".join(f"{kind} {pointer}" for kind, pointer in pointers)
+        head = f"define {linkage} void @{name}({arguments}) nounwind {{\nentry:\n"
         return head + "\n".join(body.lines) + "\n}"
 
     module.define(name, write)
@@ -133,7 +161,7 @@ class Registers:
         body, tape = self._body, self._tape
         if register in self._conditions:
             return body.select(self._conditions[register], body.number(1.0), body.number(0.0))
-        if register < tape.first_constant:
+        if register < tape.first_constant or register >= tape.first_operation:
             return self._load(register)
         return body.number(tape.constants[register - tape.first_constant])
 
@@ -150,19 +178,21 @@ class Registers:
 def emit_operations(
     body: Body,
     tape: Tape,
-    load: LoadInput,
-    load_entry: LoadEntry,
+    inputs: Inputs,
     written: Callable[[int, Registers], None] | None = None,
+    some: range | None = None,
 ) -> Registers:
     """Emit all operations of the tape into ``body``; gives the registers, from which outputs are read.
 
-    ``written(register, registers)`` is called after each operation.
+    ``written(register, registers)`` is called after each operation. With ``some`` of the operations alone,
+    ``inputs.load`` also gives the registers that others have written.
     """
     from armblocks.compiler import elementary  # not needed where code comes from the disk cache
 
-    registers = Registers(body, tape, load)
-    partners = _sine_cosine_pairs(tape)
-    for k, (opcode, operands) in enumerate(tape.operations):
+    registers = Registers(body, tape, inputs.load)
+    partners = tape.sine_cosine_pairs
+    for k in range(len(tape.operations)) if some is None else some:
+        opcode, operands = tape.operations[k]
         target = tape.first_operation + k
         if opcode in COMPARISONS:
             registers.set_condition(target, _emit_comparison(body, registers, opcode, operands))
@@ -174,7 +204,7 @@ def emit_operations(
             first, count, index = operands
             size = int(tape.constants[count - tape.first_constant])
             behind = body.held_index(registers.number(index), size)
-            registers.set_number(target, load_entry(first, behind))
+            registers.set_number(target, inputs.load_entry(first, behind))
         elif target in partners:
             if not registers.has_number(target):
                 pair = elementary.sine_cosine(body, registers.number(operands[0]))
@@ -186,16 +216,6 @@ def emit_operations(
         if written is not None:
             written(target, registers)
     return registers
-
-
-def _sine_cosine_pairs(tape: Tape) -> dict[int, tuple[int, int]]:
-    """Registers of sines and cosines of the same argument: both come from one reduction."""
-    found: dict[int, dict[Opcode, int]] = {}
-    for k, (opcode, operands) in enumerate(tape.operations):
-        if opcode in (Opcode.SIN, Opcode.COS):
-            found.setdefault(operands[0], {})[opcode] = tape.first_operation + k
-    pairs = [(pair[Opcode.SIN], pair[Opcode.COS]) for pair in found.values() if len(pair) == 2]
-    return {register: pair for pair in pairs for register in pair}
 
 
 _PREDICATES = {

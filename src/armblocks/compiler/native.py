@@ -16,6 +16,10 @@ from armblocks.compiler.target import Target, host_target
 if TYPE_CHECKING:
     from llvmlite import binding as llvm
 
+LONG, VERY_LONG = 20_000, 200_000
+"""Lines of IR from which on the time to optimise is out of proportion: the code is so long that it waits for
+memory, not for arithmetic."""
+
 _LOCK = threading.Lock()  # LLVM's global context is not for two threads at once
 
 
@@ -59,19 +63,43 @@ def compile_object(text: str, target: Target, *, jit: bool = True) -> bytes:
     from llvmlite import binding as llvm
 
     with _LOCK:
-        machine = target.machine(jit=jit)
+        lines = text.count("\n")
+        machine = target.machine(jit=jit, opt=2 if lines < LONG else 1 if lines < VERY_LONG else 0)
         module = llvm.parse_assembly(text)
         module.triple = target.triple
         module.data_layout = str(machine.target_data)
-        module.verify()
-        tuning = llvm.create_pipeline_tuning_options(speed_level=2)
-        # The code is written over lanes already; these would only take time.
-        tuning.slp_vectorization = False
-        tuning.loop_vectorization = False
-        tuning.loop_unrolling = False
-        builder = llvm.create_pass_builder(machine, tuning)
-        builder.getModulePassManager().run(module, builder)
+        if lines < LONG:
+            module.verify()
+            _optimise(module, machine)
+        else:
+            _tidy(module, machine)
         return machine.emit_object(module)
+
+
+def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """All passes that make straight-line code faster."""
+    from llvmlite import binding as llvm
+
+    tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+    # The code is written over lanes already; these would only take time.
+    tuning.slp_vectorization = False
+    tuning.loop_vectorization = False
+    tuning.loop_unrolling = False
+    builder = llvm.create_pass_builder(machine, tuning)
+    builder.getModulePassManager().run(module, builder)
+
+
+def _tidy(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
+    """The two passes that matter most for the loops around long code: variables in registers, fewer jumps."""
+    from llvmlite import binding as llvm
+
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
+    passes = llvm.create_new_function_pass_manager()
+    passes.add_sroa_pass()
+    passes.add_simplify_cfg_pass()
+    for function in module.functions:
+        if not function.is_declaration:
+            passes.run(function, builder)
 
 
 def _link(code: bytes, target: Target) -> NativeCode:

@@ -81,6 +81,16 @@ class Tape:
     """For each output slot the register of each of its scalars."""
 
     @cached_property
+    def sine_cosine_pairs(self) -> dict[int, tuple[int, int]]:
+        """Registers of sines and cosines of the same argument: both come from one reduction."""
+        found: dict[int, dict[Opcode, int]] = {}
+        for k, (opcode, operands) in enumerate(self.operations):
+            if opcode in (Opcode.SIN, Opcode.COS):
+                found.setdefault(operands[0], {})[opcode] = self.first_operation + k
+        pairs = [(pair[Opcode.SIN], pair[Opcode.COS]) for pair in found.values() if len(pair) == 2]
+        return {register: pair for pair in pairs for register in pair}
+
+    @cached_property
     def input_starts(self) -> tuple[int, ...]:
         """First register of each input slot, and at the end the first register after the inputs."""
         return (0, *(int(end) for end in np.cumsum(self.input_sizes)))

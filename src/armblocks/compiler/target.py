@@ -29,14 +29,14 @@ class Target:
         """Identifies the target: code made for one key runs wherever the key is the same."""
         return "|".join((self.triple, self.cpu, self.features, str(self.lanes), self.llvm_version))
 
-    def machine(self, *, jit: bool = True) -> llvm.TargetMachine:
-        """A new LLVM target machine."""
+    def machine(self, *, jit: bool = True, opt: int = 2) -> llvm.TargetMachine:
+        """A new LLVM target machine; ``opt``: how much work goes into the code, 0 to 2."""
         from llvmlite import binding as llvm
 
         return llvm.Target.from_triple(self.triple).create_target_machine(
             cpu=self.cpu,
             features=self.features,
-            opt=2,
+            opt=opt,
             reloc="pic",
             codemodel="jitdefault" if jit else "default",
             jit=jit,

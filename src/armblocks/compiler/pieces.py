@@ -1,0 +1,191 @@
+"""Long tapes cut into pieces, each a function of its own.
+
+The work of LLVM's register allocation and scheduling grows faster than a function does: ten thousand
+operations in one function take minutes, in pieces of some hundred they take seconds. What one piece works
+out and a later one needs goes through memory, as it would anyway, because no processor has that many
+registers. The operations are the same in the same order, and so are the bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.llvm_ir import Inputs, Registers, emit_operations
+from armblocks.compiler.opcodes import ELEMENTARY
+from armblocks.compiler.tape import Tape
+
+LONGEST = 1200
+"""Operations and stores of a function that is left in one piece."""
+LENGTH = 400
+"""Operations and stores of a piece."""
+FUNCTION_WEIGHT = 8
+"""An elementary function counts as so many operations."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Piece:
+    """Operations ``first`` to ``last - 1``, and the names of the stores that can be done after them."""
+
+    first: int
+    last: int
+    stores: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cut:
+    """A tape in pieces. ``places`` says where a register that a later piece reads lies in memory."""
+
+    pieces: tuple[Piece, ...]
+    places: dict[int, int]
+    room: int
+
+
+def is_long(tape: Tape) -> bool:
+    """Whether a tape is better cut."""
+    stores = sum(len(members) for members in tape.outputs)
+    return len(tape.operations) + stores > LONGEST
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calls:
+    """Text that evaluates a tape in pieces: its memory (to be made once), the calls, and in which lanes a
+    function was undecided, as bits (``None``: always decided)."""
+
+    room: str
+    lines: tuple[str, ...]
+    doubtful: str | None
+
+
+Stores = Mapping[int, Sequence[int]]
+"""The registers of each group of outputs that is stored together, under some number."""
+
+
+def cut(tape: Tape, stores: Stores) -> Cut:
+    """Cut a tape."""
+    first = tape.first_operation
+    ready: dict[int, list[int]] = {}
+    for number, registers in stores.items():
+        ready.setdefault(max(registers, default=0), []).append(number)
+    pieces: list[Piece] = []
+    begin, weight = 0, 0
+    waiting: list[int] = []
+    for k, (opcode, _) in enumerate(tape.operations):
+        done = ready.pop(first + k, [])
+        waiting += done
+        weight += (FUNCTION_WEIGHT if opcode in ELEMENTARY else 1) + len(done)
+        if weight >= LENGTH:
+            pieces.append(Piece(first=begin, last=k + 1, stores=tuple(waiting)))
+            begin, weight, waiting = k + 1, 0, []
+    waiting += [number for numbers in ready.values() for number in numbers]  # of inputs and constants alone
+    end = len(tape.operations)
+    for start in range(0, max(1, len(waiting)), LENGTH):
+        pieces.append(Piece(first=begin, last=end, stores=tuple(waiting[start : start + LENGTH])))
+        begin = end
+    return _with_places(tape, stores, pieces)
+
+
+def _with_places(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
+    """Give each register that crosses a border a place, free again after the last piece that reads it."""
+    first = tape.first_operation
+    made: dict[int, int] = {}
+    last_read: dict[int, int] = {}
+    for number, piece in enumerate(pieces):
+        for k in range(piece.first, piece.last):
+            made[first + k] = number
+        read = [r for k in range(piece.first, piece.last) for r in tape.operations[k].operands]
+        read += [r for store in piece.stores for r in stores[store]]
+        for register in read:
+            if register >= first:
+                last_read[register] = number
+    ends: dict[int, list[int]] = {}
+    places: dict[int, int] = {}
+    free: list[int] = []
+    room = 0
+    crossing = sorted(register for register, piece in last_read.items() if piece > made[register])
+    starts: dict[int, list[int]] = {}
+    for register in crossing:
+        starts.setdefault(made[register], []).append(register)
+    for number in range(len(pieces)):
+        for register in starts.get(number, []):
+            if not free:
+                free.append(room)
+                room += 1
+            places[register] = free.pop()
+            ends.setdefault(last_read[register], []).append(places[register])
+        free += ends.pop(number, [])
+    return Cut(pieces=tuple(pieces), places=places, room=room)
+
+
+def emit_pieces(
+    module: Module,
+    tape: Tape,
+    name: str,
+    lanes: int,
+    arguments: Sequence[tuple[str, str]],
+    stores: Stores,
+    inputs_of: Callable[[Body], Inputs],
+    storing: Callable[[Body, Registers, int], None],
+) -> Calls:
+    """Add the functions of a tape's pieces.
+
+    ``arguments`` are the types and names of what all of them get; ``inputs_of(body)`` gives how a body reads
+    the inputs, ``storing(body, registers, k)`` writes group ``k`` of ``stores``.
+    """
+    done = cut(tape, stores)
+    declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %kept"])
+    passed = ", ".join([f"{kind.split()[0]} {argument}" for kind, argument in arguments] + ["ptr %kept"])
+    bits = f"i{lanes}"
+    calls: list[str] = []
+    doubts: list[str] = []
+    for number, piece in enumerate(done.pieces):
+        body = Body(module, lanes)
+        _emit_piece(body, tape, done, piece, inputs_of(body), storing)
+        result = "void"
+        if body.undecided is None:
+            body.do("ret void")
+        else:
+            result = bits
+            body.do(f"ret {bits} {body.let(f'bitcast {body.bit} {body.undecided} to {bits}')}")
+            doubts.append(f"%doubt{number}")
+        symbol = f"{name}.{number}"
+        head = f"define internal {result} @{symbol}({declared}) nounwind noinline {{\nentry:\n"
+        module.add(symbol, head + "\n".join(body.lines) + "\n}")
+        target = "" if result == "void" else f"%doubt{number} = "
+        calls.append(f"  {target}call {result} @{symbol}({passed})")
+    total: str | None = None
+    for doubt in doubts:
+        joined = f"{doubt}.all"
+        calls.append(f"  {joined} = or {bits} {doubt}, {total or 0}")
+        total = joined
+    room = f"  %kept = alloca double, i64 {max(1, done.room * lanes)}, align {8 * lanes}"
+    return Calls(room=room, lines=tuple(calls), doubtful=total)
+
+
+def _emit_piece(
+    body: Body,
+    tape: Tape,
+    done: Cut,
+    piece: Piece,
+    inputs: Inputs,
+    storing: Callable[[Body, Registers, int], None],
+) -> None:
+    def address(register: int) -> str:
+        place = done.places[register] * body.lanes
+        return body.let(f"getelementptr inbounds double, ptr %kept, i64 {place}")
+
+    def load(register: int) -> str:
+        if register < tape.first_operation:
+            return inputs.load(register)
+        return body.let(f"load {body.real}, ptr {address(register)}, align {8 * body.lanes}")
+
+    registers = emit_operations(
+        body, tape, Inputs(load, inputs.load_entry), some=range(piece.first, piece.last)
+    )
+    for store in piece.stores:
+        storing(body, registers, store)
+    for register in range(tape.first_operation + piece.first, tape.first_operation + piece.last):
+        if register in done.places:
+            value = registers.number(register)
+            body.do(f"store {body.real} {value}, ptr {address(register)}, align {8 * body.lanes}")

@@ -1,0 +1,94 @@
+"""Long tapes are cut into functions without changing a bit."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from casadi import SX
+
+from armblocks.compiler import compile_function, native, pieces
+from armblocks.compiler.from_casadi import tape_from
+from armblocks.compiler.interpret import interpret
+from armblocks.compiler.pieces import LENGTH, cut, is_long
+from armblocks.equations import TracedFunction, signature
+
+
+def long_function(count: int) -> TracedFunction:
+    """A recursion that keeps old values in use, with conditions, functions and outputs all along its way."""
+
+    def equations(x: SX, u: SX) -> tuple[SX, SX]:
+        values = [x[0], x[1]]
+        for k in range(count):
+            a, b, c = values[-1], values[-2], values[max(0, len(values) - 900)]
+            values.append(ca.if_else(a < b, 0.7 * a + 0.2 * c, 0.6 * b - 0.3 * a * u[k % 3] + 0.01 * k))
+            if k % 97 == 0:
+                values.append(ca.sin(values[-1]))
+                values.append(ca.cos(values[-2]))
+        return ca.vertcat(*values[::7], 3.0, x[1]), ca.vertcat(*values[-20:])
+
+    return TracedFunction.trace(
+        "long",
+        signature(("x", (2,)), ("u", (3,))),
+        signature(("y", (len(_count(count)),)), ("z", (20,))),
+        equations,
+    )
+
+
+def _count(count: int) -> list[int]:
+    total = 2 + count + 2 * ((count + 96) // 97)
+    return [*range(0, total, 7), -1, -2]
+
+
+def test_a_long_function_gives_the_bits_that_it_has_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    traced = long_function(1500)
+    tape = tape_from(traced)
+    assert is_long(tape)
+    rng = np.random.default_rng(0)
+    x, u = rng.normal(size=(21, 2)), rng.normal(size=(21, 3))
+    # An angle so huge that lanes leave it to the one-lane code.
+    x[20, 0] = 1e200
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
+    in_pieces = compile_function(traced)
+    found = in_pieces(x, u)
+    singles = [in_pieces(x[row], u[row]) for row in range(21)]
+    monkeypatch.setattr(pieces, "LONGEST", 10**9)
+    whole = compile_function(traced)(x, u)
+    for slot in (0, 1):
+        np.testing.assert_array_equal(found[slot], whole[slot])
+        np.testing.assert_array_equal(found[slot], [single[slot] for single in singles])
+        told = [interpret(tape, [x[row], u[row]])[slot] for row in range(20)]
+        # Functions differ by a unit or two in the last place; the recursion damps what came before.
+        np.testing.assert_allclose(found[slot][:20], told, rtol=1e-12, atol=1e-13)
+
+
+def test_every_operation_and_store_is_in_one_piece_and_no_piece_is_long() -> None:
+    tape = tape_from(long_function(5000))
+    stores = {
+        k: (register,) for k, register in enumerate(register for part in tape.outputs for register in part)
+    }
+    done = cut(tape, stores)
+    operations = [k for piece in done.pieces for k in range(piece.first, piece.last)]
+    assert operations == list(range(len(tape.operations)))
+    assert sorted(k for piece in done.pieces for k in piece.stores) == sorted(stores)
+    assert all(piece.last - piece.first + len(piece.stores) <= 2 * LENGTH for piece in done.pieces)
+    # Places are used again: 900 values back are in use, not all 5000.
+    assert done.room < 2 * 900 + LENGTH
+
+
+@pytest.mark.parametrize("effort", ["LONG", "VERY_LONG"])
+def test_less_optimisation_changes_no_bit(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    traced = long_function(1500)
+    x, u = np.random.default_rng(1).normal(size=(2, 11, 3))
+    expected = compile_function(traced)(x[:, :2], u)
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
+    monkeypatch.setattr(native, "LONG", 0)
+    if effort == "VERY_LONG":
+        monkeypatch.setattr(native, "VERY_LONG", 0)
+    quick = compile_function(traced)(x[:, :2], u)
+    for one, other in zip(expected, quick):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_length_of_the_longest_uncut_function_is_above_that_of_a_piece() -> None:
+    assert pieces.LONGEST >= 2 * LENGTH
