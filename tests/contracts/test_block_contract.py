@@ -67,7 +67,7 @@ def numbers(
     """
     random = np.random.default_rng(1)
     states = (*block.states(shapes), *block.discrete_states(shapes), *block.modes(shapes))
-    states += block.conditions(shapes)
+    states += (*block.conditions(shapes), *block.delay_lines(shapes))
     rates = [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs]
     ends = [
         [Slot(state.name, state.shape) for state in states],
@@ -81,7 +81,8 @@ def numbers(
         p["T"] = SX(0.1)
     found = [block.outputs(t, x, u, p), block.derivatives(t, x, u, p), block.records(t, x, u, p)]
     found += [block.updates(t, x, u, p), block.guard_values(t, x, u, p), block.mode_values(t, x, u, p)]
-    found += [block.condition_values(t, x, u, p)]
+    found += [block.condition_values(t, x, u, p), block.delay_times(t, x, u, p), block.initial_past(p)]
+    found += [{name: bound[k] for name, bound in block.delay_bounds(p).items()} for k in (0, 1)]
     found += [block.resets(t, x, u, p, e) if block.guards(shapes) else {}, block.initial_outputs(p)]
     found += [block.initial_states(p), dict(enumerate(map(SX, block.breakpoints(p))))]
     function = Function("f", [t, *symbols], [SX(value) for group in found for value in group.values()])

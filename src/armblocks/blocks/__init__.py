@@ -41,6 +41,7 @@ from armblocks.blocks import (
     sinks,
     sources,
     transforms,
+    transport,
     waveforms,
     zero_poles,
 )
@@ -236,6 +237,7 @@ from armblocks.blocks.selection import (
 from armblocks.blocks.sinks import Display, Scope, Terminator, ToWorkspace, XYGraph
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
 from armblocks.blocks.transforms import T2xyz, Xyz2T
+from armblocks.blocks.transport import TransportDelay, VariableTimeDelay, VariableTransportDelay
 from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
 from armblocks.blocks.zero_poles import AnalogFilter, DigitalFilter, DiscreteZeroPole, ZeroPole
 from armblocks.diagram import Block, BlockLibrary, structure, virtual_wiring
@@ -291,6 +293,7 @@ BLOCKS = BlockLibrary(
         expression,
         python_function,
         second_order,
+        transport,
         dynamic_limits,
         edges,
     )
@@ -501,6 +504,7 @@ __all__ = [
     "TransferFunctionRealZero",
     "TransformPoint",
     "TransformTwist",
+    "TransportDelay",
     "Transpose",
     "Trapezoidal",
     "Trigonometry",
@@ -508,6 +512,8 @@ __all__ = [
     "UniformRandomNumber",
     "UnitDelay",
     "VariableIntegerDelay",
+    "VariableTimeDelay",
+    "VariableTransportDelay",
     "WeightedSampleTime",
     "WrapToZero",
     "XYGraph",

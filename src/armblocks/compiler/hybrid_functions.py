@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from armblocks.compiler.delay_lines import emit_delay_lines
 from armblocks.compiler.implicit_equations import emit_solve
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Workspace
 from armblocks.compiler.ir_routine import Routine
@@ -29,6 +30,8 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
     """
     if sizes.algebraic:
         emit_solve(module, workspace, sizes.algebraic)
+    if sizes.delays:
+        emit_delay_lines(module, workspace, sizes)
     if sizes.directions:
         writer = _GuardFunctions(module, workspace, sizes.directions)
         module.define("watch", writer.watch)

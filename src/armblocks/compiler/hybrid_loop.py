@@ -52,6 +52,7 @@ class HybridLoop(Loop):
         self.sizes = sizes
         self.guards = len(sizes.directions)
         emit_functions(module, workspace, sizes)
+        self.delays = len(sizes.delays)
         w = self.w
         self.instant = w.variable("double", number_text(0.0))
         self.event = w.variable("i64", "0")
@@ -65,8 +66,43 @@ class HybridLoop(Loop):
         """Address of a vector of the workspace."""
         return self.w.at("%reals", place)
 
+    def emit_delay_bounds(self) -> None:
+        """No step is longer than a delay: what is looked up is then always there."""
+        w, places, n = self.w, self.places, self.delays
+        w.do(f"call void @delay_bounds(ptr %p, ptr {self.at(places.bounds)})")
+        shortest, longest = self.max_step, number_text(0.0)
+        for k in range(n):
+            shortest = w.minimum(shortest, w.get(self.at(places.bounds + k)))
+            longest = w.maximum(longest, w.get(self.at(places.bounds + n + k)))
+            w.put(w.get(self.at(places.bounds + k)), self.at(places.taus + k))
+        self.max_step = shortest
+        w.put(longest, self.at(places.longest))
+
+    def reals_size(self) -> str:
+        """Bytes of the array of doubles, with the past as far as it is kept."""
+        if not self.delays:
+            return super().reals_size()
+        w, places = self.w, self.places
+        rows = w.get(w.at("%counts", Count.PAST, "i64"), "i64")
+        length = w.word_op("add", w.word_op("mul", rows, str(places.past_width)), str(places.past))
+        return w.word_op("mul", length, "8")
+
+    def emit_room(self) -> None:
+        """Make sure that the past of delayed signals has room for another step."""
+        if self.delays:
+            time = self.w.get(self.kept[Real.TIME])
+            room = self.w.let(f"call i1 @make_room(double {time}, ptr %reals, ptr %counts)")
+            self.leave_unless(room, Status.PAST_FULL)
+
+    def keep(self, instant: str, x: str, function: str, middle: float = 0.0) -> None:
+        """A row of the past at a point, whose unknowns are solved and whose delayed values are looked up."""
+        arguments = f"ptr {instant}, ptr {x}, ptr %reals, ptr %counts, ptr %p"
+        self.w.do(f"call void @{function}({arguments}, double {number_text(middle)})")
+
     def emit_solve(self, instant: str, x: str) -> None:
-        """The unknowns of the implicit equations at a point, into ``trial_w``."""
+        """The delayed values at a point into ``z``, the unknowns of implicit equations into ``trial_w``."""
+        if self.delays:
+            self.w.do(f"call void @look_back(ptr {instant}, ptr {x}, ptr %reals, ptr %counts, ptr %p)")
         if self.sizes.algebraic:
             self.w.do(f"call void @solve(ptr {instant}, ptr {x}, ptr %reals, ptr %p)")
 
@@ -104,6 +140,8 @@ class HybridLoop(Loop):
     def emit_entry(self) -> None:
         """Go on where the last call stopped; the ends of the current piece are worked out again."""
         w = self.w
+        if self.delays:
+            self.emit_delay_bounds()
         self.emit_piece()
         started = w.get(self.counts[Count.STARTED], "i64")
         running, other = w.word_test("eq", started, str(int(Stage.RUNNING))), w.fresh("other")
@@ -141,6 +179,10 @@ class HybridLoop(Loop):
             time = self.tick_time(clock)
             earlier = w.both(w.compare("olt", time, shortest), w.compare("olt", time, earliest))
             earliest = w.select(earlier, time, earliest)
+        if self.delays:
+            time = w.let("call double @next_arrival(ptr %reals, ptr %counts)")
+            earlier = w.both(w.compare("olt", time, shortest), w.compare("olt", time, earliest))
+            earliest = w.select(earlier, time, earliest)
         w.put(earliest, self.piece_end)
 
     def emit_instant(self) -> None:
@@ -148,6 +190,8 @@ class HybridLoop(Loop):
         w = self.w
         time = w.get(self.kept[Real.TIME])
         until = w.multiply(time, number_text(SAME_ABOVE))
+        if self.delays:
+            w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         self.emit_ticks(time, until)
         if self.guards:
             self.emit_settling(time)
@@ -155,6 +199,11 @@ class HybridLoop(Loop):
         else:
             w.put(time, self.instant)
             self.emit_solve(self.instant, self.at(self.places.x))
+        if self.delays:
+            w.put(time, self.instant)
+            self.emit_solve(self.instant, self.at(self.places.x))
+            self.keep(self.instant, self.at(self.places.x), "keep_change")
+            w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         self.accept_unknowns()
         self.emit_samples(time, until, None)
         finished = w.word_test("slt", w.get(self.counts[Count.SEGMENT], "i64"), self.segments)
@@ -354,20 +403,23 @@ class HybridLoop(Loop):
         """The end of a fixed step, sooner right after an event."""
         w = self.w
         following = w.from_bits(w.word_op("add", w.bits(time), "10"))
-        return w.minimum(w.maximum(w.add(time, w.get(self.kept[Real.BOUND])), following), new_time)
+        soon = w.maximum(w.add(time, w.get(self.kept[Real.BOUND])), following)
+        if self.delays:
+            soon = w.minimum(soon, w.add(time, self.max_step))
+        return w.minimum(soon, new_time)
 
     def emit_record(self, instant: str, sample: str, row: str) -> None:
         """What else than the state a sample instant records: ``z``, and ``w`` for the state just written."""
         w, step, places = self.w, self.step, self.places
+        if self.delays or self.sizes.algebraic:
+            w.put(instant, self.instant)
+            self.emit_solve(self.instant, row)
         for name, place, count in (
             ("%out_z", places.z, self.sizes.discrete),
             ("%out_w", places.trial_w, self.sizes.algebraic),
         ):
             if not count:
                 continue
-            if name == "%out_w":
-                w.put(instant, self.instant)
-                self.emit_solve(self.instant, row)
             target = w.at(name, w.word_op("mul", sample, str(count)))
             w.for_each(count, lambda i: w.put(step.read(place, i), w.at(target, i)))  # noqa: B023
 
@@ -381,6 +433,8 @@ class HybridLoop(Loop):
             self.emit_search(time, h)
         new_time = w.get(self.new_time)
         self.emit_samples(time, w.multiply(new_time, number_text(SAME_BELOW)), h)
+        if self.delays:
+            self.emit_past(time, new_time, h)
         step.copy(step.y, step.x)
         w.put(new_time, self.kept[Real.TIME])
         w.increase(self.counts[Count.ACCEPTED])
@@ -393,7 +447,7 @@ class HybridLoop(Loop):
         w.branch(happens, instant, plain)
         w.place(plain)
         step.copy(step.K(self.tableau.end_row), step.K(0))
-        if self.sizes.algebraic:
+        if self.sizes.algebraic or self.delays:
             # The samples may have changed it; a zero of the same equations is found again at once.
             w.put(w.minimum(new_time, w.get(self.clamp)), self.instant)
             self.emit_solve(self.instant, self.at(self.places.x))
@@ -480,6 +534,17 @@ class HybridLoop(Loop):
         w.jump(on)
         w.place(quiet)
         w.place(on)
+
+    def emit_past(self, time: str, new_time: str, h: str) -> None:
+        """The middle and the end of an accepted step into the table of the past."""
+        w, places = self.w, self.places
+        middle = w.fma(number_text(0.5), w.subtract(new_time, time), time)
+        self.emit_extra_stages_once(time, h)
+        self.step.interpolate(middle, time, h, self.at(places.new_x))
+        for instant, x, mark in ((middle, places.new_x, 1.0), (new_time, places.y, 0.0)):
+            w.put(w.minimum(instant, w.get(self.clamp)), self.instant)
+            self.emit_solve(self.instant, self.at(x))
+            self.keep(self.instant, self.at(x), "keep", mark)
 
     def watch_inside(self, instant: str, time: str, h: str) -> str:
         """How many guards have fired at an instant within the step."""

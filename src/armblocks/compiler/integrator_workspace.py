@@ -22,6 +22,8 @@ class Status(IntEnum):
     """The derivative at the start of a segment is NaN or infinite."""
     ENDLESS_EVENTS = 5
     """Events follow one another without end: at one instant, or at ever shorter distances."""
+    PAST_FULL = 6
+    """The table of the past of delayed signals needs more room: give it, and call again."""
 
 
 class Real(IntEnum):
@@ -49,7 +51,11 @@ class Real(IntEnum):
 
 
 class Count(IntEnum):
-    """Places in the array of integers; after them comes the number of the next tick of every clock."""
+    """Places in the array of integers.
+
+    After them comes the number of the next tick of every clock, then the first and the last row of the past
+    that each delayed signal looks at; -1 where the last is the newest.
+    """
 
     SAMPLE = 0
     """The next sample instant to be written."""
@@ -85,7 +91,11 @@ class Count(IntEnum):
     """Whether the run wants to be told that it is stiff: it then pauses with ``STIFF`` at its limit."""
     SETTLE = 19
     """Whether the modes are still to take the values that the signals ask for: at the start."""
-    END = 20
+    PAST = 20
+    """Rows of the table of the past of delayed signals."""
+    PAST_ROOM = 21
+    """Rows that there is room for."""
+    END = 22
 
 
 class Stage(IntEnum):
@@ -100,6 +110,15 @@ class Stage(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
+class DelaySlots:
+    """One delayed scalar: where in ``z`` its value and its slope stand, and whether the delay is constant."""
+
+    value: int
+    slope: int
+    fixed: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class LoopSizes:
     """What of a system a loop is written for: lengths of its vectors, its clocks and guards.
 
@@ -109,13 +128,14 @@ class LoopSizes:
     states: int
     discrete: int = 0
     algebraic: int = 0
+    delays: tuple[DelaySlots, ...] = ()
     clocks: tuple[tuple[float, float], ...] = ()
     directions: tuple[int, ...] = ()
 
     @property
     def hybrid(self) -> bool:
         """Whether there is more than a flow."""
-        return bool(self.discrete or self.algebraic or self.clocks or self.directions)
+        return bool(self.discrete or self.algebraic or self.delays or self.clocks or self.directions)
 
 
 class Workspace:
@@ -128,7 +148,8 @@ class Workspace:
     the stretch that is looked at (``guards_before``, ``guards_middle``), their ``signs`` (0: not known yet),
     ``fired``, when each fired last (``last``), how long after the time before (``gap``) and how often in a
     row this became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian``
-    and ``before``.
+    and ``before``. For delayed signals: how long each is delayed (``taus``), between which bounds
+    (``bounds``: all shortest, all longest), the ``longest`` of all; the ``past`` comes behind everything.
     """
 
     def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
@@ -155,7 +176,14 @@ class Workspace:
         self.jacobian = self.residual + nw
         self.before = self.jacobian + nw * nw
         self.size = self.before + nw
-        self.counts = int(Count.END) + len(sizes.clocks)
+        lines = len(sizes.delays)
+        self.taus = self.size
+        self.bounds = self.taus + lines
+        self.size = self.bounds + 2 * lines + (1 if lines else 0)
+        self.longest = self.size - 1
+        self.past = self.size
+        self.past_width = 2 + 2 * lines
+        self.counts = int(Count.END) + len(sizes.clocks) + 2 * lines
 
     def slope(self, row: int) -> int:
         """Where row ``row`` of the stage derivatives begins."""

@@ -31,12 +31,15 @@ _ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * POINTERS, ctype
 SAME_INSTANT = 1.0 + 2.0**-50
 """Two times within this factor of one another are one instant, here as in the native loop."""
 
+FIRST_ROOM = 256
+"""Rows of the past that a run begins with room for."""
 NO_NUMBERS: Vector = np.empty(0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunPoint:
-    """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations.
+    """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations, and the
+    past of what is delayed (rows of :mod:`armblocks.compiler.delay_lines`; none at the start of a run).
 
     ``begun``: the ticks at this time have happened already.
     """
@@ -46,6 +49,7 @@ class RunPoint:
     begun: bool = False
     z: Vector = field(default_factory=lambda: NO_NUMBERS)
     w: Vector = field(default_factory=lambda: NO_NUMBERS)
+    past: Vector = field(default_factory=lambda: NO_NUMBERS)
 
 
 class NativeIntegrator:
@@ -126,8 +130,8 @@ class NativeIntegrator:
         clamps[: inside.size] = np.nextafter(inside, -np.inf)
         run = Integration(self, p, samples, ends, clamps)
         if checkpoint is not None:
-            run.reals[:] = checkpoint.reals
-            run.counts[Count.STARTED :] = checkpoint.counts[Count.STARTED :]
+            run.back_to(checkpoint)
+            run.counts[: Count.STARTED] = (0, samples.size, 0, ends.size)
             run.counts[[Count.ACCEPTED, Count.REJECTED, Count.EVALUATIONS, Count.INSTANTS, Count.EVENTS]] = 0
         else:
             run.place(start, step=step, first=not start.begun)
@@ -152,6 +156,7 @@ class NativeIntegrator:
         """
         old, here = run.integrator.workspace, self.workspace
         new = Integration(self, *run.course, records=(run.states, run.discrete, run.algebraic))
+        new.make_room(run.reals.size - old.size)
         head = here.slope(1)  # numbers, x, y, and the derivative at x
         new.reals[:head] = run.reals[:head]
         new.reals[here.z :] = run.reals[old.z :]
@@ -174,6 +179,7 @@ def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
     names += ["residual", "residual_jacobian"] if sizes.algebraic else []
     names += ["update"] if sizes.clocks else []
     names += ["guards", "reset"] if sizes.directions else []
+    names += ["delay_bounds", "delay_times", "delay_inputs"] if sizes.delays else []
     return tuple(names)
 
 
@@ -200,7 +206,8 @@ class Integration:
     ) -> None:
         workspace = integrator.workspace
         self.integrator = integrator
-        self.reals = np.zeros(workspace.size)
+        self._room = FIRST_ROOM * workspace.past_width if integrator.sizes.delays else 0
+        self.reals = np.zeros(workspace.size + self._room)
         self.counts = np.zeros(workspace.counts, dtype=np.int64)
         self.counts[Count.SEGMENTS] = ends.size
         self.status = Status.PAUSED
@@ -224,6 +231,18 @@ class Integration:
         self.course = (p, np.ascontiguousarray(samples), ends, clamps)
         self._take_addresses()
 
+    def make_room(self, numbers: int) -> None:
+        """Give the past of delayed signals room for so many numbers, at least."""
+        if numbers <= self._room:
+            return
+        more = np.zeros(numbers - self._room)
+        self.reals = np.concatenate([self.reals, more])
+        saved = np.concatenate([self._saved.reals, more])
+        self._saved = _checkpoint(self, saved, self._saved.counts)
+        self._room = numbers
+        self.counts[Count.PAST_ROOM] = numbers // self.integrator.workspace.past_width
+        self._take_addresses()
+
     def _take_addresses(self) -> None:
         arrays = (self.reals, self.counts, *self.course, self.states, self.discrete, self.algebraic)
         arrays += (self._saved.reals, self._saved.counts, self._scratch)
@@ -245,11 +264,28 @@ class Integration:
         self.counts[Count.STARTED] = Stage.INSTANT if sizes.hybrid else Stage.START
         self.counts[Count.FRESH] = 1
         self.counts[Count.SETTLE] = 1
+        if sizes.delays:
+            self._place_past(start)
         for clock, (period, offset) in enumerate(sizes.clocks):
             number = 0 if first else max(0, int((start.time - offset) / period) - 1)
             while not first and number * period + offset <= start.time * SAME_INSTANT:
                 number += 1
             self.counts[Count.END + clock] = number
+
+    def _place_past(self, start: RunPoint) -> None:
+        """What the delayed signals were: as the point says, or what they begin with, all the time before."""
+        places, lines = self.integrator.workspace, self.integrator.sizes.delays
+        past = start.past
+        if not past.size:
+            before = [start.z[line.value] for line in lines]
+            past = np.array([start.time, 0.0, *before, *(0.0 for _ in lines)])
+        self.make_room(2 * past.size)
+        self.reals[places.past : places.past + past.size] = past
+        self.counts[Count.PAST] = past.size // places.past_width
+        self.counts[Count.PAST_ROOM] = self._room // places.past_width
+        first = int(Count.END) + len(self.integrator.sizes.clocks)
+        self.counts[first : first + len(lines)] = 0
+        self.counts[first + len(lines) :] = -1
 
     def cut_at(self, time: float) -> None:
         """Let a step end exactly at a time (s), later than that reached, and the run start anew there."""
@@ -268,6 +304,9 @@ class Integration:
         self.reals[Real.PAUSE] = pause
         if self.status is Status.PAUSED:
             self.status = self.integrator.advance(self._addresses, max_steps)
+            while self.status is Status.PAST_FULL:
+                self.make_room(2 * self._room)
+                self.status = self.integrator.advance(self._addresses, max_steps)
         return self.status
 
     @property
@@ -279,8 +318,11 @@ class Integration:
 
     def back_to(self, checkpoint: Checkpoint) -> None:
         """Stand where :meth:`now` was taken, with what is recorded since forgotten."""
-        self.reals[:] = checkpoint.reals
+        self.make_room(checkpoint.reals.size - self.integrator.workspace.size)
+        self.reals[: checkpoint.reals.size] = checkpoint.reals
         self.counts[:] = checkpoint.counts
+        if self.integrator.sizes.delays:
+            self.counts[Count.PAST_ROOM] = self._room // self.integrator.workspace.past_width
         self.status = Status.PAUSED
 
     def now(self) -> Checkpoint:
@@ -292,7 +334,11 @@ class Integration:
         """Where the run stands: copies."""
         places, sizes = self.integrator.workspace, self.integrator.sizes
         z, w = self._vector(places.z, sizes.discrete), self._vector(places.w, sizes.algebraic)
-        return RunPoint(time=self.time, x=self.state.copy(), z=z.copy(), w=w.copy())
+        past = np.empty(0)
+        if sizes.delays:
+            rows = int(self.counts[Count.PAST]) * places.past_width
+            past = self._vector(places.past, rows).copy()
+        return RunPoint(time=self.time, x=self.state.copy(), z=z.copy(), w=w.copy(), past=past)
 
     @property
     def trial_unknowns(self) -> Vector:

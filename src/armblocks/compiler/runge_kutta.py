@@ -152,6 +152,7 @@ class Loop:
         on = w.word_test("slt", w.get(self.taken, "i64"), "%max_steps")
         on = w.both(on, w.compare("olt", w.get(self.kept[Real.TIME]), self.pause))
         self.leave_unless(on, Status.PAUSED)
+        self.emit_room()
         error = self.tableau.error_row
         if error is not None:
             self.emit_adaptive_step(error)
@@ -188,15 +189,20 @@ class Loop:
         w.place(last)
         self.emit_keep()
         w.module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
-        for kind, size in (("reals", self.places.size), ("counts", self.places.counts)):
-            w.do(
-                f"call void @llvm.memcpy.p0.p0.i64(ptr %saved_{kind}, ptr %{kind}, i64 {8 * size}, i1 false)"
-            )
+        for kind, size in (("reals", self.reals_size()), ("counts", str(8 * self.places.counts))):
+            w.do(f"call void @llvm.memcpy.p0.p0.i64(ptr %saved_{kind}, ptr %{kind}, i64 {size}, i1 false)")
         fresh = w.word_test("ne", w.get(self.counts[Count.FRESH], "i64"), "0")
         stage = w.let(f"select i1 {fresh}, i64 {int(Stage.START)}, i64 {int(Stage.RUNNING)}")
         w.put(stage, w.at("%saved_counts", Count.STARTED, "i64"), "i64")
         w.put("1", self.counts[Count.SAVED], "i64")
         w.place(on)
+
+    def reals_size(self) -> str:
+        """Bytes of the array of doubles."""
+        return str(8 * self.places.size)
+
+    def emit_room(self) -> None:
+        """Make sure that what a step leaves behind has room."""
 
     def leave(self, status: Status) -> None:
         """Return, unconditionally."""

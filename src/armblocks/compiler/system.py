@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armblocks.compiler import cache
 from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
 from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.integrator_workspace import LoopSizes
+from armblocks.compiler.integrator_workspace import DelaySlots, LoopSizes
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
 from armblocks.compiler.kept_jacobian import KeptJacobian, kept_jacobian
@@ -26,7 +26,7 @@ from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
 
 if TYPE_CHECKING:
-    from armblocks.equations import HybridSystem
+    from armblocks.equations import HybridSystem, TracedFunction
 
 Vector = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
 
     Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that tapes do not know.
     """
-    tapes = {name: tape_of(getattr(system, name)) for name in _FUNCTIONS}
+    tapes = {name: tape_of(function) for name, function in _functions(system).items()}
     return CompiledSystem(_describe(system, tapes), tapes.__getitem__, lambda: system)
 
 
@@ -61,13 +61,13 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
             description = json.loads(stored)
 
             def tape(function: str) -> Tape:
-                return kept_tape(description["digests"][function], lambda: getattr(trace(), function))
+                return kept_tape(description["digests"][function], lambda: _functions(trace())[function])
 
             return CompiledSystem(description, tape, trace)
         except (ValueError, KeyError, TypeError):
             pass  # a record of another make is made anew
     system = trace()
-    tapes = {function: tape_of(getattr(system, function)) for function in _FUNCTIONS}
+    tapes = {name: tape_of(function) for name, function in _functions(system).items()}
     description = _describe(system, tapes)
     for tape_made in tapes.values():
         keep_tape(tape_made)
@@ -100,11 +100,15 @@ class CompiledSystem:
             states=self.states.size,
             discrete=self.discrete.size,
             algebraic=self.algebraic.size,
+            delays=tuple(
+                DelaySlots(value=int(value), slope=int(slope), fixed=bool(fixed))
+                for value, slope, fixed in description["delays"]
+            ),
             clocks=tuple((float(period), float(offset)) for period, offset in description["clocks"]),
             directions=tuple(int(direction) for direction in description["guard_directions"]),
         )
         self._breakpoint_count = int(description["breakpoints"])
-        self._digests: Mapping[str, str] = {name: description["digests"][name] for name in _FUNCTIONS}
+        self._digests: Mapping[str, str] = dict(description["digests"])
         self._make_tape = tape
         self._trace = trace
         self._integrators: dict[int, NativeIntegrator] = {}
@@ -220,6 +224,16 @@ class CompiledSystem:
         return found
 
 
+def _functions(system: HybridSystem) -> dict[str, TracedFunction]:
+    """All functions of a system by name."""
+    functions: dict[str, TracedFunction] = {name: getattr(system, name) for name in _FUNCTIONS}
+    if system.delays is not None:
+        functions["delay_inputs"] = system.delays.inputs
+        functions["delay_times"] = system.delays.times
+        functions["delay_bounds"] = system.delays.bounds
+    return functions
+
+
 def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]:
     """All of a system but its equations, as plain values that JSON gives back exactly."""
 
@@ -231,6 +245,9 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "clocks": [[clock.period, clock.offset] for clock in system.clocks],
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
+        "delays": []
+        if system.delays is None
+        else list(zip(system.delays.values, system.delays.slopes, system.delays.fixed)),
         "parameters": slots_to_json(system.parameters),
         "signals": slots_to_json(system.signals_layout),
         "parameter_values": np.asarray(system.parameter_values, dtype=np.float64).tolist(),

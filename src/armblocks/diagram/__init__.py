@@ -16,7 +16,7 @@ from armblocks.diagram.hierarchy import (
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
-from armblocks.diagram.port import Condition, Guard, Port, PortRef, State, View, ViewKind
+from armblocks.diagram.port import Condition, DelayLine, Guard, Port, PortRef, State, View, ViewKind
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
 from armblocks.diagram.structure import Inport, Outport, Subsystem
@@ -41,6 +41,7 @@ __all__ = [
     "Carried",
     "Condition",
     "Connection",
+    "DelayLine",
     "Diagram",
     "DiagramBuilder",
     "DiagramShapes",

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from casadi import SX
 
 from armblocks.diagram.parameter import Parameter, Value
-from armblocks.diagram.port import Condition, Guard, Port, State, View
+from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 
@@ -44,6 +44,9 @@ class Block(ABC):
     Where a mode is no more than whether some quantity is positive, the block states *conditions* instead:
     ``condition_values`` gives the quantity, the equations find 1 or 0 as ``x[name]``, and mode, guard and
     reset follow. A block that only sampled blocks and constants feed asks its conditions directly.
+
+    A block may read what an input was some time ago: ``delay_lines`` names such values, ``delay_times`` says
+    how long ago. The equations find them as ``x[name]``; the numerics keep the past.
 
     The first line of a subclass's docstring says in one sentence what the block does, with its equation.
     """
@@ -138,6 +141,10 @@ class Block(ABC):
         """What the equations ask of the values, in an order in which each may depend on those before it."""
         return ()
 
+    def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
+        """Inputs whose values of some time ago the equations read, each in ``rated_inputs`` too."""
+        return ()
+
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of those outputs whose port does not state one, given the shapes of all inputs.
 
@@ -192,6 +199,18 @@ class Block(ABC):
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         """The quantity of every condition: the answer is 1 where it is positive."""
+        return {}
+
+    def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """How long ago (s), one number for each delay line."""
+        return {}
+
+    def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
+        """The shortest and the longest that each delay may be (s), above 0: no step is longer."""
+        return {}
+
+    def initial_past(self, p: Signals) -> Signals:
+        """What each delay line gives for times before the start."""
         return {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

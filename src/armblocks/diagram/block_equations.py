@@ -19,7 +19,7 @@ from casadi import SX, Function, densify, if_else, jtimes, substitute, vertcat
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.parameter import shape_of
-from armblocks.diagram.port import Condition, Guard, State
+from armblocks.diagram.port import Condition, DelayLine, Guard, State
 from armblocks.equations import Shape, Slot, flatten, unflatten
 from armblocks.errors import DiagramError
 
@@ -34,6 +34,9 @@ class SlotKind(Enum):
     GUARD = "guard value"
     MODE = "mode value"
     RESET = "reset"
+    DELAYED = "delayed signal"
+    DELAYED_RATE = "slope of a delayed signal"
+    DELAY = "delay"
 
 
 @dataclass(frozen=True)
@@ -99,10 +102,13 @@ class BlockEquations:
 
     states: tuple[State, ...]
     discrete: tuple[State, ...]
-    """Discrete states, then modes."""
+    """Discrete states, then delayed values, then their slopes (``name'``), then modes."""
     modes: tuple[State, ...]
     guards: tuple[Guard, ...]
     groups: tuple[Group, ...]
+    delays: tuple[DelayLine, ...] = ()
+    fixed_delays: frozenset[str] = frozenset()
+    """Those that only parameters say."""
 
     @cached_property
     def group_of(self) -> dict[tuple[SlotKind, str], int]:
@@ -180,7 +186,8 @@ def spread(value: SX, shape: Shape) -> SX:
 def _trace(structure: _Structure) -> BlockEquations:
     block = structure.block
     shapes = dict(structure.input_shapes)
-    states, discrete = block.states(shapes), block.discrete_states(shapes)
+    states, discrete, lines = block.states(shapes), block.discrete_states(shapes), block.delay_lines(shapes)
+    past = tuple(State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in lines)
     conditions = block.conditions(shapes)
     # Those whose change is an event are modes; all others are asked where they are needed.
     located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
@@ -189,7 +196,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     guards = (*block.guards(shapes), *(Guard(entry.name, entry.shape, entry.doc) for entry in located))
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
-        "z": [Slot(state.name, state.shape) for state in (*discrete, *modes)],
+        "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],
         "u": [Slot(name, shape) for name, shape in shapes.items()]
         + [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs],
         "e": [Slot(guard.name, guard.shape) for guard in guards],
@@ -225,6 +232,9 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.GUARD: {guard.name: guard.shape for guard in guards},
         SlotKind.MODE: {mode.name: mode.shape for mode in modes},
         SlotKind.RESET: {name: state_shapes[name] for name in resets if name in state_shapes},
+        SlotKind.DELAYED: {line.name: line.shape for line in lines},
+        SlotKind.DELAYED_RATE: {line.name: line.shape for line in lines},
+        SlotKind.DELAY: {line.name: () for line in lines},
     }
     found = {
         SlotKind.OUTPUT: block.outputs(t, x, u, p),
@@ -240,14 +250,29 @@ def _trace(structure: _Structure) -> BlockEquations:
             **{entry.name: _positive(quantities[entry.name], entry.closed) for entry in located},
         },
         SlotKind.RESET: resets,
+        SlotKind.DELAYED: {line.name: u[line.input] for line in lines},
+        SlotKind.DELAYED_RATE: {line.name: u[f"{line.input}'"] for line in lines},
+        SlotKind.DELAY: block.delay_times(t, x, u, p),
     }
     for kind, values in found.items():
         _check_complete(block, kind, list(sought[kind]), values)
     slots = [BlockSlot(kind, name, shape) for kind, named in sought.items() for name, shape in named.items()]
     flat = [spread(SX(found[slot.kind][slot.name]), slot.shape) for slot in slots]
     groups = _grouped(slots, flat, t, symbols, ends)
+    moved = {
+        slot.name
+        for group in groups
+        for slot in group.slots
+        if slot.kind is SlotKind.DELAY and (group.timed or group.states or group.discrete or group.inputs)
+    }
     return BlockEquations(
-        states=states, discrete=(*discrete, *modes), modes=modes, guards=guards, groups=groups
+        states=states,
+        discrete=(*discrete, *past, *modes),
+        modes=modes,
+        guards=guards,
+        groups=groups,
+        delays=lines,
+        fixed_delays=frozenset(line.name for line in lines) - moved,
     )
 
 

@@ -46,6 +46,16 @@ class Guard:
 
 
 @dataclass(frozen=True)
+class DelayLine:
+    """The value that an ``input`` of a block had some time ago, of the input's ``shape``."""
+
+    name: str
+    shape: Shape
+    doc: str
+    input: str
+
+
+@dataclass(frozen=True)
 class Condition:
     """A yes or no that a block asks of its values, by element: 1 where a quantity is positive, else 0.
 

@@ -128,7 +128,7 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
 
 def _flows(block: Block, equations: BlockEquations) -> bool:
     """Whether the outputs of a block move by themselves: with the time or with a continuous state."""
-    return bool(equations.states) or any(group.timed for group in equations.groups)
+    return bool(equations.states or equations.delays) or any(group.timed for group in equations.groups)
 
 
 def _reach(

@@ -30,7 +30,7 @@ from armblocks.diagram.sampling import Sampling, moving_blocks, resolve_sampling
 from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
 from armblocks.diagram.structure import Outport
 from armblocks.diagram.units import infer_units
-from armblocks.equations import HybridSystem, Signature, Slot, TracedFunction, flatten, signature
+from armblocks.equations import Delays, HybridSystem, Signature, Slot, TracedFunction, flatten, signature
 from armblocks.errors import ArmblocksError, DiagramError
 
 
@@ -173,6 +173,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
             ],
         ),
         aliases=_aliases(form, layout),
+        delays=_delays(model, symbols, flow, loops, ends),
     )
 
 
@@ -250,6 +251,9 @@ class _Tracing:
             events = [symbols.events[f"{node.block}/{name}"] for name in group.events]
             if order:
                 still, events = ([SX.zeros(part.numel()) for part in parts] for parts in (still, events))
+                for place, name in enumerate(group.discrete):
+                    if name in {line.name for line in self.network.equations[node.block].delays}:
+                        still[place] = self._slope(node.block, name, order)
             inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
             columns.append(vertcat(*states, *still, *inputs, *events, SX(0, 1)))
         arguments = [symbols.t, symbols.parameters[node.block], *columns]
@@ -263,6 +267,18 @@ class _Tracing:
                     fresh = self._values[node][slot.kind, slot.name]
                     held = symbols.discrete[f"{node.block}/{slot.name}"]
                     self._values[node][slot.kind, slot.name] = if_else(ticks, fresh, held)
+
+    def _slope(self, block: str, name: str, order: int) -> SX:
+        """The time derivative of a delayed value. Raises ``DiagramError`` where it is not kept."""
+        if order > 1 or name not in self.network.equations[block].fixed_delays:
+            what = "the second derivative" if order > 1 else "the derivative"
+            raise DiagramError(
+                f"{what} of a delayed signal is asked for" + ("" if order > 1 else ", whose delay changes"),
+                where=f"block '{block}' ({self.network.diagram.blocks[block].title})",
+                allowed="the first derivative behind a constant delay",
+                fix="differentiate before the delay, or filter instead of differentiating",
+            )
+        return self.symbols.discrete[f"{block}/{name}'"]
 
     def value(self, value: Value) -> SX:
         """The flat column of a value: worked out, held, or unknown until its loop is closed."""
@@ -377,6 +393,59 @@ def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
     return Value(Node(block, network.equations[block].group_of[kind, name], 0), kind, name)
 
 
+def _delays(
+    model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit, ends: Mapping[str, SX]
+) -> Delays | None:
+    """What is delayed, and how long. Raises ``DiagramError`` where a delay hangs on what it decides."""
+    places = signature(*symbols.discrete_slots).ranges
+    values: list[int] = []
+    slopes: list[int] = []
+    fixed: list[bool] = []
+    columns: dict[str, list[SX]] = {"u": [], "du": [], "tau": [], "shortest": [], "longest": []}
+    looked_up: list[SX] = [loops.w]
+    for name, equations in model.flow.equations.items():
+        if not equations.delays:
+            continue
+        block = model.flow.diagram.blocks[name]
+        bounds = block.delay_bounds(symbols.parameters_of(name))
+        for line in equations.delays:
+            kinds = (SlotKind.DELAYED, SlotKind.DELAYED_RATE, SlotKind.DELAY)
+            u, du, tau = (flow.value(_value(model.flow, name, kind, line.name)) for kind in kinds)
+            of_value, of_slope = places[f"{name}/{line.name}"], places[f"{name}/{line.name}'"]
+            values += range(of_value.start, of_value.stop)
+            slopes += range(of_slope.start, of_slope.stop)
+            fixed += [line.name in equations.fixed_delays] * u.numel()
+            each = SX.ones(u.numel())
+            parts = (u, du, tau * each, *(bound * each for bound in bounds[line.name]))
+            for key, part in zip(columns, parts):
+                columns[key].append(part)
+            looked_up += [symbols.discrete[f"{name}/{line.name}{mark}"] for mark in ("", "'")]
+    if not values:
+        return None
+    taus = loops.solved(columns["tau"])
+    if depends_on(taus, vertcat(*looked_up)):
+        raise DiagramError(
+            "how long a delay is depends on a delayed signal, or on a loop that is not linear",
+            where=f"diagram '{model.flow.diagram.name}'",
+            allowed="delays that follow from the time, states and sampled signals",
+            fix="pass the delay time through a lag or a sampled block first",
+        )
+
+    def function(title: str, ends: Mapping[str, SX], *keys: str) -> TracedFunction:
+        return _flat_function(
+            title, ends, {"d": loops.solved([part for key in keys for part in columns[key]])}
+        )
+
+    return Delays(
+        values=tuple(values),
+        slopes=tuple(slopes),
+        fixed=tuple(fixed),
+        inputs=function("delay_inputs", ends, "u", "du"),
+        times=function("delay_times", ends, "tau"),
+        bounds=function("delay_bounds", {"p": symbols.p}, "shortest", "longest"),
+    )
+
+
 def _reset(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, list[SX]]:
     """States and discrete variables after events; without any event the modes settle."""
     states, discrete = dict(symbols.states), dict(symbols.discrete)
@@ -478,7 +547,7 @@ def _initial_discrete(model: Model, symbols: _Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
         block, p = model.flow.diagram.blocks[name], symbols.parameters_of(name)
-        given = {**block.initial_states(p)}
+        given = {**block.initial_states(p), **block.initial_past(p)}
         values.extend(spread(SX(given.get(state.name, 0.0)), state.shape) for state in equations.discrete)
         if block.sampled:
             held = block.initial_outputs(p)

@@ -7,7 +7,7 @@ from armblocks.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from armblocks.equations.continuous import continuous_system
     from armblocks.equations.flow_jacobian import FlowJacobian, trace_flow_jacobian
-    from armblocks.equations.hybrid_system import HybridSystem, SampleClock
+    from armblocks.equations.hybrid_system import Delays, HybridSystem, SampleClock
     from armblocks.equations.options import SimulationOptions
     from armblocks.equations.signatures import Shape, Signature, Slot, signature
     from armblocks.equations.symbols import flatten, matrix_shape, unflatten
@@ -18,6 +18,7 @@ else:
         __name__,
         {
             "FlowJacobian": "armblocks.equations.flow_jacobian",
+            "Delays": "armblocks.equations.hybrid_system",
             "HybridSystem": "armblocks.equations.hybrid_system",
             "SampleClock": "armblocks.equations.hybrid_system",
             "Shape": "armblocks.equations.signatures",
@@ -37,6 +38,7 @@ else:
     )
 
 __all__ = [
+    "Delays",
     "FlowJacobian",
     "HybridSystem",
     "SampleClock",

@@ -33,6 +33,25 @@ class SampleClock:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Delays:
+    """Delayed scalars, ``nd`` of them: what goes in, how long it takes, and where in ``z`` it comes out.
+
+    ``inputs``: from ``t, x, z, w, p`` what is delayed and its exact time derivatives, ``(2 nd,)``. ``times``:
+    from the same how long, ``(nd,)`` s. ``bounds``: from ``p`` the shortest and the longest of each, above 0,
+    ``(2 nd,)`` s. ``values`` and ``slopes``: the places in ``z`` that show the value at ``t - tau``, and its
+    time derivative for a delay that is ``fixed``, whenever an equation is evaluated. They alone of ``z``
+    change while the time flows. Before the start, a signal was what ``initial_discrete`` has in its place.
+    """
+
+    values: tuple[int, ...]
+    slopes: tuple[int, ...]
+    fixed: tuple[bool, ...]
+    inputs: TracedFunction
+    times: TracedFunction
+    bounds: TracedFunction
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HybridSystem:
     """Continuous flow, sampled parts, events and implicit equations of one diagram.
 
@@ -90,3 +109,5 @@ class HybridSystem:
     aliases: Mapping[str, str]
     """Other names of signals: the block's bare name where it has one output, and an input port
     (``scope/u``) for the signal that drives it."""
+    delays: Delays | None = None
+    """Signals that are looked up in the past."""
