@@ -54,6 +54,14 @@ def linearise(
     are singular, and ``InputError`` for clocks without a usable common period.
     """
     system = evaluated.system
+    if system.delays is not None:
+        names = sorted({name.rpartition("/")[0] for name in _delayed(system)})
+        raise InputError(
+            f"the dead time of {', '.join(names)} has no finite linear system",
+            where=system.name,
+            allowed="diagrams without transport delays",
+            fix="put a Transfer Function with the Pade approximation in its place: (2 - s d) / (2 + s d)",
+        )
     unknowns = _unknowns(evaluated, point)
     flow = _without(evaluated.derivative_slopes(point), unknowns)
     seen = _without(evaluated.signal_slopes(point), unknowns)
@@ -86,6 +94,11 @@ def linearise(
         name=system.name,
         point=known,
     )
+
+
+def _delayed(system: HybridSystem) -> list[str]:
+    names, _ = _elements(system.discrete)
+    return [names[place] for place in system.delays.values] if system.delays else []
 
 
 def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -15,7 +15,7 @@ from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module, number_text
 
 SAME_ABOVE = 1.0 + 2.0**-50
-ROWS_OF_A_STEP = 4
+ROWS_OF_A_STEP = 6
 """Rows that one step and the instant at its end add at most."""
 
 
@@ -135,6 +135,8 @@ class _DelayLines:
         minus = w.multiply(number_text(-1.0), s)
         square = w.multiply(s, s)
         rest = w.subtract(number_text(1.0), square)
+        # Over the differences from the middle: a constant is then itself, to the bit.
+        centre = self.value(w, rows[1], line)
         total, rate = number_text(0.0), number_text(0.0)
         for row, parts in (
             (rows[0], self.end_basis(w, minus, -1.0)),
@@ -142,10 +144,11 @@ class _DelayLines:
             (rows[2], self.end_basis(w, s, 1.0)),
         ):
             of_value, of_slope, rate_of_value, rate_of_slope = parts
-            u, du = self.value(w, row, line), w.multiply(H, self.slope(w, row, line))
+            u = w.subtract(self.value(w, row, line), centre)
+            du = w.multiply(H, self.slope(w, row, line))
             total = w.fma(of_value, u, w.fma(of_slope, du, total))
             rate = w.fma(rate_of_value, u, w.fma(rate_of_slope, du, rate))
-        w.put(total, value)
+        w.put(w.add(centre, total), value)
         w.put(w.divide(rate, H), slope)
 
     @staticmethod

@@ -30,6 +30,8 @@ from armblocks.compiler.runge_kutta import Loop
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
 """Two times within these factors of one another are the same instant."""
+HIGH_ORDER = 7
+"""From this order on, steps are too long for one quintic of the past."""
 FINEST = 2.0**-12
 """Guards are looked at no closer than this part of a step."""
 
@@ -536,12 +538,17 @@ class HybridLoop(Loop):
         w.place(on)
 
     def emit_past(self, time: str, new_time: str, h: str) -> None:
-        """The middle and the end of an accepted step into the table of the past."""
+        """The middle and the end of an accepted step into the table of the past; of both halves of the long
+        steps of a method of high order."""
         w, places = self.w, self.places
-        middle = w.fma(number_text(0.5), w.subtract(new_time, time), time)
         self.emit_extra_stages_once(time, h)
-        self.step.interpolate(middle, time, h, self.at(places.new_x))
-        for instant, x, mark in ((middle, places.new_x, 1.0), (new_time, places.y, 0.0)):
+        halves = self.tableau.order >= HIGH_ORDER
+        for part in (0.25, 0.5, 0.75, 1.0) if halves else (0.5, 1.0):
+            mark, instant, x = 0.0, new_time, places.y
+            if part < 1.0:
+                mark = 0.0 if halves and part == 0.5 else 1.0
+                instant, x = w.fma(number_text(part), w.subtract(new_time, time), time), places.new_x
+                self.step.interpolate(instant, time, h, self.at(x))
             w.put(w.minimum(instant, w.get(self.clamp)), self.instant)
             self.emit_solve(self.instant, self.at(x))
             self.keep(self.instant, self.at(x), "keep", mark)

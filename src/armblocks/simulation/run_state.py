@@ -12,7 +12,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,8 @@ class RunState:
     names: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
     settings: str = ""
     checkpoint: Checkpoint | None = None
+    past: Array = field(default_factory=lambda: np.empty(0))
+    """What delayed signals were, as the engine keeps it; empty: what they begin with, all the time before."""
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a file of NumPy's ``.npz`` format, all of it or nothing. Raises ``FormatError``."""
@@ -65,6 +67,7 @@ class RunState:
             "states": self.states,
             "discrete": self.discrete,
             "algebraic": self.algebraic,
+            "past": self.past,
         }
         if self.checkpoint is not None:
             arrays |= {"reals": self.checkpoint.reals, "counts": self.checkpoint.counts}
@@ -102,6 +105,7 @@ class RunState:
                 names=(first, second, third),
                 settings=str(description["settings"]),
                 checkpoint=checkpoint,
+                past=np.ascontiguousarray(arrays.get("past", np.empty(0)), dtype=np.float64).reshape(-1),
             )
         except (ValueError, KeyError, TypeError, OSError, zipfile.BadZipFile, EOFError) as error:
             raise FormatError(
@@ -130,7 +134,7 @@ def check_state(system: CompiledSystem, state: RunState) -> None:
                 allowed="a state of the same diagram",
                 fix="run the diagram anew, or load the diagram that the state belongs to",
             )
-        if not np.isfinite(values).all():
+        if not (np.isfinite(values).all() and np.isfinite(state.past).all()):
             raise InputError(
                 f"the state of '{state.name}' at {state.time:g} s is not all finite numbers",
                 where=system.name,

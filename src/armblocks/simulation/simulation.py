@@ -253,6 +253,7 @@ class Simulation:
             names=slot_names(compiled),
             settings=self._settings,
             checkpoint=checkpoint,
+            past=point.past,
         )
 
     def result(self) -> SimulationResult:
@@ -294,7 +295,14 @@ class Simulation:
             assert before is not None
             start = dataclasses.replace(before.point, begun=True)
         elif state is not None:
-            start = RunPoint(time=state.time, x=state.states, z=state.discrete, w=state.algebraic, begun=True)
+            start = RunPoint(
+                time=state.time,
+                x=state.states,
+                z=state.discrete,
+                w=state.algebraic,
+                past=state.past,
+                begun=True,
+            )
             if state.settings == self._settings:
                 checkpoint = state.checkpoint
             how = "exactly as the run before" if checkpoint is not None else "started anew"

@@ -1,0 +1,307 @@
+"""Dead time against the method of steps, closed forms and SciPy, by fixed and adaptive steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    Clock,
+    CompareToConstant,
+    Constant,
+    Derivative,
+    Gain,
+    Integrator,
+    Mux,
+    PulseGenerator,
+    Ramp,
+    Relay,
+    Saturation,
+    SineWave,
+    Step,
+    Sum,
+    TransportDelay,
+    VariableTimeDelay,
+    VariableTransportDelay,
+    ZeroOrderHold,
+)
+from armblocks.compiler.system import compile_system
+from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
+from armblocks.equations import SimulationOptions
+from armblocks.errors import DiagramError, InputError
+from armblocks.simulation import RunState, SimulationResult, simulate
+
+Run = Callable[..., SimulationResult]
+
+
+def native(**settings: object) -> Run:
+    def run(diagram: Diagram, stop: float, **more: object) -> SimulationResult:
+        chosen = {"stop_time": stop, "sample_time": stop / 200} | settings | more
+        options = SimulationOptions(**chosen)  # pyright: ignore
+        return simulate(compile_system(trace_diagram(diagram)), options)
+
+    return run
+
+
+RUNS = {
+    "rk45": native(solver="rk45", rtol=1e-10, atol=1e-12),
+    "dop853": native(solver="dop853", rtol=1e-10, atol=1e-12),
+    "rk4": native(solver="rk4", step=0.01),
+}
+
+
+@pytest.fixture(params=RUNS.values(), ids=RUNS)
+def run(request: pytest.FixtureRequest) -> Run:
+    return request.param
+
+
+def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
+    assert found == pytest.approx(expected, abs=tolerance)
+
+
+def decay(delay: float = 1.0) -> Diagram:
+    """x' = -x(t - delay), x = 1 up to 0."""
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator(initial=1.0))
+    late = builder.add("late", TransportDelay(delay=delay, initial=1.0), x)
+    builder.connect(builder.add("minus", Gain(gain=-1.0), late), x["u"])
+    return builder.build()
+
+
+def decayed(t: float) -> float:
+    """The method of steps: (-1)^k (t - (k - 1))^k / k! over all k whose step has begun; in fractions."""
+    time, total, k = Fraction(t), Fraction(1), 1
+    while time >= k - 1:
+        total += (-1) ** k * (time - (k - 1)) ** k / math.factorial(k)
+        k += 1
+    return float(total)
+
+
+def test_a_delayed_decay_follows_the_method_of_steps(run: Run) -> None:
+    result = run(decay(), 10.0)
+    expected = np.array([decayed(t) for t in result.time])
+    close(result["x/y"], expected, 5e-9)
+    close(result["late/y"], np.array([decayed(t - 1.0) if t > 1.0 else 1.0 for t in result.time]), 5e-9)
+
+
+def test_the_past_is_as_exact_as_the_run() -> None:
+    """Tighter tolerances give smaller errors, in proportion, however long the steps."""
+    errors = []
+    for rtol in (1e-4, 1e-6, 1e-8, 1e-10):
+        result = native(solver="rk45", rtol=rtol, atol=rtol * 1e-3)(decay(), 10.0)
+        expected = np.array([decayed(t) for t in result.time])
+        errors.append(float(np.abs(result["x/y"] - expected).max()))
+    assert errors[0] < 1e-3
+    assert all(later < 0.1 * sooner for sooner, later in pairwise(errors))
+
+
+def test_a_step_comes_out_exactly_one_delay_later(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    late = builder.add(
+        "late", TransportDelay(delay=0.7, initial=-1.0), builder.add("step", Step(time=0.5, final=2.0))
+    )
+    builder.add("integral", Integrator(), late)
+    result = run(builder.build(), 3.0)
+    t = result.time
+    close(result["integral/y"], -np.minimum(t, 0.7) + 2.0 * np.clip(t - 1.2, 0.0, None), 1e-12)
+    assert result["late/y"].tolist() == np.select([t < 0.7, t < 1.2 - 1e-12], [-1.0, 0.0], 2.0).tolist()
+
+
+def test_a_sine_comes_out_late(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    sines = builder.add("sines", SineWave(frequency=2.0, amplitude=(1.0, 3.0), phase=(0.0, 1.0)))
+    builder.add("late", TransportDelay(delay=0.35, initial=(5.0, 6.0)), sines)
+    builder.add("keeps the steps", Integrator(), builder.add("sine", SineWave(frequency=2.0)))
+    result = run(builder.build(), 10.0)
+    t = result.time[:, np.newaxis]
+    expected = np.where(t < 0.35, [5.0, 6.0], np.array([1.0, 3.0]) * np.sin(2.0 * (t - 0.35) + [0.0, 1.0]))
+    close(result["late/y"], expected, 2e-8)
+
+
+def test_the_derivative_of_what_is_late_is_the_late_derivative(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    late = builder.add("late", TransportDelay(delay=0.5), builder.add("sine", SineWave(frequency=2.0)))
+    later = builder.add("later", TransportDelay(delay=0.25), late)
+    builder.add("integral", Integrator(), builder.add("rate", Derivative(), later))
+    result = run(builder.build(), 5.0)
+    close(result["integral/y"], np.where(result.time < 0.75, 0.0, np.sin(2.0 * (result.time - 0.75))), 1e-7)
+
+
+def test_pulses_and_ticks_come_out_late(run: Run) -> None:
+    """Jumps at events and at ticks arrive as jumps: the integrals are exact."""
+    builder = DiagramBuilder("d")
+    pulses = builder.add("late", TransportDelay(delay=0.3), builder.add("pulses", PulseGenerator(period=1.0)))
+    builder.add("integral", Integrator(), pulses)
+    held = builder.add("held", ZeroOrderHold(sample_time=0.25), builder.add("t", Clock()))
+    builder.add("stairs", Integrator(), builder.add("held late", TransportDelay(delay=0.4), held))
+    result = run(builder.build(), 5.0)
+    t = np.clip(result.time - 0.3, 0.0, None)
+    close(result["integral/y"], 0.5 * np.floor(t + 1e-12) + np.minimum(t - np.floor(t + 1e-12), 0.5), 1e-9)
+    k = np.floor(np.clip(result.time - 0.4, 0.0, None) / 0.25 + 1e-9)
+    rest = np.clip(result.time - 0.4, 0.0, None) - 0.25 * k
+    close(result["stairs/y"], 0.25 * 0.25 * k * (k - 1) / 2 + 0.25 * k * rest, 1e-9)
+
+
+def test_a_loop_with_dead_time(run: Run) -> None:
+    """A plant under an integral controller with dead time, at the border of its stability.
+
+    y' = K (1 - y(t - 1)): the border is K = pi / 2, where it swings as cos(pi t / 2) for ever.
+    """
+    builder = DiagramBuilder("d")
+    error = builder.add("error", Sum(signs="+-"), builder.add("one", Constant(value=1.0)))
+    y = builder.add("y", Integrator(initial=0.0), builder.add("K", Gain(gain=math.pi / 2), error))
+    builder.connect(builder.add("late", TransportDelay(delay=1.0), y), error["u2"])
+    result = run(builder.build(), 60.0)
+    t, e = result.time, 1.0 - result["y/y"]
+    late = t > 40.0
+    basis = np.column_stack([np.cos(math.pi / 2 * t[late]), np.sin(math.pi / 2 * t[late])])
+    fit, *_ = np.linalg.lstsq(basis, e[late], rcond=None)
+    assert np.abs(basis @ fit - e[late]).max() < 1e-5
+    assert np.hypot(*fit) > 0.5
+
+
+def test_a_thermostat_with_dead_time_overshoots_by_what_it_sees_too_late(run: Run) -> None:
+    """x' = 1 - 2 m, seen 0.2 s late, relay at +-0.5: a triangle between +-0.7, of period 4 (0.5 + 0.2)."""
+    builder = DiagramBuilder("d")
+    x = builder.add("x", Integrator())
+    late = builder.add("late", TransportDelay(delay=0.2), x)
+    relay = builder.add("relay", Relay(on_point=0.5, off_point=-0.5, on_value=-1.0, off_value=1.0), late)
+    builder.connect(relay, x["u"])
+    result = run(builder.build(), 8.4)
+    triangle = 0.7 - np.abs(np.mod(result.time - 0.7 + 1.4, 2.8) - 1.4)
+    close(result["x/y"], triangle, 1e-9)
+
+
+def test_a_delay_that_grows(run: Run) -> None:
+    """d = 0.1 + t / 2 gives u((t - 0.2) / 2), once there is a past."""
+    builder = DiagramBuilder("d")
+    d = builder.add("d", Ramp(slope=0.5, initial=0.1))
+    late = builder.add(
+        "late", VariableTimeDelay(longest=10.0), builder.add("sine", SineWave(frequency=2.0)), d
+    )
+    builder.add("integral", Integrator(), late)
+    result = run(builder.build(), 6.0)
+    past = (result.time - 0.2) / 2.0
+    expected = np.where(past < 0.0, 0.0, np.sin(2.0 * past))
+    close(result["late/y"], expected, 1e-7)
+
+
+def test_a_pipe_in_which_the_flow_slows_down(run: Run) -> None:
+    """T(t) = 1 + t / 2: the integral of 1/T over the stay is 1: 1 + (t - d) / 2 = (1 + t / 2) exp(-1/2)."""
+    builder = DiagramBuilder("d")
+    T = builder.add("T", Ramp(slope=0.5, initial=1.0))
+    pipe = builder.add("pipe", VariableTransportDelay(), builder.add("sine", SineWave()), T)
+    builder.add("integral", Integrator(), pipe["y"])
+    result = run(builder.build(), 6.0)
+    entered = 2.0 * ((1.0 + result.time / 2.0) * math.exp(-0.5) - 1.0)
+    # before: 1/T was 1 up to 0, so -e + 2 log(1 + t / 2) = 1
+    before = 2.0 * np.log1p(result.time / 2.0) - 1.0
+    entered = np.where(entered > 0.0, entered, before)
+    # the kink of T at 0 comes out unannounced: RK4 steps over it
+    close(result["pipe/delay"], result.time - entered, 1e-6)
+    close(result["pipe/y"], np.where(entered < 0.0, 0.0, np.sin(entered)), 1e-6)
+
+
+def test_a_long_run_forgets_what_is_out_of_reach() -> None:
+    result = native(solver="rk4", step=0.01)(decay(0.5), 200.0)
+    assert result.final_state is not None
+    assert result.final_state.past.size < 256 * 4  # of 20 000 steps, the last half second is kept
+    # it fades with the real part of the root of s + exp(-s / 2) = 0
+    s = complex(-1.0, 1.0)
+    for _ in range(50):
+        s -= (s + np.exp(-s / 2)) / (1 - np.exp(-s / 2) / 2)
+    early, later = (np.abs(result["x/y"][(result.time >= a) & (result.time < a + 6)]).max() for a in (10, 20))
+    assert math.log(later / early) / 10.0 == pytest.approx(s.real, abs=0.05)
+
+
+def test_a_run_goes_on_with_its_past(tmp_path: Path) -> None:
+    """To the bit with the same settings, also through a file; with others from the values and the past."""
+    for settings in ({"solver": "rk45", "rtol": 1e-8, "atol": 1e-10}, {"solver": "rk4", "step": 0.05}):
+        run = native(**settings)
+        whole = run(decay(), 8.0, sample_time=0.1)
+        compiled = compile_system(trace_diagram(decay()))
+        half = simulate(compiled, SimulationOptions(stop_time=3.7, sample_time=0.1, **settings))  # pyright: ignore
+        assert half.final_state is not None
+        half.final_state.save(tmp_path / "state.npz")
+        state = RunState.load(tmp_path / "state.npz")
+        options = SimulationOptions(stop_time=8.0, sample_time=0.1, **settings)  # pyright: ignore
+        rest = simulate(compiled, options, initial_state=state)
+        after = whole.time > 3.75
+        assert rest["x/y"][rest.time > 3.75].tolist() == whole["x/y"][after].tolist()
+        other = SimulationOptions(stop_time=8.0, sample_time=0.1, solver="dop853", rtol=1e-9, atol=1e-11)
+        anew = simulate(compiled, other, initial_state=state)
+        assert "started anew" in anew.run.reason
+        close(anew["x/y"][anew.time > 3.75], whole["x/y"][after], 1e-6)
+
+
+def test_a_tuned_delay_is_obeyed_without_compiling() -> None:
+    compiled = compile_system(trace_diagram(decay()))
+    options = SimulationOptions(stop_time=3.0, sample_time=0.1, rtol=1e-9, atol=1e-12)
+    tuned = simulate(compiled, options, {"late.delay": 0.5})
+    fresh = simulate(compile_system(trace_diagram(decay(0.5))), options)
+    assert tuned["x/y"] == pytest.approx(fresh["x/y"], abs=1e-12)
+
+
+def test_delays_break_algebraic_loops_and_see_events(run: Run) -> None:
+    """y = 1 - y(t - 1) / 2 has no integrator at all: 1, 1/2, 3/4, 5/8 …"""
+    builder = DiagramBuilder("d")
+    y = builder.add("y", Sum(signs="+-"), builder.add("one", Constant(value=1.0)))
+    half = builder.add("half", Gain(gain=0.5), builder.add("late", TransportDelay(delay=1.0), y))
+    builder.connect(half, y["u2"])
+    builder.add("above", CompareToConstant(relation=">", constant=0.7), y)
+    builder.add("time", Integrator(), builder.add("limited", Saturation(lower=-9.0, upper=9.0), y))
+    result = run(builder.build(), 5.0)
+    k = np.floor(result.time + 1e-12)
+    level = (2.0 + (-0.5) ** k) / 3.0
+    close(result["y/y"], level, 1e-14)
+    assert result["above/y"].tolist() == (level > 0.7).tolist()
+    close(result["time/y"], np.cumsum(np.r_[0.0, level[:-1]]) * 0.025, 1e-9)
+
+
+def test_what_cannot_be_delayed_is_refused() -> None:
+    builder = DiagramBuilder("d")
+    builder.add(
+        "twice",
+        Derivative(),
+        builder.add(
+            "once", Derivative(), builder.add("late", TransportDelay(), builder.add("sine", SineWave()))
+        ),
+    )
+    with pytest.raises(DiagramError, match="the second derivative of a delayed signal is asked for"):
+        trace_diagram(builder.build())
+    builder = DiagramBuilder("d")
+    late = builder.add(
+        "late", VariableTimeDelay(), builder.add("sine", SineWave()), builder.add("t", Clock())
+    )
+    builder.add("rate", Derivative(), late)
+    with pytest.raises(
+        DiagramError, match="the derivative of a delayed signal is asked for, whose delay changes"
+    ):
+        trace_diagram(builder.build())
+    builder = DiagramBuilder("d")
+    inner = builder.add("inner", TransportDelay(), builder.add("t", Clock()))
+    builder.add("late", VariableTimeDelay(), builder.add("sine", SineWave()), inner)
+    with pytest.raises(DiagramError, match="how long a delay is depends on a delayed signal"):
+        trace_diagram(builder.build())
+
+
+def test_a_dead_time_is_not_linearised() -> None:
+    with pytest.raises(InputError, match="the dead time of late has no finite linear system"):
+        ab.linearize(decay(), inputs=["minus.gain"], outputs=["x/y"])
+
+
+def test_vectors_are_delayed_by_element(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    pair = builder.add("pair", Mux(), builder.add("t", Clock()), builder.add("sine", SineWave()))
+    builder.add("late", TransportDelay(delay=0.5), pair)
+    builder.add("x", Integrator(), builder.add("s", SineWave()))
+    result = run(builder.build(), 3.0)
+    past = np.clip(result.time - 0.5, 0.0, None)
+    close(result["late/y"], np.column_stack([past, np.sin(past)]), 1e-8)
