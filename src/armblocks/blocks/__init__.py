@@ -14,6 +14,7 @@ from armblocks.blocks import (
     dry_friction,
     dynamic_limits,
     edges,
+    ending,
     expression,
     from_file,
     gains,
@@ -98,6 +99,7 @@ from armblocks.blocks.edges import (
     SRFlipFlop,
     VariableIntegerDelay,
 )
+from armblocks.blocks.ending import Assertion, StopSimulation
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.from_file import FromFile
 from armblocks.blocks.gains import SineWaveFunction, SliderGain, WeightedSampleTime
@@ -271,6 +273,7 @@ BLOCKS = BlockLibrary(
         transforms,
         robots,
         sinks,
+        ending,
         arithmetic,
         gains,
         reductions,
@@ -310,6 +313,7 @@ __all__ = [
     "AngleAxis2T",
     "AngleDifference",
     "ArmPlant",
+    "Assertion",
     "Assignment",
     "Atan2",
     "Backlash",
@@ -481,6 +485,7 @@ __all__ = [
     "StateSpace",
     "Step",
     "StickSlipFriction",
+    "StopSimulation",
     "SubMatrix",
     "Subsystem",
     "Sum",

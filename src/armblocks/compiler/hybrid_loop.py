@@ -208,6 +208,8 @@ class HybridLoop(Loop):
             w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         self.accept_unknowns()
         self.emit_samples(time, until, None)
+        if self.sizes.stops:
+            self.emit_stop(time)
         finished = w.word_test("slt", w.get(self.counts[Count.SEGMENT], "i64"), self.segments)
         self.leave_unless(finished, Status.DONE)
         self.emit_piece()
@@ -240,6 +242,32 @@ class HybridLoop(Loop):
         m, new = (f"ptr {self.at(place)}" for place in (places.ticking, places.new_z))
         w.do(f"call void @update(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {m}, {new})")
         self.copy(places.new_z, places.z, self.sizes.discrete)
+        w.place(on)
+
+    def emit_stop(self, time: str) -> None:
+        """Where a guard that ends the run is positive, record this instant, if it is not, and leave."""
+        w, places, sample = self.w, self.places, self.counts[Count.SAMPLE]
+        stop, write, leave, on = (w.fresh(stem) for stem in ("stop", "write", "leave", "on"))
+        signs = [w.get(self.at(places.signs + k)) for k in self.sizes.stops]
+        positive = w.compare("ogt", signs[0], number_text(0.0))
+        for sign in signs[1:]:
+            positive = w.either(positive, w.compare("ogt", sign, number_text(0.0)))
+        w.branch(positive, stop, on)
+        w.place(stop)
+        number = w.get(sample, "i64")
+        before = w.word_op("sub", number, "1")
+        first = w.word_test("slt", before, "0")
+        latest = w.get(w.at("%samples", w.let(f"select i1 {first}, i64 0, i64 {before}")))
+        later = w.compare("olt", latest, w.multiply(time, number_text(SAME_BELOW)))
+        w.branch(w.both(w.word_test("slt", number, self.samples), w.either(first, later)), write, leave)
+        w.place(write)
+        w.put(time, w.at("%samples", number))
+        row = w.at("%out", w.word_op("mul", number, str(self.n)))
+        w.for_each(self.n, lambda i: w.put(self.step.read(places.x, i), w.at(row, i)))
+        self.emit_record(time, number, row)
+        w.increase(sample)
+        w.place(leave)
+        self.leave(Status.STOPPED)
         w.place(on)
 
     def emit_settling(self, time: str) -> None:

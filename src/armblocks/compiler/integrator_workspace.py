@@ -24,6 +24,8 @@ class Status(IntEnum):
     """Events follow one another without end: at one instant, or at ever shorter distances."""
     PAST_FULL = 6
     """The table of the past of delayed signals needs more room: give it, and call again."""
+    STOPPED = 7
+    """A guard that ends the run is positive; what holds then is recorded."""
 
 
 class Real(IntEnum):
@@ -122,7 +124,8 @@ class DelaySlots:
 class LoopSizes:
     """What of a system a loop is written for: lengths of its vectors, its clocks and guards.
 
-    ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards.
+    ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
+    those that end the run where they are positive.
     """
 
     states: int
@@ -131,6 +134,7 @@ class LoopSizes:
     delays: tuple[DelaySlots, ...] = ()
     clocks: tuple[tuple[float, float], ...] = ()
     directions: tuple[int, ...] = ()
+    stops: tuple[int, ...] = ()
 
     @property
     def hybrid(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -360,6 +360,15 @@ class Integration:
     def events(self) -> int:
         """Guards that fired so far."""
         return int(self.counts[Count.EVENTS])
+
+    def positive(self, guards: Sequence[int]) -> list[int]:
+        """Which of some guards are positive where the run stands."""
+        signs = self._vector(self.integrator.workspace.signs, len(self.integrator.sizes.directions))
+        return [guard for guard in guards if signs[guard] > 0.0]
+
+    def last_fired(self, guard: int) -> float:
+        """When a guard fired last, s; minus infinity if it never did."""
+        return float(self.reals[self.integrator.workspace.last + guard])
 
     @property
     def last_guard(self) -> int:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
+ENDING = ("stop", "fail")
+"""What guards do that end a run where they are positive."""
 _STARTS = ("initial_states", "initial_discrete", "initial_algebraic")
 _POINTWISE = ("derivative", *_STARTS, "breakpoints")
 _FUNCTIONS = (*_POINTWISE, "signals", "residual", "residual_jacobian", "update", "guards", "reset")
@@ -96,6 +98,7 @@ class CompiledSystem:
         self.parameter_values.flags.writeable = False
         self.aliases: Mapping[str, str] = dict(description["aliases"])
         self.guard_names: tuple[str, ...] = tuple(description["guard_names"])
+        self.guard_actions: tuple[str, ...] = tuple(description["guard_actions"])
         self.sizes = LoopSizes(
             states=self.states.size,
             discrete=self.discrete.size,
@@ -106,6 +109,7 @@ class CompiledSystem:
             ),
             clocks=tuple((float(period), float(offset)) for period, offset in description["clocks"]),
             directions=tuple(int(direction) for direction in description["guard_directions"]),
+            stops=tuple(k for k, action in enumerate(description["guard_actions"]) if action in ENDING),
         )
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = dict(description["digests"])
@@ -245,6 +249,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "clocks": [[clock.period, clock.offset] for clock in system.clocks],
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
+        "guard_actions": list(system.guard_actions),
         "delays": []
         if system.delays is None
         else list(zip(system.delays.values, system.delays.slopes, system.delays.fixed)),

@@ -36,13 +36,15 @@ class State:
 class Guard:
     """A quantity of a block at whose zero something happens; each entry of a vector is a guard by itself.
 
-    ``direction``: +1 where it fires on its way upwards, -1 downwards, 0 both.
+    ``direction``: +1 where it fires on its way upwards, -1 downwards, 0 both. ``action``: what it does to the
+    run where it is positive: ``stop`` ends it, ``fail`` fails it, ``warn`` is told at its end.
     """
 
     name: str
     shape: Shape
     doc: str
     direction: int = 0
+    action: str = ""
 
 
 @dataclass(frozen=True)

@@ -159,6 +159,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         guards=function("guards", ends, g=[value for _, _, value in guards]),
         guard_directions=tuple(guard.direction for _, guard, value in guards for _ in range(value.numel())),
         guard_names=tuple(name for name, _, value in guards for _ in range(value.numel())),
+        guard_actions=tuple(guard.action for _, guard, value in guards for _ in range(value.numel())),
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
         initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),

@@ -109,5 +109,8 @@ class HybridSystem:
     aliases: Mapping[str, str]
     """Other names of signals: the block's bare name where it has one output, and an input port
     (``scope/u``) for the signal that drives it."""
+    guard_actions: tuple[str, ...] = ()
+    """For each guard, if there are any: what it does to the run where it is positive. ``stop`` ends it,
+    ``fail`` ends it as a failure, ``warn`` is told at its end, and empty nothing."""
     delays: Delays | None = None
     """Signals that are looked up in the past."""

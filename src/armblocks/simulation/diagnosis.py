@@ -63,6 +63,16 @@ def _signal_error(system: CompiledSystem, place: int, value: float, time: float)
     )
 
 
+def assertion_failure(system: CompiledSystem, block: str, time: float) -> SimulationError:
+    """An Assertion whose input has become 0."""
+    return SimulationError(
+        f"assertion '{block}' does not hold at {time:.9g} s",
+        where=system.name,
+        allowed="an input that is not 0 at any time",
+        fix=f"look at what feeds '{block}', or let it only warn",
+    )
+
+
 def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> SimulationError:
     """Why the native loop gave up."""
     if run.status is Status.STEP_TOO_SMALL:

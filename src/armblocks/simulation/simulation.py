@@ -16,7 +16,12 @@ from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import InputError, SimulationError
-from armblocks.simulation.diagnosis import first_bad_signal, integration_failure, stiffness_hint
+from armblocks.simulation.diagnosis import (
+    assertion_failure,
+    first_bad_signal,
+    integration_failure,
+    stiffness_hint,
+)
 from armblocks.simulation.plan import changed_parameters, make_plan, parameter_vector
 from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult, signal_path
 from armblocks.simulation.run_state import RunState, check_state, settings_text, slot_names
@@ -178,7 +183,10 @@ class Simulation:
                     break
         finally:
             self._spent += perf_counter() - began
-        if stretch.status not in (Status.PAUSED, Status.DONE):
+        if stretch.status is Status.STOPPED:
+            assert integration is not None
+            self._ended_by(integration)
+        elif stretch.status not in (Status.PAUSED, Status.DONE):
             assert integration is not None
             self._fail(integration_failure(self.compiled, integration, stretch.p))
 
@@ -351,6 +359,24 @@ class Simulation:
     def _rows(self, begin: int = 0) -> list[Rows]:
         return [rows for rows in (part.rows(begin) for part in self._stretches) if rows.time.size]
 
+    def _ended_by(self, integration: Integration) -> None:
+        """Say which block has ended the run; raises where it is one that fails it."""
+        compiled = self.compiled
+        guard = integration.positive(compiled.sizes.stops)[0]
+        block, time = compiled.guard_names[guard], f"{integration.time:.9g} s"
+        if compiled.guard_actions[guard] == "fail":
+            self._fail(assertion_failure(compiled, block, integration.time))
+        self._note(f"stopped by block '{block}' at {time}")
+
+    def _note_warnings(self, integration: Integration) -> None:
+        """What blocks have to say that only warn."""
+        compiled = self.compiled
+        for guard, action in enumerate(compiled.guard_actions):
+            fired = integration.last_fired(guard)
+            if action == "warn" and (fired > -np.inf or integration.positive([guard])):
+                when = f"last from {fired:.9g} s on" if fired > -np.inf else "from the start on"
+                self._note(f"assertion '{compiled.guard_names[guard]}' did not hold, {when}")
+
     def _fail(self, failure: SimulationError) -> None:
         """Raise with what is good so far."""
         self._failure = failure
@@ -371,6 +397,7 @@ class Simulation:
         integrations = [part.integration for part in self._stretches if part.integration is not None]
         if integrations:
             self._note(stiffness_hint(compiled, integrations[-1], self._stretches[-1].p))
+            self._note_warnings(integrations[-1])
         if failure is not None:
             self._failure = failure
             self._message = " ".join(part for part in (failure.what + ".", self._message) if part)

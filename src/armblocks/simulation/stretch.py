@@ -90,7 +90,8 @@ class Stretch:
         states, discrete, algebraic = (part[start:held] for part in parts)
         return Rows(
             begin=self.begin + start,
-            time=self._time[start:held],
+            # The loop's own: a block that ends the run puts the instant at which it did there.
+            time=(self._time if run is None else run.course[1])[start:held],
             states=states,
             discrete=discrete,
             algebraic=algebraic,
