@@ -362,3 +362,18 @@ def test_a_dip_that_is_over_within_a_step_is_seen() -> None:
             result = result_of(builder.build(), 10.0, solver, step)
             assert result["integral/y"][-1] == pytest.approx(2 * width, abs=1e-9)
             assert result.run.events == 2
+
+
+def test_modes_settle_where_a_run_goes_on_with_other_parameters() -> None:
+    """At 1 s the level is above 0.5; with the threshold 2.8 it is not, though nothing has crossed it."""
+    builder = DiagramBuilder("d")
+    level = builder.add("level", Integrator(), builder.add("one", Constant(value=1.0)))
+    above = builder.add("above", CompareToConstant(relation=">", constant=0.5), level)
+    builder.add("time", Integrator(), above)
+    compiled = compile_system(trace_diagram(builder.build()))
+    first = simulate(compiled, SimulationOptions(stop_time=1.0, rtol=1e-9))
+    assert first["time/y"][-1] == pytest.approx(0.5, abs=1e-12)
+    options = SimulationOptions(stop_time=4.0, sample_time=0.5, rtol=1e-9)
+    later = simulate(compiled, options, {"above.constant": 2.8}, initial_state=first.final_state)
+    assert later["above/y"].tolist() == [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+    assert later["time/y"][-1] == pytest.approx(1.7, abs=1e-9)
