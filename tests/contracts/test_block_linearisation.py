@@ -22,6 +22,7 @@ FLOWING = {
     for name, kind in BLOCKS.items()
     if not kind.sampled
     and not kind.virtual
+    and kind.delay_lines is Block.delay_lines  # a dead time has no finite linear system: it is refused
     and example_block(kind).input_ports()
     and example_block(kind).output_ports()
 }

@@ -211,21 +211,17 @@ def _trace(structure: _Structure) -> BlockEquations:
     x.update(_answers(block, asked, t, x, u, p))
     if structure.settled:
         x.update(block.mode_values(t, x, u, p))
-    quantities = {entry.name: block.condition_values(t, x, u, p)[entry.name] for entry in located}
+    quantities: Signals = block.condition_values(t, x, u, p) if located else {}
+    sides = {entry.name: _sided(quantities[entry.name], entry.closed) for entry in located}
+    answers = {entry.name: _positive(quantities[entry.name], entry.closed) for entry in located}
 
-    output_shapes = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
-    output_shapes.update(block.output_shapes(shapes))
     state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
     resets = dict(block.resets(t, x, u, p, e)) if block.guards(shapes) else dict[str, SX]()
     resets |= {
         entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
     }
     sought: dict[SlotKind, dict[str, Shape]] = {
-        SlotKind.OUTPUT: {
-            port.name: output_shapes[port.name]
-            for port in block.output_ports()
-            if port.name not in block.time_derivatives
-        },
+        SlotKind.OUTPUT: _output_shapes(block, shapes),
         SlotKind.DERIVATIVE: {state.name: state.shape for state in states},
         SlotKind.RECORD: {port.name: port.shape or () for port in block.record_ports()},
         SlotKind.UPDATE: {state.name: state.shape for state in discrete if block.sampled},
@@ -241,14 +237,8 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.DERIVATIVE: block.derivatives(t, x, u, p),
         SlotKind.RECORD: block.records(t, x, u, p),
         SlotKind.UPDATE: block.updates(t, x, u, p),
-        SlotKind.GUARD: {
-            **block.guard_values(t, x, u, p),
-            **{entry.name: _sided(quantities[entry.name], entry.closed) for entry in located},
-        },
-        SlotKind.MODE: {
-            **block.mode_values(t, x, u, p),
-            **{entry.name: _positive(quantities[entry.name], entry.closed) for entry in located},
-        },
+        SlotKind.GUARD: {**block.guard_values(t, x, u, p), **sides},
+        SlotKind.MODE: {**block.mode_values(t, x, u, p), **answers},
         SlotKind.RESET: resets,
         SlotKind.DELAYED: {line.name: u[line.input] for line in lines},
         SlotKind.DELAYED_RATE: {line.name: u[f"{line.input}'"] for line in lines},
@@ -259,12 +249,6 @@ def _trace(structure: _Structure) -> BlockEquations:
     slots = [BlockSlot(kind, name, shape) for kind, named in sought.items() for name, shape in named.items()]
     flat = [spread(SX(found[slot.kind][slot.name]), slot.shape) for slot in slots]
     groups = _grouped(slots, flat, t, symbols, ends)
-    moved = {
-        slot.name
-        for group in groups
-        for slot in group.slots
-        if slot.kind is SlotKind.DELAY and (group.timed or group.states or group.discrete or group.inputs)
-    }
     return BlockEquations(
         states=states,
         discrete=(*discrete, *past, *modes),
@@ -272,7 +256,25 @@ def _trace(structure: _Structure) -> BlockEquations:
         guards=guards,
         groups=groups,
         delays=lines,
-        fixed_delays=frozenset(line.name for line in lines) - moved,
+        fixed_delays=frozenset(line.name for line in lines) - _moving_delays(groups),
+    )
+
+
+def _output_shapes(block: Block, inputs: Shapes) -> dict[str, Shape]:
+    """Shapes of the outputs that have equations."""
+    stated = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
+    found = {**stated, **block.output_shapes(inputs)}
+    names = [port.name for port in block.output_ports() if port.name not in block.time_derivatives]
+    return {name: found[name] for name in names}
+
+
+def _moving_delays(groups: Sequence[Group]) -> frozenset[str]:
+    """Those that hang on more than parameters."""
+    return frozenset(
+        slot.name
+        for group in groups
+        for slot in group.slots
+        if slot.kind is SlotKind.DELAY and (group.timed or group.states or group.discrete or group.inputs)
     )
 
 
