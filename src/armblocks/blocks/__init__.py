@@ -5,6 +5,7 @@ from types import ModuleType
 from armblocks.blocks import (
     arithmetic,
     arm_plant,
+    branching,
     continuous,
     delays,
     discontinuities,
@@ -64,6 +65,7 @@ from armblocks.blocks.arithmetic import (
     UnaryMinus,
 )
 from armblocks.blocks.arm_plant import ArmPlant
+from armblocks.blocks.branching import If, SwitchCase
 from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
 from armblocks.blocks.delays import Delay, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
 from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
@@ -242,7 +244,15 @@ from armblocks.blocks.transforms import T2xyz, Xyz2T
 from armblocks.blocks.transport import TransportDelay, VariableTimeDelay, VariableTransportDelay
 from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
 from armblocks.blocks.zero_poles import AnalogFilter, DigitalFilter, DiscreteZeroPole, ZeroPole
-from armblocks.diagram import Block, BlockLibrary, structure, virtual_wiring
+from armblocks.diagram import Block, BlockLibrary, conditional, structure, virtual_wiring
+from armblocks.diagram.conditional import (
+    ActionSubsystem,
+    EnabledSubsystem,
+    EnabledTriggeredSubsystem,
+    Merge,
+    ResettableSubsystem,
+    TriggeredSubsystem,
+)
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 
@@ -270,6 +280,8 @@ BLOCKS = BlockLibrary(
         routing,
         virtual_wiring,
         structure,
+        conditional,
+        branching,
         transforms,
         robots,
         sinks,
@@ -309,6 +321,7 @@ __all__ = [
     "PID",
     "PID2DOF",
     "Abs",
+    "ActionSubsystem",
     "AnalogFilter",
     "AngleAxis2T",
     "AngleDifference",
@@ -367,6 +380,8 @@ __all__ = [
     "Divide",
     "DotProduct",
     "EdgeDetection",
+    "EnabledSubsystem",
+    "EnabledTriggeredSubsystem",
     "Encoder",
     "Eul2T",
     "Expression",
@@ -386,6 +401,7 @@ __all__ = [
     "Ground",
     "HitCrossing",
     "Hypot",
+    "If",
     "IndexVector",
     "Inertia",
     "Inport",
@@ -419,6 +435,7 @@ __all__ = [
     "MatrixInverse",
     "MatrixPower",
     "MatrixProduct",
+    "Merge",
     "MinMax",
     "MinMaxRunningResettable",
     "Modulo",
@@ -459,6 +476,7 @@ __all__ = [
     "RepeatingSequenceInterpolated",
     "RepeatingSequenceStair",
     "ResettableIntegrator",
+    "ResettableSubsystem",
     "Reshape",
     "Rne",
     "RobotEnergy",
@@ -491,6 +509,7 @@ __all__ = [
     "Sum",
     "SumOfElements",
     "Switch",
+    "SwitchCase",
     "T2AngleAxis",
     "T2Quaternion",
     "T2Rp",
@@ -512,6 +531,7 @@ __all__ = [
     "TransportDelay",
     "Transpose",
     "Trapezoidal",
+    "TriggeredSubsystem",
     "Trigonometry",
     "UnaryMinus",
     "UniformRandomNumber",

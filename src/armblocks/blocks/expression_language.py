@@ -70,6 +70,13 @@ _COMPARISONS: Mapping[type[ast.cmpop], Callable[[SX, SX], SX]] = {
     ast.Eq: lambda left, right: left == right,
     ast.NotEq: lambda left, right: left != right,
 }
+_SIDES: Mapping[type[ast.cmpop], float] = {
+    ast.Gt: -1e-300,
+    ast.LtE: -1e-300,
+    ast.GtE: 1e-300,
+    ast.Lt: 1e-300,
+}
+"""Beside a border by less than any signal can tell: it gives the border itself a side."""
 _SPELLINGS = ((r"\^", "**"), (r"&&", " and "), (r"\|\|", " or "), (r"~=", "!="), (r"!(?!=)|~", " not "))
 _CALLED_IF = "if_"  # a word that Python keeps for itself
 
@@ -99,6 +106,20 @@ class Formula:
         Raises ``UnknownNameError`` for a name or function that does not exist, ``InputError`` for the rest.
         """
         return self._value(self._tree, {**{key: SX(value) for key, value in CONSTANTS.items()}, **names}, 0)
+
+    def borders(self, names: Mapping[str, SX]) -> list[SX]:
+        """Quantities at whose zeros a comparison in the formula changes: left less right of each.
+
+        Equality has the side on which the comparison is as it says. Of a formula that compares nothing, its
+        own value.
+        """
+        known = {**{key: SX(value) for key, value in CONSTANTS.items()}, **names}
+        found: list[SX] = []
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.Compare):
+                left, right = (self._value(part, known, 1) for part in (node.left, node.comparators[0]))
+                found.append(left - right + _SIDES.get(type(node.ops[0]), 0.0))
+        return found or [self.trace(names)]
 
     def _value(self, node: ast.expr, names: Mapping[str, SX], depth: int) -> SX:
         if depth > DEEPEST:

@@ -2,7 +2,8 @@
 
 At an instant (a tick, an event, a breakpoint, the start) things happen in this order, all in native code:
 
-1. the flow is integrated up to it with the old values; the step ends exactly there;
+1. the flow is integrated up to it with the old values; the step ends exactly there, and where something
+   keeps left limits, ``update`` is called for that with no clock marked;
 2. all clocks that tick now are marked and ``update`` gives ``z``;
 3. guards whose sign the jump has changed fire, and so do those whose zero was located here; ``reset`` gives
    ``x`` and ``z``; this is repeated until none fires;
@@ -194,6 +195,8 @@ class HybridLoop(Loop):
         until = w.multiply(time, number_text(SAME_ABOVE))
         if self.delays:
             w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
+        if self.sizes.captures:
+            self.emit_captures(time)
         self.emit_ticks(time, until)
         if self.guards:
             self.emit_settling(time)
@@ -235,14 +238,28 @@ class HybridLoop(Loop):
         w.place(tick)
         w.increase(self.counts[Count.INSTANTS])
         w.put(time, self.instant)
-        places = self.places
+        self.emit_update()
+        w.place(on)
+
+    def emit_captures(self, time: str) -> None:
+        """What keeps how things were just before this instant, from the flow with the old ``z``."""
+        w, places = self.w, self.places
+        zero = number_text(0.0)
+        for clock in range(len(self.sizes.clocks)):
+            w.put(zero, self.at(places.ticking + clock))
+        before = w.from_bits(w.word_op("sub", w.bits(time), "1"))
+        w.put(w.select(w.compare("ogt", time, zero), before, time), self.instant)
+        self.emit_update()
+
+    def emit_update(self) -> None:
+        """``z`` becomes what ``update`` gives for the clocks that are marked."""
+        w, places = self.w, self.places
         self.emit_solve(self.instant, self.at(places.x))
         arguments = (places.x, places.z, places.trial_w)
         x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
         m, new = (f"ptr {self.at(place)}" for place in (places.ticking, places.new_z))
         w.do(f"call void @update(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {m}, {new})")
         self.copy(places.new_z, places.z, self.sizes.discrete)
-        w.place(on)
 
     def emit_stop(self, time: str) -> None:
         """Where a guard that ends the run is positive, record this instant, if it is not, and leave."""

@@ -125,7 +125,8 @@ class LoopSizes:
     """What of a system a loop is written for: lengths of its vectors, its clocks and guards.
 
     ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
-    those that end the run where they are positive.
+    those that end the run where they are positive. ``captures``: whether ``update`` is also called just
+    before every instant.
     """
 
     states: int
@@ -135,6 +136,7 @@ class LoopSizes:
     clocks: tuple[tuple[float, float], ...] = ()
     directions: tuple[int, ...] = ()
     stops: tuple[int, ...] = ()
+    captures: bool = False
 
     @property
     def hybrid(self) -> bool:

@@ -177,7 +177,7 @@ def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
     """Names of the functions that a loop calls."""
     names = ["derivative"]
     names += ["residual", "residual_jacobian"] if sizes.algebraic else []
-    names += ["update"] if sizes.clocks else []
+    names += ["update"] if sizes.clocks or sizes.captures else []
     names += ["guards", "reset"] if sizes.directions else []
     names += ["delay_bounds", "delay_times", "delay_inputs"] if sizes.delays else []
     return tuple(names)

@@ -110,6 +110,7 @@ class CompiledSystem:
             clocks=tuple((float(period), float(offset)) for period, offset in description["clocks"]),
             directions=tuple(int(direction) for direction in description["guard_directions"]),
             stops=tuple(k for k, action in enumerate(description["guard_actions"]) if action in ENDING),
+            captures=bool(description["captures"]),
         )
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = dict(description["digests"])
@@ -247,6 +248,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "discrete": slots_to_json(system.discrete),
         "algebraic": slots_to_json(system.algebraic),
         "clocks": [[clock.period, clock.offset] for clock in system.clocks],
+        "captures": system.captures,
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
         "guard_actions": list(system.guard_actions),

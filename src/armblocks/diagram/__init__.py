@@ -4,6 +4,14 @@ from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.block_equations import BlockEquations, SlotKind, block_equations
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
 from armblocks.diagram.check import check_diagram
+from armblocks.diagram.conditional import (
+    ActionSubsystem,
+    EnabledSubsystem,
+    EnabledTriggeredSubsystem,
+    Merge,
+    ResettableSubsystem,
+    TriggeredSubsystem,
+)
 from armblocks.diagram.diagram import Connection, Diagram, Placement
 from armblocks.diagram.hierarchy import (
     Bus,
@@ -18,7 +26,8 @@ from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, PortRef, State, View, ViewKind
 from armblocks.diagram.sampling import sample_time_parameter
-from armblocks.diagram.shapes import DiagramShapes, broadcast, infer_shapes
+from armblocks.diagram.shape_rules import broadcast
+from armblocks.diagram.shapes import DiagramShapes, infer_shapes
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
@@ -30,6 +39,7 @@ from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
 
 __all__ = [
     "REQUIRED",
+    "ActionSubsystem",
     "Block",
     "BlockEquations",
     "BlockHandle",
@@ -45,6 +55,8 @@ __all__ = [
     "Diagram",
     "DiagramBuilder",
     "DiagramShapes",
+    "EnabledSubsystem",
+    "EnabledTriggeredSubsystem",
     "Fed",
     "Feed",
     "FlatForm",
@@ -52,18 +64,21 @@ __all__ = [
     "Goto",
     "Guard",
     "Inport",
+    "Merge",
     "Outport",
     "Parameter",
     "ParameterKind",
     "Placement",
     "Port",
     "PortRef",
+    "ResettableSubsystem",
     "Shapes",
     "Signals",
     "SlotKind",
     "State",
     "Subsystem",
     "TimeTable",
+    "TriggeredSubsystem",
     "UserFunction",
     "View",
     "ViewKind",

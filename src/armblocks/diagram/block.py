@@ -221,8 +221,13 @@ class Block(ABC):
         """New values of those states and modes that an event may change.
 
         ``e``, by guard: +1 or -1 where it fired upwards or downwards, 0 elsewhere. Where it is 0 everywhere,
-        the old values must come out; some other block has had an event.
+        some other block has had an event, and the old values must come out unless the inputs or states of
+        this moment alone ask for others.
         """
+        return {}
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """What those discrete states become that keep how things were just before a tick or event."""
         return {}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:

@@ -10,7 +10,7 @@ a gain of zero hides nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property, lru_cache
@@ -18,6 +18,7 @@ from functools import cached_property, lru_cache
 from casadi import SX, Function, densify, if_else, jtimes, substitute, vertcat
 
 from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.conditional_equations import FIRE, ConditionalBlock
 from armblocks.diagram.parameter import shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, State
 from armblocks.equations import Shape, Slot, flatten, unflatten
@@ -37,6 +38,7 @@ class SlotKind(Enum):
     DELAYED = "delayed signal"
     DELAYED_RATE = "slope of a delayed signal"
     DELAY = "delay"
+    CAPTURE = "capture"
 
 
 @dataclass(frozen=True)
@@ -128,17 +130,25 @@ class _Structure:
     input_shapes: tuple[tuple[str, Shape], ...]
     period: float
     settled: bool
+    hidden: tuple[str, ...]
+    clocked: bool
     block: Block = field(compare=False)
 
 
 def block_equations(
-    block: Block, input_shapes: Shapes, *, period: float = 1.0, settled: bool = False
+    block: Block,
+    input_shapes: Shapes,
+    *,
+    period: float = 1.0,
+    settled: bool = False,
+    hidden: Collection[str] = (),
 ) -> BlockEquations:
     """Trace a block whose inputs have these shapes; equal structures are traced once.
 
     ``period`` s: of a sampled block's clock. ``settled``: with modes that follow the values of the moment
-    instead of events.
+    instead of events. ``hidden``: the hidden inputs of a block in a conditional subsystem.
     """
+    clocked = block.sampled and FIRE not in hidden
     rules = block.parameters()
     return _trace(
         _Structure(
@@ -148,8 +158,10 @@ def block_equations(
                 shape_of(block.parameter_value(rule.name)) for rule in rules if rule.tunable
             ),
             input_shapes=tuple(input_shapes.items()),
-            period=period if block.sampled else 0.0,
-            settled=settled and bool(block.modes(input_shapes) or block.conditions(input_shapes)),
+            period=period if clocked else 0.0,
+            settled=settled and bool(block.modes(input_shapes) or block.conditions(input_shapes) or hidden),
+            hidden=tuple(sorted(hidden)),
+            clocked=clocked,
             block=block,
         )
     )
@@ -182,10 +194,23 @@ def spread(value: SX, shape: Shape) -> SX:
     return flatten(value, shape)
 
 
+def _gated(structure: _Structure) -> tuple[Block, dict[str, Shape]]:
+    """The block with its hidden inputs, if it is in a conditional subsystem, and the shapes of all inputs."""
+    shapes = dict(structure.input_shapes)
+    if not structure.hidden:
+        return structure.block, shapes
+    block = ConditionalBlock(
+        block=structure.block,
+        hidden=structure.hidden,
+        clocked=structure.clocked,
+        ticking=structure.settled or structure.clocked,
+    )
+    return block, shapes | dict.fromkeys(structure.hidden, ())
+
+
 @lru_cache(maxsize=1024)
 def _trace(structure: _Structure) -> BlockEquations:
-    block = structure.block
-    shapes = dict(structure.input_shapes)
+    block, shapes = _gated(structure)
     states, discrete, lines = block.states(shapes), block.discrete_states(shapes), block.delay_lines(shapes)
     past = tuple(State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in lines)
     conditions = block.conditions(shapes)
@@ -198,14 +223,14 @@ def _trace(structure: _Structure) -> BlockEquations:
         "x": [Slot(state.name, state.shape) for state in states],
         "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],
         "u": [Slot(name, shape) for name, shape in shapes.items()]
-        + [Slot(f"{name}'", shapes[name]) for name in block.rated_inputs],
+        + [Slot(f"{name}'", shapes[name]) for name in structure.block.rated_inputs],
         "e": [Slot(guard.name, guard.shape) for guard in guards],
-        "p": list(tunable_slots(block)),
+        "p": list(tunable_slots(structure.block)),
     }
     symbols = {letter: SX.sym(letter, sum(slot.size for slot in slots)) for letter, slots in ends.items()}
     t = SX.sym("t")
     x, z, u, e, p = (dict(natural(slots, symbols[letter])) for letter, slots in ends.items())
-    if block.sampled:
+    if structure.clocked:
         p["T"] = SX(structure.period)
     x.update(z)
     x.update(_answers(block, asked, t, x, u, p))
@@ -216,21 +241,23 @@ def _trace(structure: _Structure) -> BlockEquations:
     answers = {entry.name: _positive(quantities[entry.name], entry.closed) for entry in located}
 
     state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
-    resets = dict(block.resets(t, x, u, p, e)) if block.guards(shapes) else dict[str, SX]()
+    resets = dict(block.resets(t, x, u, p, e))
     resets |= {
         entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
     }
+    captures = block.captures(t, x, u, p)
     sought: dict[SlotKind, dict[str, Shape]] = {
-        SlotKind.OUTPUT: _output_shapes(block, shapes),
+        SlotKind.OUTPUT: _output_shapes(structure.block, dict(structure.input_shapes)),
         SlotKind.DERIVATIVE: {state.name: state.shape for state in states},
         SlotKind.RECORD: {port.name: port.shape or () for port in block.record_ports()},
-        SlotKind.UPDATE: {state.name: state.shape for state in discrete if block.sampled},
+        SlotKind.UPDATE: {state.name: state.shape for state in discrete if structure.clocked},
         SlotKind.GUARD: {guard.name: guard.shape for guard in guards},
         SlotKind.MODE: {mode.name: mode.shape for mode in modes},
         SlotKind.RESET: {name: state_shapes[name] for name in resets if name in state_shapes},
         SlotKind.DELAYED: {line.name: line.shape for line in lines},
         SlotKind.DELAYED_RATE: {line.name: line.shape for line in lines},
         SlotKind.DELAY: {line.name: () for line in lines},
+        SlotKind.CAPTURE: {name: state_shapes[name] for name in captures if name in state_shapes},
     }
     found = {
         SlotKind.OUTPUT: block.outputs(t, x, u, p),
@@ -243,6 +270,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.DELAYED: {line.name: u[line.input] for line in lines},
         SlotKind.DELAYED_RATE: {line.name: u[f"{line.input}'"] for line in lines},
         SlotKind.DELAY: block.delay_times(t, x, u, p),
+        SlotKind.CAPTURE: captures,
     }
     for kind, values in found.items():
         _check_complete(block, kind, list(sought[kind]), values)

@@ -41,6 +41,10 @@ class Placement:
     flipped: bool = False
 
 
+Gate = Mapping[str, PortRef]
+"""What feeds the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Diagram:
     """Blocks and wires. Only ``DiagramBuilder.build`` makes one, and what it makes is checked.
@@ -58,6 +62,8 @@ class Diagram:
     extras: Mapping[str, object] = field(default_factory=dict[str, object])
     description: str = ""
     """One line for people: what the diagram shows."""
+    gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
+    """Of a flat diagram, by block: see :mod:`armblocks.diagram.conditional_equations`."""
     _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
 
     def __post_init__(self) -> None:
@@ -71,6 +77,16 @@ class Diagram:
 
     def __str__(self) -> str:
         return f"diagram '{self.name}' of {len(self.blocks)} blocks"
+
+    def clocked(self, name: str) -> bool:
+        """Whether a block works at the ticks of a clock: a sampled one, unless a trigger tells it when."""
+        return self.blocks[name].sampled and "?fire" not in self.gates.get(name, {})
+
+    def source(self, name: str, port: str) -> PortRef:
+        """The output port that feeds an input port of a flat diagram, a hidden one included."""
+        if port.startswith("?"):
+            return self.gates[name][port]
+        return self.drivers[PortRef(name, port)]
 
     @cached_property
     def drivers(self) -> Mapping[PortRef, PortRef]:

@@ -12,7 +12,17 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.conditional import (
+    ActionSubsystem,
+    EnabledSubsystem,
+    EnabledTriggeredSubsystem,
+    Merge,
+    ResettableSubsystem,
+    TriggeredSubsystem,
+)
+from armblocks.diagram.conditional_equations import ELAPSED, FIRE, ON, RESTART
+from armblocks.diagram.controls import EnableControl, HeldOutput, MergedOutput, TriggerControl
+from armblocks.diagram.diagram import Connection, Diagram, Gate
 from armblocks.diagram.port import PortRef, View
 from armblocks.diagram.structure import Inport, Outport, Subsystem, stated_shape
 from armblocks.diagram.virtual_wiring import (
@@ -27,6 +37,15 @@ from armblocks.diagram.virtual_wiring import (
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, UnknownNameError
 
+CONDITIONAL = (
+    EnabledSubsystem,
+    TriggeredSubsystem,
+    EnabledTriggeredSubsystem,
+    ResettableSubsystem,
+    ActionSubsystem,
+)
+SUBSYSTEMS = (Subsystem, *CONDITIONAL)
+"""Kinds of blocks that hold a diagram."""
 DEEPEST = 100
 """Subsystems inside each other."""
 MOST_LISTED = 20
@@ -151,7 +170,7 @@ def levels_of(diagram: Diagram) -> dict[str, Diagram]:
             )
         levels[path] = level
         for name, block in level.blocks.items():
-            if isinstance(block, Subsystem):
+            if isinstance(block, SUBSYSTEMS):
                 pending.append((joined(path, name), block.diagram, depth + 1))
     return levels
 
@@ -197,12 +216,24 @@ class _Flattening:
                 source = PortRef(joined(level, wire.source.block), wire.source.port)
                 self.drivers[PortRef(joined(level, wire.target.block), wire.target.port)] = source
         self.tags = _Tags(self.blocks, self.level_of, self.where)
+        self.gates: dict[str, Gate] = {"": {}}
+        self.controls: set[str] = set()
+        for level in levels:
+            if level:
+                self._control(level)
+        for path, block in list(self.blocks.items()):
+            if isinstance(block, Merge):
+                self.blocks[path] = MergedOutput(inputs=block.inputs, initial=block.initial)
+                self.controls.add(path)
 
     def form(self) -> FlatForm:
         """The flat diagram and its relation to the hierarchy."""
         for path, block in self.blocks.items():
             for port in block.output_ports():
                 self.carry(PortRef(path, port.name))
+        for path, block in self.blocks.items():
+            if isinstance(block, MergedOutput):
+                self._merge(path, block)
         sinks = self._sinks_of_buses()
         real = {
             path: block
@@ -215,7 +246,12 @@ class _Flattening:
             for port in block.input_ports()
         ]
         flat = dataclasses.replace(
-            self.top, blocks=real, connections=tuple(connections), layout={}, extras={}
+            self.top,
+            blocks=real,
+            connections=tuple(connections),
+            layout={},
+            extras={},
+            gates=self._gates(real),
         )
         return FlatForm(
             diagram=flat,
@@ -230,6 +266,95 @@ class _Flattening:
         """Whether a block is replaced by wires: virtual ones, and the ends of subsystems."""
         block = self.blocks[path]
         return block.virtual or (bool(self.level_of[path]) and isinstance(block, Inport | Outport))
+
+    # -- conditional subsystems ----------------------------------------------------------------------------
+
+    def _control(self, level: str) -> None:
+        """The gate of the blocks of a level, and the blocks that work it out where it is conditional."""
+        outer, block = self.gates[self.level_of[level]], self.blocks[level]
+        self.gates[level] = outer
+        if not isinstance(block, CONDITIONAL):
+            return
+        if FIRE in outer:
+            raise DiagramError(
+                "a conditional subsystem is inside a triggered one",
+                where=f"block '{level}' ({block.title})",
+                allowed="conditional subsystems inside plain, enabled, action and resettable ones",
+                fix="put the condition outside, as the trigger or the enable signal",
+            )
+        match block:
+            case EnabledSubsystem() | ActionSubsystem():
+                port = "enable" if isinstance(block, EnabledSubsystem) else "action"
+                enabled = isinstance(block, EnabledSubsystem)
+                when = block.states_when_enabling if enabled else block.states_when_resuming
+                control = self._enable(level, port, outer, restarts=when == "reset")
+                works = gate = {ON: PortRef(control, "on")}
+                if when == "reset" or RESTART in outer:
+                    gate = {**works, RESTART: PortRef(control, "restart")}
+            case TriggeredSubsystem() | EnabledTriggeredSubsystem():
+                around = outer
+                if isinstance(block, EnabledTriggeredSubsystem):
+                    enable = self._enable(level, "enable", outer, restarts=False)
+                    around = {ON: PortRef(enable, "on"), RESTART: PortRef(enable, "restart")}
+                control = self._trigger(level, "trigger", around, block.edge)
+                works = {FIRE: PortRef(control, "fire")}
+                gate = {**works, ELAPSED: PortRef(control, "elapsed")}
+                if RESTART in outer:
+                    gate[RESTART] = outer[RESTART]
+            case ResettableSubsystem():
+                control = self._trigger(level, "reset", outer, block.edge)
+                self.gates[level] = {**outer, RESTART: PortRef(control, "restart")}
+                return
+        self.gates[level] = gate
+        self._hold(level, next(iter(works.values())), fires=FIRE in works)
+
+    def _enable(self, level: str, port: str, outer: Gate, *, restarts: bool) -> str:
+        block = EnableControl(outer=ON in outer, anew=RESTART in outer, restarts=restarts)
+        return self._add_control(level, port, block, outer)
+
+    def _trigger(self, level: str, port: str, outer: Gate, edge: str) -> str:
+        block = TriggerControl(outer=ON in outer, anew=RESTART in outer, edge=edge)
+        return self._add_control(level, port, block, outer)
+
+    def _add_control(self, level: str, port: str, block: Block, outer: Gate) -> str:
+        path = joined(level, port)
+        self.blocks[path] = block
+        self.level_of[path] = level
+        self.controls.add(path)
+        self.drivers[PortRef(path, "u")] = self.drivers[PortRef(level, port)]
+        for end, hidden in (("outer", ON), ("anew", RESTART)):
+            if hidden in outer:
+                self.drivers[PortRef(path, end)] = outer[hidden]
+        return path
+
+    def _hold(self, level: str, works: PortRef, *, fires: bool) -> None:
+        """Outputs that keep their values while the subsystem does not work."""
+        for name, block in self.levels[level].blocks.items():
+            if isinstance(block, Outport):
+                path = joined(level, name)
+                self.blocks[path] = HeldOutput(fires=fires, when_off=block.when_off, initial=block.initial)
+                self.drivers[PortRef(path, "works")] = works
+                self.controls.add(path)
+
+    def _merge(self, path: str, block: MergedOutput) -> None:
+        for number in range(1, block.inputs + 1):
+            carried = self.at(path, f"u{number}")
+            if not isinstance(carried, PortRef) or not isinstance(self.blocks[carried.block], HeldOutput):
+                source = f"'{carried}'" if isinstance(carried, PortRef) else "a bus"
+                raise DiagramError(
+                    f"input 'u{number}' is {source}, which no conditional subsystem gives",
+                    where=f"block '{path}' (Merge)",
+                    allowed="outputs of enabled, triggered and action subsystems",
+                    fix="take a Switch, or put the signal's block into a conditional subsystem",
+                )
+            self.drivers[PortRef(path, f"works{number}")] = self.drivers[PortRef(carried.block, "works")]
+
+    def _gates(self, real: Iterable[str]) -> dict[str, Gate]:
+        return {
+            path: gate
+            for path in real
+            if path not in self.controls and (gate := self.gates[self.level_of[path]])
+        }
 
     # -- following wires -----------------------------------------------------------------------------------
 
@@ -270,8 +395,10 @@ class _Flattening:
             case Inport():
                 level = self.level_of[path]
                 return [self.drivers[PortRef(level, path.rpartition("/")[2])]]
-            case Subsystem():
+            case Subsystem() | ResettableSubsystem():
                 return [self.drivers[PortRef(joined(path, ref.port), "u")]]
+            case EnabledSubsystem() | TriggeredSubsystem() | EnabledTriggeredSubsystem() | ActionSubsystem():
+                return [PortRef(joined(path, ref.port), "y")]
             case From():
                 return [self.drivers[PortRef(self.tags.goto(path, block), "u")]]
             case _:

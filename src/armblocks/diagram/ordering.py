@@ -62,7 +62,7 @@ class Network:
         port = ref.port
         while order and port in rates:
             port, order = rates[port], order - 1
-        if self.diagram.blocks[ref.block].sampled and (order or not self.ticking):
+        if self.diagram.clocked(ref.block) and (order or not self.ticking):
             return Value(Node(ref.block, HELD, order), SlotKind.OUTPUT, port)
         return self._slot(ref.block, SlotKind.OUTPUT, port, order)
 
@@ -70,7 +70,7 @@ class Network:
         """Where the value that feeds an input port is found; ``u'`` is the derivative of what feeds ``u``."""
         if port.endswith("'"):
             return self.input(block, port[:-1], order + 1)
-        return self.output(self.diagram.drivers[PortRef(block, port)], order)
+        return self.output(self.diagram.source(block, port), order)
 
     def state_rate(self, block: str, state: str, order: int) -> Value:
         """Where the ``order``-th (at least first) derivative of a state is found."""
@@ -83,7 +83,7 @@ class Network:
         group = self.equations[node.block].groups[node.group]
         for order in range(node.order + 1):
             for port in group.inputs:
-                ref = self.diagram.drivers[PortRef(node.block, port.removesuffix("'"))]
+                ref = self.diagram.source(node.block, port.removesuffix("'"))
                 yield self.input(node.block, port, order).node, tuple(str(entry) for entry in self.route(ref))
             if order:
                 for state in group.states:
@@ -93,9 +93,14 @@ class Network:
         """Everything that is asked for: all groups, and what the derivative ports need; at a tick, what the
         sampled blocks work out."""
         for name, block in self.diagram.blocks.items():
-            if block.sampled and not self.ticking:
+            clocked = self.diagram.clocked(name)
+            if clocked and not self.ticking:
                 yield Node(name, HELD, 0)
-            if block.sampled is not self.ticking:
+                # What an event does to the block's states, though it works at ticks.
+                for (kind, _), index in self.equations[name].group_of.items():
+                    if kind is SlotKind.RESET:
+                        yield Node(name, index, 0)
+            if clocked is not self.ticking:
                 continue
             for index in range(len(self.equations[name].groups)):
                 yield Node(name, index, 0)
@@ -155,7 +160,7 @@ def evaluation_order(network: Network) -> Evaluation:
             if node.order in orders:
                 loop = _loop(path, step)
                 if network.ticking and any(
-                    network.diagram.blocks[entry.rsplit("/", 1)[0]].sampled for entry in loop
+                    network.diagram.clocked(entry.rsplit("/", 1)[0]) for entry in loop
                 ):
                     raise AlgebraicLoopError(
                         loop,

@@ -72,7 +72,7 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
 
     Raises ``DiagramError`` where no clock follows, or two that do not fit.
     """
-    sampled = [name for name, block in diagram.blocks.items() if block.sampled]
+    sampled = [name for name in diagram.blocks if diagram.clocked(name)]
     if not sampled:
         return Sampling((), {})
     stated: dict[str, SampleClock | None] = {}
@@ -120,10 +120,30 @@ def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> 
     queue = deque(name for name, own in equations.items() if _flows(diagram.blocks[name], own))
     while queue:
         for entry in forward[queue.popleft()]:
-            if entry not in found and not diagram.blocks[entry].sampled:
+            if entry not in found and not diagram.clocked(entry):
                 found.add(entry)
                 queue.append(entry)
     return frozenset(found)
+
+
+def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> None:
+    """Raise ``DiagramError`` for a block in a triggered subsystem that cannot wait for the trigger.
+
+    That is one with continuous states, and one with a sample time of its own.
+    """
+    for name, found in equations.items():
+        block = diagram.blocks[name]
+        if diagram.clocked(name) or "?fire" not in diagram.gates.get(name, {}):
+            continue
+        timed = block.sampled and own_clock(block) is not None
+        if found.states or timed:
+            kind = "ticks by itself" if timed else f"has the continuous state '{found.states[0].name}'"
+            raise DiagramError(
+                f"a block in a triggered subsystem {kind}",
+                where=f"block '{name}' ({block.title})",
+                allowed="blocks that calculate, and sampled ones with the sample time -1",
+                fix="set its sample_time to -1" if timed else "take a sampled block, or an enabled subsystem",
+            )
 
 
 def _flows(block: Block, equations: BlockEquations) -> bool:

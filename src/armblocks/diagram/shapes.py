@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,36 +10,9 @@ from armblocks.diagram.block import Block, Shapes
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import FlatForm
 from armblocks.diagram.port import PortRef
+from armblocks.diagram.shape_rules import shapes_agree
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
-
-
-def broadcast(shapes: Shapes) -> Shape:
-    """The shape of an elementwise result: scalars (and single elements) spread over the others, as in
-    Simulink; all others must agree.
-
-    Raises ``InputError`` that names two ports that do not agree.
-    """
-    result: Shape = ()
-    first = ""
-    for name, shape in shapes.items():
-        if math.prod(shape) == 1:
-            if math.prod(result) == 1 and len(shape) > len(result):
-                result, first = shape, name
-        elif math.prod(result) == 1:
-            result, first = shape, name
-        elif shape != result:
-            raise InputError(
-                f"'{first}' has shape {result} and '{name}' has shape {shape}",
-                allowed="equal shapes, or a scalar with anything",
-                fix="change the width of one of the signals",
-            )
-    return result
-
-
-def shapes_agree(given: Shape, taken: Shape) -> bool:
-    """Whether a signal fits a port: equal shapes, or one element each."""
-    return given == taken or math.prod(given) == math.prod(taken) == 1
 
 
 @dataclass(frozen=True)

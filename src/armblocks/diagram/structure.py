@@ -92,7 +92,11 @@ class Inport(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Outport(Block):
-    """What leaves a subsystem: the subsystem's output of this name = u."""
+    """What leaves a subsystem: the subsystem's output of this name = u.
+
+    Of a subsystem that works only at times, it says what the output is while it does not: held as it was, or
+    ``initial``, which it also is before the subsystem has worked.
+    """
 
     family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Out"
@@ -102,6 +106,13 @@ class Outport(Block):
         ANY, kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc=_DIMENSIONS
     )
     unit: str = parameter("", doc="SI unit of the signal, for people")
+
+    when_off: str = parameter(
+        "held", choices=("held", "reset"), doc="what a conditional subsystem gives while it does not work"
+    )
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="the output of a conditional subsystem before it works"
+    )
 
     def check(self) -> None:
         _check_dimensions(self)

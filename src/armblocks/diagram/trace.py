@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from casadi import SX, densify, depends_on, dot, if_else, jacobian, substitute, vertcat, vertsplit
+from casadi import (
+    SX,
+    densify,
+    depends_on,
+    dot,
+    fabs,
+    if_else,
+    jacobian,
+    logic_and,
+    logic_or,
+    substitute,
+    vertcat,
+    vertsplit,
+)
 from numpy.typing import NDArray
 
-from armblocks.diagram.block import Block, Signals
+from armblocks.diagram.block import Signals
 from armblocks.diagram.block_equations import (
     BlockEquations,
     BlockSlot,
@@ -21,12 +35,13 @@ from armblocks.diagram.block_equations import (
     spread,
     tunable_slots,
 )
+from armblocks.diagram.conditional_equations import ON
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.ordering import HELD, Evaluation, Network, Node, Value, evaluation_order
 from armblocks.diagram.port import Guard, PortRef
-from armblocks.diagram.sampling import Sampling, moving_blocks, resolve_sampling
+from armblocks.diagram.sampling import Sampling, check_triggered, moving_blocks, resolve_sampling
 from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
 from armblocks.diagram.structure import Outport
 from armblocks.diagram.units import infer_units
@@ -58,21 +73,24 @@ def diagram_model(diagram: Diagram) -> Model:
     diagram = form.diagram
     shapes = infer_shapes(diagram)
     check_stated(form, shapes)
-    free = {name: block for name, block in diagram.blocks.items() if not block.sampled}
-    equations = {name: _equations(name, block, shapes) for name, block in free.items()}
+    free = [name for name in diagram.blocks if not diagram.clocked(name)]
+    equations = {name: _equations(diagram, name, shapes) for name in free}
+    check_triggered(diagram, equations)
     sampling = resolve_sampling(diagram, equations)
     moving = moving_blocks(diagram, equations)
-    for name, block in free.items():
+    for name in free:
+        block, inputs = diagram.blocks[name], shapes.inputs[name]
         # Nothing to locate where the answers change at instants only.
-        if name not in moving and block.conditions(shapes.inputs[name]) and not equations[name].states:
-            equations[name] = _equations(name, block, shapes, settled=not block.modes(shapes.inputs[name]))
+        still = name not in moving and name not in diagram.gates
+        if still and block.conditions(inputs) and not equations[name].states:
+            equations[name] = _equations(diagram, name, shapes, settled=not block.modes(inputs))
     for name, clock in sampling.clock_of.items():
         period = sampling.clocks[clock].period
-        equations[name] = _equations(name, diagram.blocks[name], shapes, period=period)
+        equations[name] = _equations(diagram, name, shapes, period=period)
     equations = {name: equations[name] for name in diagram.blocks}
     flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
     if sampling.clocks:
-        settled = {name: _equations(name, block, shapes, settled=True) for name, block in free.items()}
+        settled = {name: _equations(diagram, name, shapes, settled=True) for name in free}
         tick = Network(diagram, equations | settled, ticking=True)
     return Model(
         shapes=shapes,
@@ -85,10 +103,11 @@ def diagram_model(diagram: Diagram) -> Model:
 
 
 def _equations(
-    name: str, block: Block, shapes: DiagramShapes, *, period: float = 1.0, settled: bool = False
+    diagram: Diagram, name: str, shapes: DiagramShapes, *, period: float = 1.0, settled: bool = False
 ) -> BlockEquations:
+    block, hidden = diagram.blocks[name], diagram.gates.get(name, {})
     try:
-        return block_equations(block, shapes.inputs[name], period=period, settled=settled)
+        return block_equations(block, shapes.inputs[name], period=period, settled=settled, hidden=hidden)
     except DiagramError:
         raise
     except ArmblocksError as error:
@@ -109,8 +128,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     have no solution, or no single one.
     """
     model = diagram_model(diagram)
-    form = flatten_hierarchy(diagram)
-    diagram = form.diagram
+    diagram = (form := flatten_hierarchy(diagram)).diagram
     symbols = _Symbols(model)
     flow = _Tracing(model.flow, symbols)
     for node in model.flow_order.order:
@@ -147,7 +165,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         clocks=model.sampling.clocks,
         parameter_values=values,
         derivative=function("derivative", ends, xd=derivatives),
-        signals=function("signals", ends, y=[flow.value(value) for _, _, value in signals]),
+        signals=function("signals", ends, y=[_recorded(diagram, flow, value) for _, _, value in signals]),
         residual=residual,
         residual_jacobian=dataclasses.replace(
             residual,
@@ -155,6 +173,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
             outputs=signature(("J", rates.shape)),
             results=(flatten(rates, rates.shape),),
         ),
+        captures=_keeps_left_limits(model),
         update=function("update", ends | m, z=_updated(model, symbols, flow, loops)),
         guards=function("guards", ends, g=[value for _, _, value in guards]),
         guard_directions=tuple(guard.direction for _, guard, value in guards for _ in range(value.numel())),
@@ -195,10 +214,10 @@ class _Symbols:
             for state in found.states
         ]
         self.discrete_slots: list[Slot] = []
-        for name, block in blocks.items():
+        for name in blocks:
             for state in equations[name].discrete:
                 self.discrete_slots.append(Slot(f"{name}/{state.name}", state.shape, state.unit))
-            if block.sampled:
+            if name in model.sampling.clock_of:
                 shapes = model.shapes.outputs[name]
                 self.discrete_slots += [Slot(f"{name}/{port}", shape) for port, shape in shapes.items()]
         guard_slots = [
@@ -263,6 +282,8 @@ class _Tracing:
         self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
         if node.block in self._clock_of:
             ticks = symbols.m[self._clock_of[node.block]]
+            if ON in self.network.diagram.gates.get(node.block, {}):
+                ticks = logic_and(ticks, self.value(self.network.input(node.block, ON)))
             for slot in group.slots:
                 if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
                     fresh = self._values[node][slot.kind, slot.name]
@@ -348,6 +369,7 @@ def _updated(model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit) -
     for node in model.tick_order.order:
         tick.work_out(node)
     equations, discrete = model.tick.equations, dict(symbols.discrete)
+    discrete |= _captured(model, symbols, flow)
     for name in model.sampling.clock_of:
         for index, group in enumerate(equations[name].groups):
             for slot in group.slots:
@@ -374,6 +396,35 @@ def _updated(model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit) -
         known = loops.solved([flow.value(_same(model.flow, value)) for value in tick.unknowns])
         solution = substitute(solution, cuts[remaining], known[remaining])
     return [substitute(updated, cuts, solution)]
+
+
+def _keeps_left_limits(model: Model) -> bool:
+    found = model.flow.equations.values()
+    return any(kind is SlotKind.CAPTURE for equations in found for kind, _ in equations.group_of)
+
+
+def _captured(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, SX]:
+    """What keeps how things were just before an instant: taken when the update is asked for with no tick."""
+    ticking = dot(symbols.m, symbols.m) if symbols.m.numel() else SX(0.0)
+    return {
+        f"{name}/{slot}": if_else(
+            ticking == 0.0,
+            flow.value(_value(model.flow, name, kind, slot)),
+            symbols.discrete[f"{name}/{slot}"],
+        )
+        for name, equations in model.flow.equations.items()
+        for kind, slot in equations.group_of
+        if kind is SlotKind.CAPTURE
+    }
+
+
+def _recorded(diagram: Diagram, flow: _Tracing, value: Value) -> SX:
+    """A signal as it is recorded: what is not finite in a subsystem that is off disturbs nobody, and is 0."""
+    worked_out = flow.value(value)
+    if ON not in diagram.gates.get(value.node.block, {}):
+        return worked_out
+    on = flow.value(flow.network.input(value.node.block, ON))
+    return if_else(logic_or(on, fabs(worked_out) <= sys.float_info.max), worked_out, 0.0)
 
 
 def _same(network: Network, value: Value) -> Value:
@@ -550,7 +601,7 @@ def _initial_discrete(model: Model, symbols: _Symbols) -> list[SX]:
         block, p = model.flow.diagram.blocks[name], symbols.parameters_of(name)
         given = {**block.initial_states(p), **block.initial_past(p)}
         values.extend(spread(SX(given.get(state.name, 0.0)), state.shape) for state in equations.discrete)
-        if block.sampled:
+        if name in model.sampling.clock_of:
             held = block.initial_outputs(p)
             shapes = model.shapes.outputs[name]
             values.extend(spread(SX(held.get(port, 0.0)), shape) for port, shape in shapes.items())

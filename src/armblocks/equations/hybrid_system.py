@@ -67,11 +67,12 @@ class HybridSystem:
     ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``; one output ``xd (nx,)``,
     ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``.
     ``update``: one input more, ``m (nclocks,)``; output ``z (nz,)``: what z becomes at an instant at which
-    the clocks with ``m[k] = 1`` tick. ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired
-    upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it settles modes
-    (a limiter that starts beyond its limit) and changes nothing else: a run calls it so once, at the start
-    after the ticks, and takes the signs of the guards then. A breakpoint is an instant like a tick: guards
-    are compared across it.
+    the clocks with ``m[k] = 1`` tick. Where ``captures`` is true, it is also asked for with no clock ticking,
+    just before every instant, at a time one unit in the last place earlier: then z keeps left limits.
+    ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs
+    ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it settles modes (a limiter that starts beyond its limit)
+    and changes nothing else: a run calls it so once, at the start after the ticks, and takes the signs of the
+    guards then. A breakpoint is an instant like a tick: guards are compared across it.
     ``initial_states``, ``initial_discrete``, ``initial_algebraic``: input ``p``; output ``x0``, ``z0``,
     ``w0``. At the start all clocks without an offset tick, before the first derivative.
     ``breakpoints``: input ``p``; output ``times (nb,)``: known instants at which signals jump (a step
@@ -114,3 +115,5 @@ class HybridSystem:
     ``fail`` ends it as a failure, ``warn`` is told at its end, and empty nothing."""
     delays: Delays | None = None
     """Signals that are looked up in the past."""
+    captures: bool = False
+    """Whether some discrete variable keeps how things were just before an instant."""

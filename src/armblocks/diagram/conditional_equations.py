@@ -1,0 +1,163 @@
+"""The equations of a block inside a conditional subsystem: the block's own, gated by what controls it.
+
+While the control is off, continuous states stand still and sampled ones keep their values. At a restart all
+states take their start values. A triggered block works when the trigger fires, as a sampled one does at a
+tick. The block is asked for its equations as always; only what becomes of them is changed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, if_else, logic_and
+
+from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State
+
+ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
+"""Hidden inputs: whether the block works; whether its states start anew now; whether the trigger fires now;
+and the time since it fired before, s."""
+_DONE = "?done"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConditionalBlock(Block):
+    """A block with hidden inputs, for the tracing of its equations only: it is in no library and no file.
+
+    ``clocked``: it works at the ticks of a clock. ``ticking``: the equations are those of a tick, where a
+    restart has to act before anything else. (At an event it acts through ``resets``, one turn after the
+    control has changed; ``?done`` keeps it from acting twice where a tick was first.)
+    """
+
+    family: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+
+    block: Block
+    hidden: Collection[str]
+    clocked: bool
+    ticking: bool
+
+    def __post_init__(self) -> None:
+        """Nothing to check: the block inside is checked."""
+
+    def _plain(self, values: Mapping[str, SX]) -> dict[str, SX]:
+        return {name: value for name, value in values.items() if name not in self.hidden and name != _DONE}
+
+    def _shapes(self, shapes: Shapes) -> Shapes:
+        return {name: shape for name, shape in shapes.items() if name not in self.hidden}
+
+    @property
+    def _restarted(self) -> bool:
+        return RESTART in self.hidden
+
+    @property
+    def _notes_restarts(self) -> bool:
+        return self._restarted and self.clocked
+
+    def _arguments(self, t: SX, x: Signals, u: Signals, p: Signals) -> tuple[SX, Signals, Signals, Signals]:
+        """What the block's own equations are given."""
+        own = self._plain(x)
+        if self._restarted and self.ticking:
+            own |= {
+                name: if_else(u[RESTART] != 0.0, start, own[name])
+                for name, start in self.block.initial_states(p).items()
+            }
+        if ELAPSED in self.hidden:
+            p = {**p, "T": u[ELAPSED]}
+        return t, own, self._plain(u), p
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (*self.block.input_ports(), *(Port(name, "", "", ()) for name in self.hidden))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return self.block.output_ports()
+
+    def record_ports(self) -> tuple[Port, ...]:
+        return self.block.record_ports()
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return self.block.states(self._shapes(inputs))
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        noted = (State(_DONE, (), "whether this tick has restarted the block"),)
+        own = self.block.discrete_states(self._shapes(inputs))
+        return (*own, *noted) if self._notes_restarts else own
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return self.block.modes(self._shapes(inputs))
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return self.block.guards(self._shapes(inputs))
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return self.block.conditions(self._shapes(inputs))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self.block.condition_values(*self._arguments(t, x, u, p))
+
+    def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
+        return self.block.delay_lines(self._shapes(inputs))
+
+    def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self.block.delay_times(*self._arguments(t, x, u, p))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return self.block.output_shapes(self._shapes(inputs))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        outputs = self.block.outputs(*self._arguments(t, x, u, p))
+        # What is worked out at a tick while the control is off is not taken over: see trace.
+        return self._while_on(u, outputs) if self.clocked else outputs
+
+    def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self.block.records(*self._arguments(t, x, u, p))
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._while_on(u, self.block.derivatives(*self._arguments(t, x, u, p)))
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # A guard that is zero keeps its side, so that nothing fires while the block is off.
+        return self._while_on(u, self.block.guard_values(*self._arguments(t, x, u, p)))
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self.block.mode_values(*self._arguments(t, x, u, p))
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        captured = self.block.captures(*self._arguments(t, x, u, p))
+        return self._while_on(u, captured, x)
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if not self.clocked:
+            return {}
+        arguments = self._arguments(t, x, u, p)
+        updated = self._while_on(u, self.block.updates(*arguments), arguments[1])
+        return {**updated, _DONE: u[RESTART]} if self._notes_restarts else updated
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        arguments = self._arguments(t, x, u, p)
+        after = dict(self._while_on(u, self.block.resets(*arguments, e), x))
+        if FIRE in self.hidden and self.block.sampled:
+            fired = {
+                name: if_else(u[FIRE] != 0.0, value, after.get(name, x[name]))
+                for name, value in self.block.updates(*arguments).items()
+            }
+            after |= fired
+        if self._restarted:
+            again = u[RESTART] != 0.0
+            if self._notes_restarts:
+                after[_DONE] = if_else(again, 0.0, x[_DONE])
+                again = logic_and(again, x[_DONE] == 0.0)
+            for name, start in self.block.initial_states(p).items():
+                after[name] = if_else(again, start, after.get(name, x[name]))
+        return after
+
+    def _while_on(self, u: Signals, values: Signals, otherwise: Signals | None = None) -> Signals:
+        """Values where the control is on; else what ``otherwise`` has under their names, or 0."""
+        if ON not in self.hidden:
+            return values
+        return {
+            name: if_else(u[ON] != 0.0, value, 0.0 if otherwise is None else otherwise[name])
+            for name, value in values.items()
+        }

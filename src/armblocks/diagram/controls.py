@@ -1,0 +1,245 @@
+"""What a flat diagram has in the place of conditional subsystems: controls, held outputs, merged outputs.
+
+They are in no library and no file. At an event things happen in two turns: first the control's mode follows
+its signal, so that ``restart`` or ``fire`` are 1; then the guard ``acts`` fires, the blocks inside start anew
+or do their work, and the control has seen it. At a tick modes follow at once, and both happen together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fabs, if_else, logic_and, logic_or
+from numpy.typing import ArrayLike
+
+from armblocks.diagram.block import Block, Shapes, Signals
+from armblocks.diagram.parameter import ParameterKind, parameter, shape_of
+from armblocks.diagram.port import Guard, Port, State
+from armblocks.diagram.shape_rules import broadcast
+
+JUST = 1e-300
+"""Beside zero by less than any signal can tell: it gives zero itself a side."""
+_STATES = ("held", "reset")
+_EDGES = ("rising", "falling", "either")
+
+
+def _inside(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
+    ports = (
+        (block.outer, Port("outer", "whether the subsystem around works", "", ())),
+        (block.anew, Port("anew", "whether the subsystem around starts anew", "", ())),
+    )
+    return tuple(port for there, port in ports if there)
+
+
+def _outer(u: Signals) -> SX:
+    return u.get("outer", SX(1.0))
+
+
+def _side(u: SX) -> SX:
+    return if_else(u > 0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnableControl(Block):
+    """Whether an enabled subsystem is on, and whether its states start anew just now: on = u > 0."""
+
+    family: ClassVar[str] = "structure"
+    title: ClassVar[str] = "Enable"
+
+    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be off")
+    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can start anew")
+    restarts: bool = parameter(False, doc="whether states start anew when it is switched on")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the control signal", "", ()), *_inside(self))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("on", "1 while it works", "", ()), Port("restart", "1 where states start anew", "", ()))
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("seen", (), "what on was when it was last acted on; -1 before that"),)
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("side", (), "1 where u is positive, else 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("side", (), "u passes zero"), Guard("acts", (), "on has changed", 1))
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"seen": SX(-1.0)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        on = x["side"] * _outer(u)
+        begins = logic_and(on, x["seen"] == 0.0) if self.restarts else SX(0.0)
+        return {"on": on, "restart": logic_or(begins, u.get("anew", SX(0.0)))}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        changed = fabs(x["side"] * _outer(u) - x["seen"])
+        return {"side": u["u"] - JUST, "acts": if_else(x["seen"] < 0.0, 0.0, changed) - 0.5}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"side": _side(u["u"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
+        start = _side(u["u"]) * _outer(u)
+        seen = if_else(e["acts"] == 0.0, x["seen"], x["side"] * _outer(u))
+        return {"side": side, "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), start, seen)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TriggerControl(Block):
+    """Whether a trigger fires just now, and how long after it fired before."""
+
+    family: ClassVar[str] = "structure"
+    title: ClassVar[str] = "Trigger"
+
+    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be off")
+    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can start anew")
+    edge: str = parameter("rising", choices=_EDGES, doc="when it fires")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the trigger", "", ()), *_inside(self))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("fire", "1 at the instant at which it fires", "", ()),
+            Port("restart", "1 where states start anew, by this trigger or from around", "", ()),
+            Port("elapsed", "time since it fired before; since the start at first", "s", ()),
+        )
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (
+            State("seen", (), "the side of u that was acted on last; -1 before that"),
+            State("last", (), "when it fired last", "s"),
+        )
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("side", (), "1 where u is positive, else 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("side", (), "u passes zero"), Guard("acts", (), "the side has changed", 1))
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"seen": SX(-1.0), "last": SX(0.0)}
+
+    def _fires(self, x: Signals, u: Signals) -> SX:
+        rises = logic_and(x["side"] == 1.0, x["seen"] == 0.0)
+        falls = logic_and(x["side"] == 0.0, x["seen"] == 1.0)
+        fires = {"rising": rises, "falling": falls, "either": logic_or(rises, falls)}[self.edge]
+        return logic_and(fires, _outer(u))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        fires = self._fires(x, u)
+        return {"fire": fires, "restart": logic_or(fires, u.get("anew", SX(0.0))), "elapsed": t - x["last"]}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        changed = logic_and(x["seen"] >= 0.0, x["side"] != x["seen"])
+        return {"side": u["u"] - JUST, "acts": if_else(changed, 0.5, -0.5)}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"side": _side(u["u"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
+        acts = e["acts"] != 0.0
+        seen = if_else(acts, x["side"], x["seen"])
+        return {
+            "side": side,
+            "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), _side(u["u"]), seen),
+            "last": if_else(logic_and(acts, self._fires(x, u)), t, x["last"]),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOutput(Block):
+    """An output of a conditional subsystem: y = u while it works, else what y was, or ``initial``."""
+
+    family: ClassVar[str] = "structure"
+    title: ClassVar[str] = "Out"
+
+    fires: bool = parameter(False, doc="whether works is 1 at instants only")
+    when_off: str = parameter("held", choices=_STATES, doc="whether y is held or goes back")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before it has worked")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what leaves"), Port("works", "1 while or when the subsystem works", "", ()))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "what is held"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("held", self.output_shapes(inputs)["y"], "what y was"),)
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"held": p["initial"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        otherwise = x["held"] if self.fires or self.when_off == "held" else p["initial"]
+        return {"y": if_else(u["works"], u["u"], otherwise)}
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {} if self.fires else {"held": if_else(u["works"], u["u"], x["held"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"held": if_else(u["works"], u["u"], x["held"])} if self.fires else {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MergedOutput(Block):
+    """Several outputs of conditional subsystems on one wire: y = that of the one that works, or did last."""
+
+    family: ClassVar[str] = "routing"
+    title: ClassVar[str] = "Merge"
+
+    inputs: int = parameter(2, minimum=1, doc="how many inputs")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before any of them has worked")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        numbers = range(1, self.inputs + 1)
+        return (
+            *(Port(f"u{number}", "an output") for number in numbers),
+            *(Port(f"works{number}", "1 while or when its subsystem works", "", ()) for number in numbers),
+        )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output of the one that worked last"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        wide = {name: shape for name, shape in inputs.items() if name.startswith("u")}
+        return {"y": broadcast({**wide, "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("held", self.output_shapes(inputs)["y"], "what y was"),)
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"held": p["initial"]}
+
+    def _chosen(self, x: Signals, u: Signals) -> SX:
+        chosen = x["held"]
+        for number in range(self.inputs, 0, -1):
+            chosen = if_else(u[f"works{number}"], u[f"u{number}"], chosen)
+        return chosen
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._chosen(x, u)}
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"held": self._chosen(x, u)}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"held": self._chosen(x, u)}
