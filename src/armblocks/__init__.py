@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armblocks.face.linearizing import linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
-    from armblocks.face.reporting import write_report
+    from armblocks.face.reporting import write_files, write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
     from armblocks.face.sensitivity import SensitivityResult, sensitivity
     from armblocks.face.trajectory import JointTrajectory, jtraj
@@ -89,6 +89,7 @@ else:
             "simulate": "armblocks.face.model",
             "standard_dh": "armblocks.robot",
             "trim": "armblocks.face.trimming",
+            "write_files": "armblocks.face.reporting",
             "write_report": "armblocks.face.reporting",
         },
     )
@@ -136,6 +137,7 @@ __all__ = [
     "simulate",
     "standard_dh",
     "trim",
+    "write_files",
     "write_report",
 ]
 

@@ -238,7 +238,7 @@ from armblocks.blocks.selection import (
     Selector,
     SubMatrix,
 )
-from armblocks.blocks.sinks import Display, Scope, Terminator, ToWorkspace, XYGraph
+from armblocks.blocks.sinks import Display, Scope, Spectrum, Terminator, ToFile, ToWorkspace, XYGraph
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
 from armblocks.blocks.transforms import T2xyz, Xyz2T
 from armblocks.blocks.transport import TransportDelay, VariableTimeDelay, VariableTransportDelay
@@ -499,6 +499,7 @@ __all__ = [
     "SineWaveFunction",
     "Skew",
     "SliderGain",
+    "Spectrum",
     "Sqrt",
     "StateSpace",
     "Step",
@@ -519,6 +520,7 @@ __all__ = [
     "Tachometer",
     "TappedDelay",
     "Terminator",
+    "ToFile",
     "ToWorkspace",
     "Tr2Delta",
     "Trace",

@@ -67,12 +67,14 @@ def run(
     """Simulate a diagram and write a report: figures, numbers, data."""
     import armblocks as ab
     from armblocks.cli.summary import print_displays, print_files, print_motions, print_run
+    from armblocks.report.sink_files import REPORT_DATA, sink_files
 
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
     settings = _stated(
         stop_time=stop_time, solver=solver, step=step, sample_time=sample_time, rtol=rtol, atol=atol
     )
+    sink_files(diagram, REPORT_DATA)  # refused before the run rather than after it
     folder = _writable_folder(out or Path(f"{diagram.name}-report"))
     settings.update(parameters=parameters, initial_state=from_state)
     result, failure = _simulate(diagram, settings)

@@ -24,7 +24,18 @@ from armblocks.diagram.hierarchy import (
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
-from armblocks.diagram.port import Condition, DelayLine, Guard, Port, PortRef, State, View, ViewKind
+from armblocks.diagram.port import (
+    Condition,
+    DelayLine,
+    FileSettings,
+    Guard,
+    Port,
+    PortRef,
+    SpectrumSettings,
+    State,
+    View,
+    ViewKind,
+)
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
@@ -59,6 +70,7 @@ __all__ = [
     "EnabledTriggeredSubsystem",
     "Fed",
     "Feed",
+    "FileSettings",
     "FlatForm",
     "From",
     "Goto",
@@ -75,6 +87,7 @@ __all__ = [
     "Shapes",
     "Signals",
     "SlotKind",
+    "SpectrumSettings",
     "State",
     "Subsystem",
     "TimeTable",

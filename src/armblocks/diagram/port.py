@@ -94,8 +94,35 @@ class ViewKind(Enum):
     """The number itself, as it stands at the end or at the moment looked at (Display)."""
     ROBOT = "robot"
     """A moving robot: the one signal holds the poses of its links, shape (L+2, 4, 4)."""
+    SPECTRUM = "spectrum"
+    """Every signal over the frequency (Spectrum); ``subject`` is a ``SpectrumSettings``."""
     DATA = "data"
     """Kept for export only (To Workspace)."""
+    FILE = "file"
+    """Kept in a file of its own (To File); ``subject`` is a ``FileSettings``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpectrumSettings:
+    """How a spectrum is worked out and drawn; see the block Spectrum, whose parameters these are."""
+
+    quantity: str
+    window: str
+    averages: int
+    sample_rate: float
+    begin: float
+    remove_mean: bool
+    decibels: bool
+    logarithmic: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileSettings:
+    """Which rows go to which file; see the block ToFile, whose parameters these are."""
+
+    file: str
+    decimation: int
+    limit: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +131,7 @@ class View:
 
     ``signals`` names ports or records of the block itself, so that ``f"{block}/{signal}"`` is a name that a
     simulation result knows. ``labels`` gives a text for each (``""``: the signal's own name). ``subject`` is
-    the ``Robot`` to draw where the kind is ``ROBOT``.
+    the ``Robot`` to draw where the kind is ``ROBOT``, and the settings where a kind has some.
     """
 
     kind: ViewKind

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from armblocks.diagram import Diagram
@@ -23,9 +24,22 @@ def write_report(
 ) -> ReportFiles:
     """Write ``report.html``, the diagram, figures and data of a run into a folder, made if absent.
 
-    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. Returns the paths. Raises
-    UnknownNameError for another format, FormatError where the folder cannot be written.
+    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. The files that To File blocks ask
+    for lie there too. Returns the paths. Raises UnknownNameError for another format, DiagramError where two
+    blocks ask for one file, FormatError where the folder cannot be written.
     """
     from armblocks import report
 
     return report.write_report(folder, diagram, result, formats=formats, data=data)
+
+
+def write_files(folder: str | PathLike[str], diagram: Diagram, result: SimulationResult) -> tuple[Path, ...]:
+    """Write what the To File blocks of a diagram keep of a run into a folder that is there, and nothing else.
+
+    A run by itself writes nothing: here, or by ``write_report``, the caller says in which folder the paths of
+    the blocks lie; none leads out of it. Returns the paths. Raises DiagramError where two blocks ask for one
+    file, FormatError where one cannot be written.
+    """
+    from armblocks.report.sink_files import write_files
+
+    return write_files(folder, diagram, result)

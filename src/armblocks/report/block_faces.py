@@ -139,6 +139,8 @@ def face(block: Block, room: Room, trend: Trend | None) -> list[Mark]:
             return _display(room, block.inputs, trend)
         case kinds.ToWorkspace():
             return _words(room, block.variable, size=11)
+        case kinds.ToFile():
+            return _words(room, block.file.rpartition("/")[2], size=11)
         case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
             return _robot(room, block.robot, caption)

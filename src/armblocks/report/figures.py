@@ -10,14 +10,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.diagram import Diagram, View, ViewKind, diagram_views
+from armblocks.analysis.spectrum import SignalSpectrum, signal_spectrum
+from armblocks.diagram import Diagram, SpectrumSettings, View, ViewKind, diagram_views
+from armblocks.errors import InputError
 from armblocks.report.arm_picture import moments_picture
 from armblocks.report.charts import Panel, Trace, fits_beside, time_chart
 from armblocks.report.motion import Motion
 from armblocks.report.numbers import axis_number, si_prefix
 from armblocks.report.path_chart import path_chart, side_by_side
-from armblocks.report.picture import Picture
-from armblocks.report.style import FIGURE_WIDTH
+from armblocks.report.picture import Picture, Text
+from armblocks.report.spectrum_chart import spectrum_chart
+from armblocks.report.style import FIGURE_WIDTH, SMALL_SIZE, Tone
 from armblocks.report.svg import svg_marks
 from armblocks.simulation.result import SimulationResult
 
@@ -70,7 +73,7 @@ def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
 
 
 def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGURE_WIDTH) -> Iterator[Figure]:
-    """A figure for every Scope and XY Graph of the diagram, in the order of their names."""
+    """A figure for every Scope, XY Graph and Spectrum of the diagram, in the order of their names."""
     for block, view in diagram_views(diagram):
         if view.kind is ViewKind.TRACES:
             yield Figure(
@@ -86,6 +89,13 @@ def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGU
                 caption=view.title or block,
                 picture=_xy_graph(block, view, result),
                 narrow=True,
+            )
+        elif view.kind is ViewKind.SPECTRUM:
+            yield Figure(
+                name=f"spectrum-{file_name(block)}",
+                section="spectra",
+                caption=view.title or block,
+                picture=_spectrum(block, view, result, width),
             )
 
 
@@ -239,6 +249,49 @@ def _compared(block: str, view: View, result: SimulationResult) -> list[list[int
             by_unit[slot.unit] = [number]
             panels.append(by_unit[slot.unit])
     return panels
+
+
+def _spectrum(block: str, view: View, result: SimulationResult, width: float) -> Picture:
+    try:
+        lines, settings = _spectra(block, view, result)
+    except InputError as error:  # the run may have ended early; all else of the report is still wanted
+        picture = Picture(width=width, height=48.0, title=f"Spectrum {block}", description=str(error))
+        picture.add(Text(14.0, 28.0, f"No spectrum: {error}", SMALL_SIZE, Tone.MUTED))
+        return picture
+    return spectrum_chart(
+        lines,
+        title=f"Spectrum {block}",
+        decibels=settings.decibels,
+        logarithmic=settings.logarithmic,
+        width=width,
+    )
+
+
+def _spectra(
+    block: str, view: View, result: SimulationResult
+) -> tuple[list[tuple[str, str, SignalSpectrum]], SpectrumSettings]:
+    """Label, unit and spectrum of every scalar, and the settings. Raises ``InputError``."""
+    settings = view.subject
+    assert isinstance(settings, SpectrumSettings)
+    lines: list[tuple[str, str, SignalSpectrum]] = []
+    for signal in view.signals:
+        path = result.resolve(f"{block}/{signal}")
+        slot = result.signals_layout[path]
+        columns = result[path].reshape(len(result.time), -1)
+        for index, column in list(zip(np.ndindex(*slot.shape), columns.T))[:_FIRST_ENTRIES]:
+            found = signal_spectrum(
+                result.time,
+                column,
+                quantity=settings.quantity,
+                window=settings.window,
+                averages=settings.averages,
+                sample_rate=settings.sample_rate,
+                begin=settings.begin,
+                remove_mean=settings.remove_mean,
+            )
+            label = f"{path}[{','.join(map(str, index))}]" if index else path
+            lines.append((label, _SPELLED.get(slot.unit, slot.unit), found))
+    return lines, settings
 
 
 def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:

@@ -56,7 +56,7 @@ def report_page(contents: ReportContents) -> str:
     displays = _displays(contents)
     if displays:
         sections.append(("displays", "Displays", displays))
-    for key, heading in (("graphs", "XY graphs"), ("scopes", "Scopes")):
+    for key, heading in (("graphs", "XY graphs"), ("scopes", "Scopes"), ("spectra", "Spectra")):
         chosen = [figure for figure in contents.figures if figure.section == key]
         if chosen:
             sections.append((key, heading, _figure_list(chosen)))

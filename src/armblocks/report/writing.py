@@ -15,11 +15,11 @@ from armblocks.report.diagram_drawing import diagram_picture
 from armblocks.report.figures import Figure, file_name, motion_figures, view_figures
 from armblocks.report.motion import Motion, motions
 from armblocks.report.page import ReportContents, report_page
+from armblocks.report.sink_files import DATA_FORMATS, REPORT_DATA, sink_files, write_files
 from armblocks.report.svg import svg_file
 from armblocks.simulation.result import SimulationResult
 
 FIGURE_FORMATS = ("svg", "png")
-DATA_FORMATS = ("csv", "parquet", "npz", "mat")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,11 +41,12 @@ def write_report(
     formats: Sequence[str] = FIGURE_FORMATS,
     data: Sequence[str] = ("csv", "parquet"),
 ) -> ReportFiles:
-    """Write ``report.html``, ``diagram.svg``, ``figures/*`` and ``data.*`` into a folder, made if absent.
+    """Write ``report.html``, ``diagram.svg``, ``figures/*``, ``data.*`` and the files of To File blocks.
 
-    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. Each file is there completely or
-    not at all; the page comes last. Raises UnknownNameError for another format and FormatError where the
-    folder cannot be written.
+    All lie in the folder, which is made if absent. ``formats`` of the figures: svg, png. ``data``: csv,
+    parquet, npz, mat. Each file is there completely or not at all; the page comes last. Raises
+    UnknownNameError for another format, DiagramError where two blocks ask for one file, and FormatError where
+    the folder cannot be written.
     """
     for name in formats:
         if name not in FIGURE_FORMATS:
@@ -53,6 +54,7 @@ def write_report(
     for name in data:
         if name not in DATA_FORMATS:
             raise UnknownNameError("data format", name, DATA_FORMATS, where="write_report")
+    sink_files(diagram, REPORT_DATA)  # refused before anything is written
     place = Path(folder)
     make_folder(place / "figures")
     found = motions(diagram, result) if result.time.size > 1 else ()
@@ -70,6 +72,7 @@ def write_report(
     data_paths = tuple(place / f"data.{kind}" for kind in data)
     for path in data_paths:
         result.save(path)
+    data_paths += write_files(place, diagram, result, taken=REPORT_DATA)
     contents = ReportContents(
         diagram=diagram,
         result=result,

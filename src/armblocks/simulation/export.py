@@ -109,6 +109,11 @@ def _mat(result: SimulationResult) -> bytes:
     paths: list[list[str]] = []
     for name in result.names:
         block, _, port = name.rpartition("/")
+        if not block:
+            variable = _identifier(name, {*contents, "run", "paths"})
+            contents[variable] = result[name]
+            paths.append([name, variable, result.units[name]])
+            continue
         if block not in blocks:
             blocks[block] = _identifier(block, {*contents, "run", "paths"})
             contents[blocks[block]] = {}

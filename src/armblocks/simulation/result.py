@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -121,6 +122,26 @@ class SimulationResult:
 
     def __contains__(self, name: object) -> bool:
         return name in self.signals_layout.ranges or name in self.aliases
+
+    def only(self, names: Mapping[str, str], rows: slice = slice(None)) -> SimulationResult:
+        """The result with some signals alone, ``{new name: path}``, and some of the instants.
+
+        Raises ``UnknownNameError`` for a path that does not exist.
+        """
+        slots: list[Slot] = []
+        places: list[Array] = []
+        for name, path in names.items():
+            known = self.resolve(path)
+            slots.append(dataclasses.replace(self.signals_layout[known], name=name))
+            places.append(self.signals[self.signals_layout.ranges[known]])
+        return dataclasses.replace(
+            self,
+            time=self.time[rows],
+            signals_layout=Signature(tuple(slots)),
+            signals=np.concatenate(places)[:, rows] if places else np.empty((0, self.time[rows].size)),
+            states=self.states[rows],
+            aliases={},
+        )
 
     def columns(self) -> tuple[str, ...]:
         """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[0]``, ``fkine/T[0,3]``."""

@@ -1,0 +1,88 @@
+"""The files that To File blocks ask for: written after a run, into a folder that the caller gives."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from armblocks.diagram import Diagram, FileSettings, ViewKind, diagram_views
+from armblocks.errors import DiagramError, FormatError
+from armblocks.simulation.result import SimulationResult
+
+DATA_FORMATS = ("csv", "parquet", "npz", "mat")
+REPORT_DATA = tuple(f"data.{kind}" for kind in DATA_FORMATS)
+"""Names of a report's files with all signals, which no To File block may have."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SinkFile:
+    """A file that a block asks for: its path in the folder, the signal and its name in the file."""
+
+    block: str
+    signal: str
+    variable: str
+    settings: FileSettings
+
+
+def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, ...]:
+    """All files that the diagram's blocks ask for; nothing is written.
+
+    Raises ``DiagramError`` where two blocks ask for the same one, or for one of those ``taken``.
+    """
+    owners = {name.lower(): "the report" for name in taken}
+    found: list[SinkFile] = []
+    for block, view in diagram_views(diagram):
+        if view.kind is not ViewKind.FILE:
+            continue
+        settings = view.subject
+        assert isinstance(settings, FileSettings)
+        other = owners.setdefault(settings.file.lower(), f"'{block}'")  # many file systems fold cases
+        if other != f"'{block}'":
+            raise DiagramError(
+                f"{other} and '{block}' write the same file '{settings.file}'",
+                where=f"diagram '{diagram.name}'",
+                allowed="a file of its own for each To File block",
+                fix=f"give '{block}' another file",
+            )
+        found.append(
+            SinkFile(block=block, signal=view.signals[0], variable=view.labels[0], settings=settings)
+        )
+    return tuple(found)
+
+
+def write_files(
+    folder: str | os.PathLike[str], diagram: Diagram, result: SimulationResult, *, taken: Sequence[str] = ()
+) -> tuple[Path, ...]:
+    """Write what the To File blocks of a diagram keep into ``folder``, each file all or nothing.
+
+    Subfolders are made; nothing is written outside of the folder, also not through links. ``taken``: names in
+    it that are not to be replaced. Returns the paths. Raises ``DiagramError`` where two blocks ask for one
+    file and ``FormatError`` where one cannot be written or its path leads out of the folder.
+    """
+    place = Path(folder)
+    written: list[Path] = []
+    for sink in sink_files(diagram, taken):
+        path = place / sink.settings.file
+        if not path.resolve().is_relative_to(place.resolve()):
+            raise FormatError(
+                f"the file '{sink.settings.file}' of '{sink.block}' leads out of the folder by a link",
+                where=str(place),
+                allowed="files inside of the folder",
+                fix="remove the link or choose another folder",
+            )
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FormatError(
+                f"the folder of '{sink.settings.file}' cannot be made ({error.strerror or error})",
+                where=str(place),
+                fix="choose another folder or change its permissions",
+            ) from error
+        count = len(range(0, result.time.size, sink.settings.decimation))
+        first = max(0, count - sink.settings.limit) * sink.settings.decimation
+        rows = slice(first, None, sink.settings.decimation)
+        result.only({sink.variable: f"{sink.block}/{sink.signal}"}, rows).save(path)
+        written.append(path)
+    return tuple(written)
