@@ -11,7 +11,7 @@ from small_systems import oscillator, scalar, states_of, system
 from armblocks.compiler.system import compile_system
 from armblocks.equations import SimulationOptions, signature
 from armblocks.errors import InputError, SimulationError, UnknownNameError
-from armblocks.simulation import SimulationResult, simulate
+from armblocks.simulation import Simulation, SimulationResult, simulate
 
 OSCILLATOR = compile_system(oscillator())
 
@@ -197,3 +197,38 @@ def test_parameters_that_cannot_be_run_are_refused(
 ) -> None:
     with pytest.raises(kind, match=message):
         simulate(OSCILLATOR, SimulationOptions(), parameters)  # pyright: ignore
+
+
+@pytest.mark.parametrize(("solver", "most"), [("rk45", 200_000), ("dop853", 200_000), ("rodas5p", 50_000)])
+def test_a_run_that_crawls_is_ended(solver: str, most: int) -> None:
+    """x' = -1 + 2 (x < 0): from 1 s on, every step answers the one before, and 1000 s would take 1e10 steps."""
+    jumping = compile_system(scalar("friction", lambda t, x, p: -1 + 2 * (x < 0), 1.0))
+    with pytest.raises(SimulationError, match=r"the run crawls at 1\.\d+ s with steps of") as error:
+        simulate(jumping, SimulationOptions(stop_time=1000.0, solver=solver))
+    kept = partial(error)
+    assert kept.run.steps < most
+    assert kept.time[-1] == pytest.approx(1.0, abs=0.05)
+    text = str(error.value)
+    assert len(text) < 400
+    assert "what drives 'block/x'" in text
+    assert "StickSlipFriction" in text
+    assert ("rodas5p" in text) == (solver != "rodas5p")
+
+
+def test_many_good_steps_do_not_crawl() -> None:
+    """Steps of 0.06 s of 1e9 s: more than 1e8 to come, each for a good reason."""
+    run = Simulation(OSCILLATOR, SimulationOptions(stop_time=1e9, solver="rk45", sample_time=1e7, rtol=1e-6))
+    run.advance(steps=400_000)
+    assert not run.finished
+    assert run.time > 20_000.0
+
+
+def test_a_blow_up_leaves_no_warning_of_numpy() -> None:
+    """The hint about stiffness looks at a state near the largest double and says nothing."""
+    run = pytest.raises(
+        SimulationError,
+        simulate,
+        OSCILLATOR,
+        SimulationOptions(stop_time=1e6, solver="rk45", sample_time=1e5, rtol=0.1),
+    )
+    assert "not finite" in str(run.value)

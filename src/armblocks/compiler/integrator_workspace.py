@@ -26,6 +26,8 @@ class Status(IntEnum):
     """The table of the past of delayed signals needs more room: give it, and call again."""
     STOPPED = 7
     """A guard that ends the run is positive; what holds then is recorded."""
+    CRAWLING = 8
+    """Steps so short that what changes in one is within the tolerance, and more to come than anybody awaits."""
 
 
 class Real(IntEnum):
@@ -97,7 +99,9 @@ class Count(IntEnum):
     """Rows of the table of the past of delayed signals."""
     PAST_ROOM = 21
     """Rows that there is room for."""
-    END = 22
+    CRAWL = 22
+    """Looks that found a step short without need, less some for every look that did not."""
+    END = 23
 
 
 class Stage(IntEnum):

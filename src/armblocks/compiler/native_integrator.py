@@ -161,7 +161,7 @@ class NativeIntegrator:
         new.reals[:head] = run.reals[:head]
         new.reals[here.z :] = run.reals[old.z :]
         new.counts[:] = run.counts
-        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.WATCHING]] = 0
+        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.WATCHING, Count.CRAWL]] = 0
         return new
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
@@ -381,6 +381,11 @@ class Integration:
         return float(self.reals[Real.TIME])
 
     @property
+    def stop(self) -> float:
+        """Time at which the run is complete, s."""
+        return float(self.course[2][-1])
+
+    @property
     def state(self) -> Vector:
         """State there, ``(n,)``: a view."""
         return self._vector(self.integrator.workspace.x, self.integrator.states)
@@ -420,10 +425,17 @@ class Integration:
     def weighted_errors(self) -> Vector:
         """Error of every state in the step tried last, over what is allowed, ``(n,)`` (adaptive methods)."""
         weights = np.array(self.integrator.tableau.error_row)
+        return self._weighted(weights @ self._stage_derivatives()[: weights.size])
+
+    def weighted_changes(self) -> Vector:
+        """By how much the derivative changed in the step tried last, as ``weighted_errors``, ``(n,)``."""
+        K = self._stage_derivatives()
+        return self._weighted(K[self.integrator.tableau.end_row] - K[0])
+
+    def _weighted(self, slope: Vector) -> Vector:
         after = self._vector(self.integrator.workspace.y, self.integrator.states)
         rtol, atol = self.reals[Real.RTOL], self.reals[Real.ATOL]
-        error = self.last_step * (weights @ self._stage_derivatives()[: weights.size])
-        return np.abs(error) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))
+        return np.abs(self.last_step * slope) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))
 
     def first_non_finite_stage(self) -> tuple[float, Vector]:
         """Time and state at which the derivative of the step tried last became NaN or infinite first."""

@@ -30,6 +30,16 @@ NEAR_BORDER = 0.97
 STIFF_LOOKS, CALM_LOOKS = 250, 6
 """So many looks that find a step bound by stability, 4000 steps, make the system stiff; so many in a row that
 do not make it calm again."""
+CRAWL_EVERY, CRAWL_BACK = 64, 8
+"""Steps between two looks (a power of two), and how many looks each takes back that finds nothing wrong."""
+CRAWL_LOOKS = {True: 2048, False: 512}
+"""Looks that make a run crawl, for explicit methods and others: some tenths of a second."""
+CRAWL_CHANGE, RESOLVED = 1000.0, 0.01
+"""What a step that is short for good reason changes at least, in tolerances: ``h |f(end) - f(start)|``. A jump of
+``f`` passes where it is below 1 over the least weight of the error, some hundreds; a smooth solution of rate L
+changes by ``(h L)^2 / rtol``, and ``RESOLVED`` is less than the least such square."""
+MOST_STEPS = 1e8
+"""A run that crawls is ended where it has more steps than these before it."""
 
 _ARGUMENTS = (
     "%reals",
@@ -60,6 +70,7 @@ _KEPT_COUNTS = (
     Count.WATCHED,
     Count.STIFF,
     Count.CALM,
+    Count.CRAWL,
 )
 
 
@@ -287,6 +298,7 @@ class Loop:
         w.place(accepted)
         if isinstance(step, ExplicitStep) and step.butcher.measures_stiffness:
             self.emit_stiffness_watch(step)
+        self.emit_crawl_watch(h)
         self.emit_next_length(w.multiply(h, w.minimum(ideal, w.get(growth))))
 
     def emit_stiffness_watch(self, step: ExplicitStep) -> None:
@@ -317,6 +329,42 @@ class Loop:
         w.branch(w.word_test("sge", w.get(calm, "i64"), str(CALM_LOOKS)), clear, on)
         w.place(clear)
         w.put("0", stiff, "i64")
+        w.place(on)
+
+    def emit_crawl_watch(self, h: str) -> None:
+        """Now and then, see whether steps stay short though next to nothing changes in them; end such a run.
+
+        Where equations jump without an event, such as a sign that answers itself, steps shrink until the jump
+        is within the tolerance, however good the method is. The same is seen where stability holds an explicit
+        method short. Steps that an end or ``max_step`` cuts say nothing.
+        """
+        w, step = self.w, self.step
+        crawl, change = self.counts[Count.CRAWL], [0.0] * (self.tableau.end_row + 1)
+        change[0], change[-1] = -1.0, 1.0
+        look, count, wrong, fine, on = (w.fresh(stem) for stem in ("crawl", "count", "wrong", "fine", "on"))
+        turn = w.word_op("and", w.get(self.counts[Count.ACCEPTED], "i64"), str(CRAWL_EVERY - 1))
+        w.branch(w.word_test("eq", turn, "0"), look, on)
+        w.place(look)
+        new_time = w.get(self.new_time)
+        free = w.both(w.compare("olt", new_time, w.get(self.end)), w.compare("olt", h, self.max_step))
+        w.branch(free, count, on)
+        w.place(count)
+        resolved = w.divide(number_text(RESOLVED), w.get(w.at("%reals", Real.RTOL)))
+        enough = w.minimum(number_text(CRAWL_CHANGE), resolved)
+        w.branch(w.compare("olt", step.norm(h, tuple(change)), enough), wrong, fine)
+        w.place(wrong)
+        w.increase(crawl)
+        far = w.compare("ogt", w.subtract(self.last_end, new_time), w.multiply(number_text(MOST_STEPS), h))
+        looks = CRAWL_LOOKS[isinstance(self.tableau, ButcherTableau)]
+        long = w.word_test("sge", w.get(crawl, "i64"), str(looks))
+        crawls = w.fresh("crawls")
+        w.branch(w.both(far, long), crawls, on)
+        w.place(crawls)
+        self.leave(Status.CRAWLING)
+        w.place(fine)
+        less = w.word_op("sub", w.get(crawl, "i64"), str(CRAWL_BACK))
+        w.put(w.let(f"select i1 {w.word_test('sgt', less, '0')}, i64 {less}, i64 0"), crawl, "i64")
+        w.jump(on)
         w.place(on)
 
     def emit_next_length(self, proposed: str) -> None:

@@ -101,21 +101,27 @@ class StepWriter(ABC):
     def extra_stages(self, time: str, h: str) -> None:
         """The stages that only the dense output needs; y keeps its value."""
 
+    def weighted(self, weights: Row) -> Callable[[str], str]:
+        """Elements of ``sum_j weights[j] K[j]`` over what is allowed in the step to y."""
+        w = self.w
+
+        def element(index: str) -> str:
+            before, after = (w.absolute(self.read(place, index)) for place in (self.x, self.y))
+            return w.divide(self.combination(weights, index), self.scale(w.maximum(before, after)))
+
+        return element
+
+    def norm(self, h: str, weights: Row) -> str:
+        """Weighted root-mean-square norm of ``h sum_j weights[j] K[j]``."""
+        return self.w.multiply(h, self.mean_square(self.weighted(weights)))
+
     def error_norm(self, h: str, error: Row) -> str:
         """Weighted root-mean-square norm of the error estimate of the step to y."""
         w, tableau = self.w, self.tableau
         stretched = tableau.stretched_error if isinstance(tableau, ButcherTableau) else None
-
-        def weighted(weights: Row) -> Callable[[str], str]:
-            def element(index: str) -> str:
-                before, after = (w.absolute(self.read(place, index)) for place in (self.x, self.y))
-                return w.divide(self.combination(weights, index), self.scale(w.maximum(before, after)))
-
-            return element
-
         if stretched is None:
-            return w.multiply(h, self.mean_square(weighted(error)))
-        e5, e3 = self.square(weighted(error)), self.square(weighted(stretched))
+            return self.norm(h, error)
+        e5, e3 = self.square(self.weighted(error)), self.square(self.weighted(stretched))
         denominator = w.square_root(w.multiply(w.fma(number_text(0.01), e3, e5), number_text(float(self.n))))
         norm = w.divide(w.multiply(h, e5), denominator)
         nothing = w.compare("oeq", denominator, number_text(0.0))

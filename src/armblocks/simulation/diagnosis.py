@@ -79,6 +79,8 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
         return _step_too_small(system, run)
     if run.status is Status.ENDLESS_EVENTS:
         return _endless_events(system, run)
+    if run.status is Status.CRAWLING:
+        return _crawling(system, run)
     time, state = run.first_non_finite_stage()
     point = run.point
     if not np.isfinite(run.trial_unknowns).all():
@@ -141,6 +143,21 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
     )
 
 
+def _crawling(system: CompiledSystem, run: Integration) -> SimulationError:
+    name = element_name(system.states, int(np.argmax(run.weighted_changes())))
+    left = (run.stop - run.time) / run.last_step
+    explicit = isinstance(run.integrator.tableau, ButcherTableau)
+    stiff = f"; if it is stiff, solver='{STIFF.name}'" if explicit else ""
+    return SimulationError(
+        f"the run crawls at {run.time:.6g} s with steps of {run.last_step:.2g} s, {left:.0e} more to go, for "
+        f"changes within the tolerance, of state '{name}' above all",
+        where=system.name,
+        allowed="equations that jump at events only",
+        fix=f"see whether a jump in what drives '{name}' answers itself, as dry friction or a sign in a formula: "
+        f"take a block that rests (ArmPlant, StickSlipFriction){stiff}",
+    )
+
+
 def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     """A sentence for a person where stability held the steps short, not accuracy; else empty.
 
@@ -155,7 +172,10 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     if x.size == 0:
         return ""
     slope = system.derivative(t, x, *rest)
-    size = 1e-7 * max(1.0, float(np.linalg.norm(x)))
+    with np.errstate(over="ignore"):
+        size = 1e-7 * max(1.0, float(np.linalg.norm(x)))
+    if not math.isfinite(size):
+        return ""
     direction = np.ones_like(x) + 0.1 * np.arange(x.size)
     rate = 0.0
     for _ in range(30):
