@@ -27,7 +27,7 @@ class Status(IntEnum):
     STOPPED = 7
     """A guard that ends the run is positive; what holds then is recorded."""
     CRAWLING = 8
-    """Steps so short that what changes in one is within the tolerance, and more to come than anybody awaits."""
+    """Steps so short that what changes in one is within the tolerance, and far more to come."""
 
 
 class Real(IntEnum):

@@ -35,9 +35,9 @@ CRAWL_EVERY, CRAWL_BACK = 64, 8
 CRAWL_LOOKS = {True: 2048, False: 512}
 """Looks that make a run crawl, for explicit methods and others: some tenths of a second."""
 CRAWL_CHANGE, RESOLVED = 1000.0, 0.01
-"""What a step that is short for good reason changes at least, in tolerances: ``h |f(end) - f(start)|``. A jump of
-``f`` passes where it is below 1 over the least weight of the error, some hundreds; a smooth solution of rate L
-changes by ``(h L)^2 / rtol``, and ``RESOLVED`` is less than the least such square."""
+"""What a step that is short for good reason changes at least, in tolerances: ``h |f(end) - f(start)|``. A
+jump of ``f`` passes where it is below 1 over the least weight of the error, some hundreds; a smooth solution
+of rate L changes by ``(h L)^2 / rtol``, and ``RESOLVED`` is less than the least such square."""
 MOST_STEPS = 1e8
 """A run that crawls is ended where it has more steps than these before it."""
 
@@ -335,8 +335,8 @@ class Loop:
         """Now and then, see whether steps stay short though next to nothing changes in them; end such a run.
 
         Where equations jump without an event, such as a sign that answers itself, steps shrink until the jump
-        is within the tolerance, however good the method is. The same is seen where stability holds an explicit
-        method short. Steps that an end or ``max_step`` cuts say nothing.
+        is within the tolerance, however good the method is. The same is seen where stability holds an
+        explicit method short. Steps that an end or ``max_step`` cuts say nothing.
         """
         w, step = self.w, self.step
         crawl, change = self.counts[Count.CRAWL], [0.0] * (self.tableau.end_row + 1)

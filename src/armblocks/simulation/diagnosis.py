@@ -153,8 +153,8 @@ def _crawling(system: CompiledSystem, run: Integration) -> SimulationError:
         f"changes within the tolerance, of state '{name}' above all",
         where=system.name,
         allowed="equations that jump at events only",
-        fix=f"see whether a jump in what drives '{name}' answers itself, as dry friction or a sign in a formula: "
-        f"take a block that rests (ArmPlant, StickSlipFriction){stiff}",
+        fix=f"see whether a jump in what drives '{name}' answers itself, as dry friction or a sign in a "
+        f"formula: take a block that rests (ArmPlant, StickSlipFriction){stiff}",
     )
 
 
