@@ -1,8 +1,10 @@
 """Run every measure beside the peers and write RESULTS.md.
 
-    python benchmarks/run.py [--quick] [--only dynamics,diagram,startup]
+    python benchmarks/run.py [--quick] [--only dynamics,diagram,simulations,startup,stiff]
 
-Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake). Peers and armblocks run in turn, in one run.
+Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake, bdsim, PathSim; the latter two in an
+environment of their own if you like, see `python_peers.py`). Peers and armblocks run in turn, in one run. With
+``--only`` the sections of the other parts stay as they are.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import paper_model
+import simulations
 import startup
 import stiff
 from measure import machine_lines, reachable_peak
@@ -104,6 +107,41 @@ def diagram_part(repeats: int) -> list[str]:
     ]
 
 
+def simulations_part(repeats: int) -> list[str]:
+    compared = [
+        [
+            row.what,
+            row.peer,
+            f"{row.theirs.median * 1e3:.1f} ms",
+            f"{row.ours.median * 1e3:.3f} ms",
+            f"{row.ratio:.0f} x",
+            f"{row.target:g} x" if row.target else "",
+            "" if not row.target else "met" if row.ratio >= row.target else "missed",
+            f"{row.difference:.0e}",
+        ]
+        for row in simulations.rows(repeats)
+    ]
+    lines = [
+        "## Whole simulations",
+        "",
+        *table(
+            ["what", "peer", "peer's time", "armblocks", "faster", "target", "", "ends differ by"], compared
+        ),
+        "",
+        *(simulations.__doc__ or "").strip().splitlines()[2:],
+        "",
+    ]
+    grown = simulations.growth(max(1, repeats // 3))
+    head = ["chain", "build", "trace", "compile", "run 10 s", "all, s", "median of turns, s"]
+    return [
+        *lines,
+        *table(head, grown),
+        "",
+        "Seconds, each in a new process without a cache, the best of the turns. `mixed`: gains, first-order "
+        "transfer functions, unit delays at 10 ms, saturations in turn.",
+    ]
+
+
 def startup_part(repeats: int) -> list[str]:
     numpy, armblocks = startup.imports(3 * repeats)
     cold, warm = startup.first_result(repeats)
@@ -133,9 +171,23 @@ def startup_part(repeats: int) -> list[str]:
 PARTS = {
     "dynamics": dynamics_part,
     "diagram": diagram_part,
-    "startup": startup_part,
+    "simulations": simulations_part,
     "stiff": stiff.stiff_part,
+    "startup": startup_part,
 }
+
+
+def replaced(text: str, section: Sequence[str]) -> str:
+    """``text`` with the section of that heading replaced, or added."""
+    parts = text.split("\n## ")
+    heading = section[0].removeprefix("## ")
+    body = "\n".join([heading, *section[1:]]).rstrip() + "\n"
+    places = [k for k, part in enumerate(parts) if part.split("\n")[0] == heading]
+    if places:
+        parts[places[0]] = body
+    else:
+        parts.append(body)
+    return "\n## ".join(parts)
 
 
 def main() -> None:
@@ -144,25 +196,28 @@ def main() -> None:
     parser.add_argument("--only", default=",".join(PARTS), help="parts, separated by commas")
     arguments = parser.parse_args()
     repeats = 3 if arguments.quick else 15
-    lines = [
-        "# Measured",
-        "",
-        f"{datetime.date.today().isoformat()}, by `python benchmarks/run.py`.",
-        "",
-        *[
-            f"- {line}"
-            for line in machine_lines(["armblocks", "numpy", "casadi", "llvmlite", "pin", "drake"])
-        ],
-    ]
-    for name in arguments.only.split(","):
-        lines += ["", *PARTS[name](repeats)]
-    notes = HERE / "NOTES.md"
-    if notes.exists():
-        lines += ["", notes.read_text().rstrip()]
-    text = "\n".join(lines) + "\n"
-    print(text)
-    if not arguments.quick and set(arguments.only.split(",")) == set(PARTS):
-        (HERE / "RESULTS.md").write_text(text)
+    names = arguments.only.split(",")
+    machine = machine_lines(["armblocks", "numpy", "casadi", "llvmlite", "pin", "drake"])
+    today = datetime.date.today().isoformat()
+    sections = {name: PARTS[name](repeats) for name in names}
+    for section in sections.values():
+        print("\n".join(section), "\n")
+    if arguments.quick:
+        return
+    results = HERE / "RESULTS.md"
+    if set(names) == set(PARTS) or not results.exists():
+        lines = ["# Measured", "", f"{today}, by `python benchmarks/run.py`.", ""]
+        lines += [f"- {line}" for line in machine]
+        for section in sections.values():
+            lines += ["", *section]
+        text = "\n".join(lines) + "\n\n" + (HERE / "NOTES.md").read_text().rstrip() + "\n"
+    else:
+        text = results.read_text().split("\n## What was missed")[0].rstrip() + "\n"
+        for section in sections.values():
+            told = ["", f"Measured alone on {today}: {machine[-1]}."]
+            text = replaced(text, [*section, *told])
+        text += "\n" + (HERE / "NOTES.md").read_text().rstrip() + "\n"
+    results.write_text(text)
 
 
 if __name__ == "__main__":

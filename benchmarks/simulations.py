@@ -1,0 +1,353 @@
+"""Whole simulations beside Drake, bdsim and PathSim, and how diagrams of many blocks grow.
+
+Computed torque: the shipped `puma560_computed_torque`; bdsim does the same with Robotics Toolbox blocks (its
+inverse dynamics in C), Drake with InverseDynamicsController, TrajectorySource and MultibodyPlant, all native.
+Van der Pol: the shipped `van_der_pol_pid`, 100 s; in Drake the plant is a SymbolicVectorSystem. All runs are
+adaptive, of order 5, at rtol 1e-6 (Drake: accuracy 1e-6), without compile; ours record 1001 and 2001 instants
+of all signals. Five blocks: step, sum, gain and two integrators, 10 s in steps of 1 ms; RK4 but for bdsim,
+which has only SciPy's adaptive methods and is held to steps of 1 ms of 5(4), and Drake (runge_kutta3, fixed).
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from measure import Timing, in_turn
+from urdf import to_urdf
+
+import armblocks as ab
+from armblocks.blocks import Gain, Integrator, Step, Sum
+
+HERE = Path(__file__).parent
+QF = np.array([0.5, 0.9, -0.8, 0.6, -0.4, 1.0])
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of one tool: seconds without compile, steps, and the values it ends with."""
+
+    seconds: float
+    steps: int
+    final: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Row:
+    what: str
+    peer: str
+    theirs: Timing
+    ours: Timing
+    target: float
+    difference: float
+    """Largest difference of the ends of both."""
+
+    @property
+    def ratio(self) -> float:
+        return self.ours.times_faster_than(self.theirs)
+
+
+class PythonPeers:
+    """bdsim and PathSim in their own process: see `python_peers.py`."""
+
+    def __init__(self) -> None:
+        python = os.environ.get("ARMBLOCKS_PEERS", sys.executable)
+        self._process = subprocess.Popen(
+            [python, str(HERE / "python_peers.py")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+
+    def run(self, tool: str, model: str) -> Run:
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.write(f"{tool} {model}\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        if not line:
+            raise SystemExit("bdsim and PathSim are not there: see benchmarks/python_peers.py")
+        return Run(**json.loads(line))
+
+    def close(self) -> None:
+        self._process.terminate()
+
+
+def drake_computed_torque() -> Run:
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.polynomial import Polynomial
+    from pydrake.systems.controllers import InverseDynamicsController
+    from pydrake.systems.framework import DiagramBuilder
+    from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
+    from pydrake.trajectories import PiecewisePolynomial
+
+    robot = ab.load_robot("puma560").robot
+
+    def plant() -> MultibodyPlant:
+        result = MultibodyPlant(0.0)
+        Parser(result).AddModelsFromString(to_urdf(robot), "urdf")
+        result.WeldFrames(result.world_frame(), result.GetFrameByName("base"))
+        for number, link in enumerate(robot.links, start=1):
+            actuator = result.AddJointActuator(f"a{number}", result.GetJointByName(f"j{number}"))
+            actuator.set_default_rotor_inertia(link.motor.inertia)
+            actuator.set_default_gear_ratio(link.motor.gear_ratio)
+        result.Finalize()
+        return result
+
+    T = 10.0
+    rows = [[Polynomial([0, 0, 0, 10 * d / T**3, -15 * d / T**4, 6 * d / T**5])] for d in QF]
+    path = PiecewisePolynomial([np.array(rows)], [0.0, T])
+    builder, model = DiagramBuilder(), plant()
+    arm = builder.AddSystem(plant())
+    state = builder.AddSystem(TrajectorySource(path, 1))
+    acceleration = builder.AddSystem(TrajectorySource(path.derivative(2), 0))
+    gains = np.full(6, 100.0), np.zeros(6), np.full(6, 20.0)
+    control = builder.AddSystem(InverseDynamicsController(model, *gains, True))
+    builder.Connect(state.get_output_port(), control.get_input_port_desired_state())
+    builder.Connect(acceleration.get_output_port(), control.get_input_port_desired_acceleration())
+    builder.Connect(arm.get_state_output_port(), control.get_input_port_estimated_state())
+    builder.Connect(control.GetOutputPort("generalized_force"), arm.get_actuation_input_port())
+    LogVectorOutput(arm.get_state_output_port(), builder, 0.01)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    start = np.concatenate([np.full(6, 0.1), np.zeros(6)])
+    own = arm.GetMyMutableContextFromRoot(context)
+    arm.SetPositionsAndVelocities(own, start)
+    return _drake_run(diagram, context, T, "runge_kutta5", 1e-6, 0.1)
+
+
+def drake_van_der_pol() -> Run:
+    from pydrake.symbolic import MakeVectorVariable
+    from pydrake.systems.framework import DiagramBuilder
+    from pydrake.systems.primitives import (
+        Adder,
+        Demultiplexer,
+        Gain,
+        Integrator,
+        LogVectorOutput,
+        Sine,
+        SymbolicVectorSystem,
+    )
+
+    builder = DiagramBuilder()
+    wave, error = builder.AddSystem(Sine(1.0, 2 * np.pi * 0.1, 0.0, 1)), builder.AddSystem(Adder(2, 1))
+    minus, kp, kd = (builder.AddSystem(Gain(gain, 1)) for gain in (-1.0, 2.0, -0.5))
+    integral, ki = builder.AddSystem(Integrator(1)), builder.AddSystem(Gain(0.5, 1))
+    u = builder.AddSystem(Adder(3, 1))
+    x, v = MakeVectorVariable(2, "x"), MakeVectorVariable(1, "u")
+    rates = [x[1], (1 - x[0] * x[0]) * x[1] - x[0] + v[0]]
+    plant = builder.AddSystem(SymbolicVectorSystem(state=x, input=v, dynamics=rates, output=[x[0], x[1]]))
+    split = builder.AddSystem(Demultiplexer(2, 1))
+
+    def wire(source: Any, target: Any, entry: int = 0, port: int = 0) -> None:
+        builder.Connect(source.get_output_port(port), target.get_input_port(entry))
+
+    wire(wave, error, 0)
+    wire(plant, split)
+    wire(split, minus)
+    wire(minus, error, 1)
+    wire(error, kp)
+    wire(error, integral)
+    wire(integral, ki)
+    wire(split, kd, 0, 1)
+    wire(kp, u, 0)
+    wire(ki, u, 1)
+    wire(kd, u, 2)
+    wire(u, plant)
+    LogVectorOutput(split.get_output_port(0), builder, 0.05)
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    plant.GetMyMutableContextFromRoot(context).SetContinuousState([1.0, 0.0])
+    run = _drake_run(diagram, context, 100.0, "runge_kutta5", 1e-6, 1.0)
+    return Run(run.seconds, run.steps, plant_end(plant, context))
+
+
+def plant_end(plant: Any, context: Any) -> list[float]:
+    own = plant.GetMyContextFromRoot(context)
+    return own.get_continuous_state_vector().CopyToVector().tolist()
+
+
+def drake_five_blocks() -> Run:
+    from pydrake.systems.framework import DiagramBuilder
+    from pydrake.systems.primitives import Adder, ConstantVectorSource, Gain, Integrator
+
+    builder = DiagramBuilder()
+    step, total = builder.AddSystem(ConstantVectorSource([1.0])), builder.AddSystem(Adder(3, 1))
+    gain, less, speed_less = (builder.AddSystem(Gain(k, 1)) for k in (4.0, -1.0, -1.0))
+    speed, place = builder.AddSystem(Integrator(1)), builder.AddSystem(Integrator(1))
+    builder.Connect(step.get_output_port(), total.get_input_port(0))
+    builder.Connect(place.get_output_port(), less.get_input_port())
+    builder.Connect(speed.get_output_port(), speed_less.get_input_port())
+    builder.Connect(less.get_output_port(), total.get_input_port(1))
+    builder.Connect(speed_less.get_output_port(), total.get_input_port(2))
+    builder.Connect(total.get_output_port(), gain.get_input_port())
+    builder.Connect(gain.get_output_port(), speed.get_input_port())
+    builder.Connect(speed.get_output_port(), place.get_input_port())
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    run = _drake_run(diagram, context, 10.0, "runge_kutta3", None, 1e-3)
+    return Run(run.seconds, run.steps, [*plant_end(place, context), *plant_end(speed, context)])
+
+
+def _drake_run(
+    diagram: Any, context: Any, stop: float, method: str, accuracy: float | None, longest: float
+) -> Run:
+    from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+
+    simulator = Simulator(diagram, context)
+    ResetIntegratorFromFlags(simulator, method, longest)
+    integrator = simulator.get_mutable_integrator()
+    if accuracy is None:
+        integrator.set_fixed_step_mode(True)
+    else:
+        integrator.set_target_accuracy(accuracy)
+    simulator.Initialize()
+    begin = time.perf_counter()
+    simulator.AdvanceTo(stop)
+    seconds = time.perf_counter() - begin
+    final = context.get_continuous_state_vector().CopyToVector().tolist()
+    return Run(seconds, integrator.get_num_steps_taken(), final)
+
+
+def five_blocks() -> ab.Diagram:
+    builder = ab.DiagramBuilder("five blocks")
+    total = builder.add("total", Sum(signs="+--"), builder.add("step", Step(time=0.0, final=1.0)))
+    speed = builder.add("speed", Integrator(), builder.add("gain", Gain(gain=4.0), total))
+    place = builder.add("place", Integrator(), speed)
+    builder.connect(place, total["u2"])
+    builder.connect(speed, total["u3"])
+    return builder.build()
+
+
+FIXED = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
+
+
+def rows(repeats: int) -> list[Row]:
+    """Every comparison, turn by turn: A B C A B C …"""
+    logging.getLogger("drake").setLevel(logging.ERROR)
+    peers = PythonPeers()
+    torque, oscillator, five = (
+        ab.load_diagram("puma560_computed_torque"),
+        ab.load_diagram("van_der_pol_pid"),
+        five_blocks(),
+    )
+    cases: list[tuple[str, Callable[[], ab.SimulationResult], Sequence[str], list[Any]]] = [
+        (
+            "computed torque Puma 560, 10 s",
+            lambda: ab.simulate(torque),
+            ("arm/q",),
+            [
+                ("Drake, native systems", drake_computed_torque, 40.0, slice(0, 6)),
+                ("bdsim", lambda: peers.run("bdsim", "computed_torque"), 400.0, slice(0, 6)),
+            ],
+        ),
+        (
+            "van der Pol and PID, 100 s",
+            lambda: ab.simulate(oscillator),
+            ("x1",),
+            [
+                ("Drake, native systems", drake_van_der_pol, 80.0, slice(0, 1)),
+                ("bdsim", lambda: peers.run("bdsim", "van_der_pol"), 1500.0, slice(2, 3)),
+                ("PathSim", lambda: peers.run("pathsim", "van_der_pol"), 1500.0, slice(0, 1)),
+            ],
+        ),
+        (
+            "five blocks, 10 s in 10 000 steps",
+            lambda: ab.simulate(five, **FIXED),
+            ("place", "speed"),
+            [
+                ("PathSim", lambda: peers.run("pathsim", "five_blocks"), 0.0, [0, 1]),
+                ("bdsim", lambda: peers.run("bdsim", "five_blocks"), 0.0, [1, 0]),
+                ("Drake", drake_five_blocks, 0.0, [0, 1]),
+            ],
+        ),
+    ]
+    found: list[Row] = []
+    for what, ours, names, others in cases:
+        result = ours()
+        end = np.concatenate([np.ravel(result[name][-1]) for name in names])
+        times: list[list[float]] = [[] for _ in others]
+        mine: list[float] = []
+        worst = [0.0] * len(others)
+        for _ in range(repeats):
+            for k, (_, peer, _, part) in enumerate(others):
+                run = peer()
+                times[k].append(run.seconds)
+                worst[k] = max(worst[k], float(np.abs(np.asarray(run.final)[part] - end).max()))
+            mine += in_turn([ours], 1)[0].turns
+        found += [
+            Row(what, peer, Timing(tuple(times[k])), Timing(tuple(mine)), target, worst[k])
+            for k, (peer, _, target, _) in enumerate(others)
+        ]
+    peers.close()
+    return found
+
+
+GROWTH = """
+import json, sys, time
+import armblocks as ab
+from armblocks.blocks import Gain, Integrator, Saturation, Scope, SineWave, TransferFunction, UnitDelay
+count, kinds = int(sys.argv[1]), sys.argv[2]
+make = {
+    "gains": [lambda: Gain(gain=0.99)],
+    "mixed": [
+        lambda: Gain(gain=0.99),
+        lambda: TransferFunction(numerator=[1.0], denominator=[1.0, 1.0]),
+        lambda: UnitDelay(sample_time=0.01),
+        lambda: Saturation(lower=-0.9, upper=0.9),
+    ],
+}[kinds]
+times = [time.perf_counter()]
+builder = ab.DiagramBuilder("chain")
+last = builder.add("source", SineWave())
+for k in range(count):
+    last = builder.add(f"b{k}", make[k % len(make)](), last)
+builder.add("scope", Scope(), last)
+model = ab.CompiledDiagram(builder.build())
+times.append(time.perf_counter())
+model.system
+times.append(time.perf_counter())
+result = model.simulate()
+times.append(time.perf_counter())
+spent = [b - a for a, b in zip(times, times[1:])]
+print(json.dumps([spent[0], spent[1], spent[2] - result.run.wall_time, result.run.wall_time]))
+"""
+
+
+def growth(repeats: int, counts: Sequence[int] = (10, 100, 1000, 10_000)) -> list[list[str]]:
+    """Seconds to build, trace, compile and run chains of blocks, each in a new process without a cache."""
+    table: list[list[str]] = []
+    for kinds in ("gains", "mixed"):
+        for count in counts:
+            turns: list[list[float]] = []
+            for _ in range(repeats if count <= 1000 else max(1, repeats // 3)):
+                done = subprocess.run(
+                    [sys.executable, "-c", GROWTH, str(count), kinds],
+                    env={**os.environ, "ARMBLOCKS_CACHE_DIR": ""},
+                    capture_output=True,
+                    text=True,
+                    check=True,
+                )
+                turns.append(json.loads(done.stdout))
+            best = min(turns, key=sum)
+            typical = statistics.median(map(sum, turns))
+            table.append(
+                [
+                    f"{count:,} blocks, {kinds}",
+                    *(f"{part:.3f}" for part in best),
+                    f"{sum(best):.2f}",
+                    f"{typical:.2f}",
+                ]
+            )
+    return table
