@@ -3,8 +3,8 @@
     python benchmarks/run.py [--quick] [--only dynamics,diagram,simulations,startup,stiff]
 
 Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake, bdsim, PathSim; the latter two in an
-environment of their own if you like, see `python_peers.py`). Peers and armblocks run in turn, in one run. With
-``--only`` the sections of the other parts stay as they are.
+environment of their own if you like, see `python_peers.py`). Peers and armblocks run in turn, in one run.
+With ``--only`` the sections of the other parts stay as they are.
 """
 
 from __future__ import annotations

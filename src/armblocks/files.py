@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 from pathlib import Path
+from typing import BinaryIO
 
 from armblocks.errors import FormatError
 
@@ -23,20 +24,8 @@ def write_atomically(path: str | Path, data: bytes) -> None:
     Raises ``FormatError`` where the folder is missing, is not a folder or cannot be written, where ``path``
     is a folder, and where the disk refuses the data. The old file is then still whole.
     """
-    if "\0" in str(path):
-        raise FormatError("the path holds a NUL character", where=repr(str(path)), fix="choose another name")
-    target = Path(os.path.realpath(path))
+    target = _writable_target(path)
     folder = target.parent
-    if not folder.is_dir():
-        raise FormatError(
-            f"the folder '{folder}' does not exist",
-            where=str(path),
-            fix="create the folder, or choose another",
-        )
-    if target.is_dir():
-        raise FormatError(
-            "a folder stands where the file should go", where=str(path), fix="choose another name"
-        )
     temporary = folder / f".{target.name[:64]}.{secrets.token_hex(6)}.tmp"
     try:
         _write_through(temporary, data)
@@ -45,14 +34,49 @@ def write_atomically(path: str | Path, data: bytes) -> None:
         temporary.replace(target)
         _sync_folder(folder)
     except OSError as error:
-        raise FormatError(
-            f"the file cannot be written ({error.strerror or error})",
-            where=str(path),
-            fix="check the folder's permissions and free space; a file that was there is unchanged",
-        ) from error
+        raise _cannot_write(str(path), error) from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+class GrowingFile:
+    """A file that is written bit by bit, beside its place, and takes its name when it is complete.
+
+    Until then an older file of that name stays as it is. Raises ``FormatError`` as
+    :func:`write_atomically` does.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self._shown = str(path)
+        self._target = _writable_target(path)
+        name = f".{self._target.name[:64]}.{secrets.token_hex(6)}.part"
+        self._temporary = self._target.parent / name
+        try:
+            self.stream: BinaryIO = self._temporary.open("xb")
+        except OSError as error:
+            raise _cannot_write(self._shown, error) from error
+
+    def finish(self) -> None:
+        """All is written: the file gets its name."""
+        try:
+            self.stream.flush()
+            os.fsync(self.stream.fileno())
+            self.stream.close()
+            if self._target.exists():
+                self._temporary.chmod(self._target.stat().st_mode & 0o7777)
+            self._temporary.replace(self._target)
+            _sync_folder(self._target.parent)
+        except OSError as error:
+            self.abandon()
+            raise _cannot_write(self._shown, error) from error
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        with contextlib.suppress(OSError):
+            self.stream.close()
+        with contextlib.suppress(OSError):
+            self._temporary.unlink(missing_ok=True)
 
 
 def read_bounded(path: str | Path, limit: int) -> bytes:
@@ -101,3 +125,30 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _writable_target(path: str | Path) -> Path:
+    """Where a file of that name goes: its target, where it is a link."""
+    if "\0" in str(path):
+        raise FormatError("the path holds a NUL character", where=repr(str(path)), fix="choose another name")
+    target = Path(os.path.realpath(path))
+    folder = target.parent
+    if not folder.is_dir():
+        raise FormatError(
+            f"the folder '{folder}' does not exist",
+            where=str(path),
+            fix="create the folder, or choose another",
+        )
+    if target.is_dir():
+        raise FormatError(
+            "a folder stands where the file should go", where=str(path), fix="choose another name"
+        )
+    return target
+
+
+def _cannot_write(path: str, error: OSError) -> FormatError:
+    return FormatError(
+        f"the file cannot be written ({error.strerror or error})",
+        where=path,
+        fix="check the folder's permissions and free space; a file that was there is unchanged",
+    )

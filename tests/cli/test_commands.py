@@ -155,3 +155,15 @@ def test_what_is_beyond_a_limit_stands_out(invoke: Invoke) -> None:
     result = invoke("run", "kr180model", "--no-figures", "--set", f"{motion}.qf=[3.5 0 1.57 0]")
     assert result.exit_code == 0
     assert "! joint 'link1' leaves its range" in result.stdout
+
+
+def test_a_run_is_logged_while_it_goes_on(
+    invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import pyarrow.parquet as pq
+
+    monkeypatch.chdir(tmp_path)
+    arguments = ["run", "van_der_pol_pid", "--stop-time", "5", "--log", "all.parquet", "--no-figures"]
+    result = invoke(*arguments, "--log-signals", "x1, x2")
+    assert result.exit_code == 0, result.output
+    assert pq.read_table("all.parquet").column_names == ["time", "x1/y", "x2/y"]

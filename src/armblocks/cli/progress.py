@@ -12,6 +12,8 @@ from armblocks.cli.terminal import ACCENT
 
 _FIRST_LINE, _LINE_EVERY = 0.5, 5.0
 """Seconds until the first plain line, and from one to the next; a short run has none."""
+_WORTH_TELLING = 2.0
+"""Seconds from which on a person is told how long the rest takes."""
 
 
 class RunProgress:
@@ -20,6 +22,7 @@ class RunProgress:
     def __init__(self, name: str, console: Console) -> None:
         self._name = name
         self._console = console
+        self._began = time.perf_counter()
         self._next_line = time.perf_counter() + _FIRST_LINE
         self._bar: Progress | None = None
         self._task: TaskID | None = None
@@ -47,8 +50,18 @@ class RunProgress:
         reached = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
         where = f"t = {reached} s, {real_time_factor:,.0f} x real time"
         now = time.perf_counter()
+        left = (now - self._began) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
+        if left >= _WORTH_TELLING:
+            where += f", {_duration(left)} left"
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, total=1.0, completed=fraction, where=where)
         elif now >= self._next_line and fraction < 1.0:
             self._next_line = now + _LINE_EVERY
             self._console.print(f"{self._name}: {where} ({fraction:.0%})")
+
+
+def _duration(seconds: float) -> str:
+    """A rough time for a person: ``40 s``, ``3 min``, ``1.5 h``."""
+    if seconds < 100.0:
+        return f"about {seconds:.0f} s"
+    return f"about {seconds / 60.0:.0f} min" if seconds < 6000.0 else f"about {seconds / 3600.0:.1f} h"

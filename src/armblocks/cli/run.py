@@ -46,6 +46,13 @@ def run(
     save_state: Annotated[
         Path | None, typer.Option(help="Save the final state in this .npz file, to go on from it later.")
     ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(help="Write all recorded instants to this .parquet or .csv file while the run goes on."),
+    ] = None,
+    log_signals: Annotated[
+        str | None, typer.Option(help="Only these signals, separated by commas.", show_default="all")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the report.", show_default="MODEL-report")
     ] = None,
@@ -76,7 +83,8 @@ def run(
     )
     sink_files(diagram, REPORT_DATA)  # refused before the run rather than after it
     folder = _writable_folder(out or Path(f"{diagram.name}-report"))
-    settings.update(parameters=parameters, initial_state=from_state)
+    signals = [name.strip() for name in log_signals.split(",")] if log_signals else []
+    settings.update(parameters=parameters, initial_state=from_state, log=log, log_signals=signals)
     result, failure = _simulate(diagram, settings)
     with warnings.catch_warnings():
         # The summary below says every limit that is broken; once is enough.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from armblocks.errors import UnknownNameError
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
-from armblocks.simulation import RunState, Simulation, SimulationResult
+from armblocks.simulation import LogRequest, RunState, Simulation, SimulationResult
 from armblocks.simulation.plan import changed_parameters
 from armblocks.simulation.simulate import Progress, run_to_the_end
 
@@ -49,11 +50,12 @@ class CompiledDiagram:
         parameters: Mapping[str, object] | None = None,
         progress: Progress | None = None,
         initial_state: RunState | None = None,
+        log: LogRequest | None = None,
     ) -> SimulationResult:
         """Run once; see :func:`simulate`."""
         tuned, values = self._tuned(parameters)
         options = options or tuned.diagram.settings
-        result = run_to_the_end(Simulation(tuned.compiled, options, values, initial_state), progress)
+        result = run_to_the_end(Simulation(tuned.compiled, options, values, initial_state, log), progress)
         if tuned._watch is None:
             tuned._watch = LimitWatch(tuned.diagram, result)
         tuned._watch.warn(result)
@@ -65,12 +67,13 @@ class CompiledDiagram:
         *,
         parameters: Mapping[str, object] | None = None,
         initial_state: RunState | None = None,
+        log: LogRequest | None = None,
     ) -> DiagramRun:
         """Begin a run; see :func:`begin`."""
         tuned, values = self._tuned(parameters)
         diagram = with_parameters(self.diagram, parameters) if parameters else self.diagram
         options = options or diagram.settings
-        return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state))
+        return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state, log))
 
     def _tuned(
         self, parameters: Mapping[str, object] | None
@@ -123,6 +126,8 @@ def simulate(
     parameters: Mapping[str, object] | None = None,
     progress: Progress | None = None,
     initial_state: RunState | OperatingPoint | str | PathLike[str] | None = None,
+    log: str | PathLike[str] | None = None,
+    log_signals: Sequence[str] = (),
     **settings: Any,
 ) -> SimulationResult:
     """Run a diagram and return its recorded signals.
@@ -134,7 +139,9 @@ def simulate(
     real_time_factor)`` is called now and then during a long run. ``initial_state``: another run's
     ``final_state``, or the file that its ``save`` wrote; the run goes on from there to ``stop_time``, bit for
     bit as if the other had not ended where nothing else is changed. Or an operating point, such as ``trim``
-    finds: the run begins there, at its time.
+    finds: the run begins there, at its time. ``log``: a ``.parquet`` or ``.csv`` file to which all signals,
+    or the ``log_signals``, are written while the run goes on; memory stays flat however long it is, and the
+    result holds the rows that show all extremes.
 
     Raises InputError for a setting out of range, UnknownNameError for an unknown one, SimulationError (with
     the ``partial`` result) where the run cannot go on.
@@ -145,7 +152,13 @@ def simulate(
     if initial_state is not None and not isinstance(initial_state, RunState):
         initial_state = RunState.load(initial_state)
     options = _options(model, settings, "simulate")
-    return model.simulate(options, parameters=parameters, progress=progress, initial_state=initial_state)
+    return model.simulate(
+        options,
+        parameters=parameters,
+        progress=progress,
+        initial_state=initial_state,
+        log=_log_request(log, log_signals),
+    )
 
 
 def begin(
@@ -153,6 +166,8 @@ def begin(
     *,
     parameters: Mapping[str, object] | None = None,
     initial_state: RunState | str | PathLike[str] | None = None,
+    log: str | PathLike[str] | None = None,
+    log_signals: Sequence[str] = (),
     **settings: Any,
 ) -> DiagramRun:
     """Begin a run of a diagram that can be paused, looked at and tuned: nothing happens before ``advance``.
@@ -163,7 +178,16 @@ def begin(
     if initial_state is not None and not isinstance(initial_state, RunState):
         initial_state = RunState.load(initial_state)
     options = _options(model, settings, "begin")
-    return model.begin(options, parameters=parameters, initial_state=initial_state)
+    return model.begin(
+        options,
+        parameters=parameters,
+        initial_state=initial_state,
+        log=_log_request(log, log_signals),
+    )
+
+
+def _log_request(log: str | PathLike[str] | None, signals: Sequence[str]) -> LogRequest | None:
+    return None if log is None else LogRequest(path=Path(log), signals=tuple(signals))
 
 
 def _options(model: CompiledDiagram, settings: Mapping[str, Any], where: str) -> SimulationOptions:

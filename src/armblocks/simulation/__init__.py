@@ -1,5 +1,6 @@
 """Runs compiled systems: integrators as tables, one call to simulate, results with names and units."""
 
+from armblocks.simulation.plan import LogRequest
 from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult
 from armblocks.simulation.run_state import RunState
 from armblocks.simulation.simulate import simulate
@@ -8,6 +9,7 @@ from armblocks.simulation.tableaux import TABLEAUX, find_tableau
 
 __all__ = [
     "TABLEAUX",
+    "LogRequest",
     "ParameterChange",
     "RunReport",
     "RunState",

@@ -18,16 +18,18 @@ import csv
 import io
 import json
 import re
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armblocks.errors import UnknownNameError
-from armblocks.files import write_atomically
+from armblocks.files import GrowingFile, write_atomically
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,13 +38,16 @@ if TYPE_CHECKING:
     from armblocks.simulation.result import SimulationResult
 
 
+Array = NDArray[np.float64]
+
+
 def to_dataframe(result: SimulationResult) -> pd.DataFrame:
     """Index ``time`` in s, one column for each scalar; ``attrs`` holds how the run went."""
     import pandas as pd
 
     index = pd.Index(result.time, name="time")
     frame = pd.DataFrame(result.signals.T, index=index, columns=list(result.columns()))
-    frame.attrs.update(_description(result))
+    frame.attrs.update(description_of(result))
     return frame
 
 
@@ -55,7 +60,8 @@ def save(result: SimulationResult, path: str | PathLike[str]) -> None:
     write_atomically(place, write(result))
 
 
-def _description(result: SimulationResult) -> dict[str, Any]:
+def description_of(result: SimulationResult) -> dict[str, Any]:
+    """How the run went, in plain values."""
     parameters = {name: value.tolist() for name, value in result.parameters.items()}
     return {
         "name": result.name,
@@ -88,7 +94,7 @@ def _table(result: SimulationResult) -> pa.Table:
     import pyarrow as pa
 
     names = ["time", *result.columns()]
-    metadata = {"armblocks": json.dumps(_description(result))}
+    metadata = {"armblocks": json.dumps(description_of(result))}
     arrays = [pa.array(result.time), *(pa.array(np.ascontiguousarray(row)) for row in result.signals)]
     return pa.table(arrays, names=names, metadata=metadata)
 
@@ -96,7 +102,7 @@ def _table(result: SimulationResult) -> pa.Table:
 def _npz(result: SimulationResult) -> bytes:
     buffer = io.BytesIO()
     arrays = {name: result[name] for name in result.names}
-    description = np.array(json.dumps(_description(result)))
+    description = np.array(json.dumps(description_of(result)))
     np.savez_compressed(buffer, allow_pickle=False, time=result.time, run=description, **arrays)
     return buffer.getvalue()
 
@@ -145,3 +151,79 @@ _WRITERS: dict[str, Callable[[SimulationResult], bytes]] = {
     ".npz": _npz,
     ".mat": _mat,
 }
+
+# Files that grow while a run goes on.
+
+
+class LogFile(ABC):
+    """A table that is written piece by piece; it is there under its name when it is complete."""
+
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        self.columns = ("time", *columns)
+        self._file = GrowingFile(path)
+
+    def append(self, time: Array, signals: Array) -> None:
+        """Add instants, ``(N,)`` s, with their values ``(count of columns, N)``."""
+        import pyarrow as pa
+
+        arrays = [pa.array(np.ascontiguousarray(row)) for row in (time, *signals)]
+        self._append(pa.table(arrays, names=self.columns))
+
+    def finish(self, description: Mapping[str, Any]) -> None:
+        """Complete the file; ``description`` says how the run went, where the format has a place for it."""
+        self._close(description)
+        self._file.finish()
+
+    def abandon(self) -> None:
+        """Leave nothing behind."""
+        self._file.abandon()
+
+    @abstractmethod
+    def _append(self, table: pa.Table) -> None: ...
+
+    @abstractmethod
+    def _close(self, description: Mapping[str, Any]) -> None: ...
+
+
+class _CsvLog(LogFile):
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        super().__init__(path, columns)
+        head = io.StringIO()
+        csv.writer(head, lineterminator="\n").writerow(self.columns)
+        self._file.stream.write(head.getvalue().encode())
+
+    def _append(self, table: pa.Table) -> None:
+        from pyarrow import csv as arrow_csv
+
+        arrow_csv.write_csv(table, self._file.stream, arrow_csv.WriteOptions(include_header=False))
+
+    def _close(self, description: Mapping[str, Any]) -> None:
+        pass
+
+
+class _ParquetLog(LogFile):
+    def __init__(self, path: Path, columns: Sequence[str]) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        super().__init__(path, columns)
+        schema = pa.schema([(name, pa.float64()) for name in self.columns])
+        self._writer = pq.ParquetWriter(self._file.stream, schema)
+
+    def _append(self, table: pa.Table) -> None:
+        self._writer.write_table(table)
+
+    def _close(self, description: Mapping[str, Any]) -> None:
+        self._writer.add_key_value_metadata({"armblocks": json.dumps(description)})
+        self._writer.close()
+
+
+_LOGS: dict[str, type[LogFile]] = {".csv": _CsvLog, ".parquet": _ParquetLog}
+
+
+def open_log(path: Path, columns: Sequence[str]) -> LogFile:
+    """A new log in the format of its suffix. Raises ``UnknownNameError`` and ``FormatError``."""
+    kind = _LOGS.get(path.suffix.lower())
+    if kind is None:
+        raise UnknownNameError("log file type", path.suffix or path.name, list(_LOGS), where=str(path))
+    return kind(path, columns)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,14 @@ MOST_NUMBERS = 500_000_000
 """Recorded doubles of one run, 4 GB: beyond it the computer would suffer before the run does."""
 SMALLEST_RTOL = 1e-13
 """Below it the rounding of doubles decides, not the method."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogRequest:
+    """Write a run to ``path`` (``.parquet`` or ``.csv``) while it goes on: these ``signals``, or all."""
+
+    path: Path
+    signals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +95,13 @@ class Plan:
     max_step: float
 
 
-def make_plan(system: CompiledSystem, options: SimulationOptions, start: float = 0.0) -> Plan:
+def make_plan(
+    system: CompiledSystem, options: SimulationOptions, start: float = 0.0, *, logged: bool = False
+) -> Plan:
     """Settle every open choice of ``options`` for a run that begins at ``start``.
 
-    Raises ``InputError`` for values that cannot be run.
+    A run that is ``logged`` to a file may record as much as it likes. Raises ``InputError`` for values that
+    cannot be run.
     """
     stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
     if start > 0.0 and stop <= start:
@@ -111,7 +123,8 @@ def make_plan(system: CompiledSystem, options: SimulationOptions, start: float =
             )
         _resolvable("step", step, stop, system.name)
     tableau, reason = _choose(system, options)
-    sample_time = _sample_time(system, options, stop, None if tableau is None or tableau.adaptive else step)
+    fixed_step = None if tableau is None or tableau.adaptive else step
+    sample_time = _sample_time(system, options, stop, fixed_step, logged=logged)
     rtol, atol = options.rtol, options.atol
     if not SMALLEST_RTOL <= rtol <= 1.0:
         raise InputError(
@@ -183,7 +196,7 @@ def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau
 
 
 def _sample_time(
-    system: CompiledSystem, options: SimulationOptions, stop: float, fixed_step: float | None
+    system: CompiledSystem, options: SimulationOptions, stop: float, fixed_step: float | None, *, logged: bool
 ) -> float:
     """As asked; else the fixed step or its multiple that gives at most 10 000 rows; else stop / 1000."""
     if options.sample_time is not None:
@@ -193,13 +206,14 @@ def _sample_time(
     else:
         sample_time = stop / DEFAULT_INSTANTS if stop > 0.0 else 1.0
     width = 1 + system.states.size + system.signals_layout.size
-    if stop / sample_time * width > MOST_NUMBERS:
+    if not logged and stop / sample_time * width > MOST_NUMBERS:
         instants = f"{stop / sample_time:.3g} instants of {width} numbers"
         raise InputError(
             f"a sample time of {sample_time:g} s over {stop:g} s records {instants}",
             where=system.name,
             allowed=f"at most {MOST_NUMBERS // width} instants, which take 4 GB",
-            fix="choose a larger sample_time: it has no effect on the accuracy of the steps",
+            fix="choose a larger sample_time, which has no effect on the accuracy of the steps, "
+            "or log the run to a file",
         )
     return sample_time
 

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +71,14 @@ class ParameterChange:
     values: Mapping[str, Array]
 
 
+@dataclass(frozen=True, kw_only=True)
+class LoggedFile:
+    """The file that holds all ``rows`` of a run of which the result shows only some."""
+
+    path: Path
+    rows: int
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimulationResult:
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
@@ -77,7 +86,8 @@ class SimulationResult:
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
     ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
     its end where there were ``parameter_changes``; ``final_state`` what a run needs to go
-    on from here, ``None`` where it failed.
+    on from here, ``None`` where it failed. Of a run that was logged to a file it holds the rows that show all
+    extremes of the logged signals; the rest is in ``log``.
     """
 
     name: str
@@ -92,6 +102,7 @@ class SimulationResult:
     run: RunReport
     final_state: RunState | None = None
     parameter_changes: tuple[ParameterChange, ...] = ()
+    log: LoggedFile | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -170,6 +181,8 @@ class SimulationResult:
             f"{self.name}: {self.time.size} instants to {end}, {len(self.names)} signals, {solver}, "
             f"{report.wall_time:.3g} s ({report.real_time_factor:.3g} x real time)"
         )
+        if self.log is not None:
+            head += f", all {self.log.rows} instants in {self.log.path}"
         lines = [f"<SimulationResult {head}{'' if report.complete else ', INCOMPLETE'}>"]
         if report.message:
             lines.append(f"  {report.message}")

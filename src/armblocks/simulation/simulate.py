@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
+from armblocks.simulation.plan import LogRequest
 from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_state import RunState
 from armblocks.simulation.simulation import Simulation
@@ -24,6 +25,7 @@ def simulate(
     parameters: Mapping[str, ArrayLike] | ArrayLike | None = None,
     progress: Progress | None = None,
     initial_state: RunState | None = None,
+    log: LogRequest | None = None,
 ) -> SimulationResult:
     """Run ``compiled`` from 0 to ``options.stop_time`` and record its signals.
 
@@ -40,13 +42,16 @@ def simulate(
     time is cut into 1000 (10 s in steps of 10 ms); with a fixed step, every step is recorded, or as many of
     them as give at most 10 000 rows.
 
+    With a ``log`` the signals go to a file while the run goes on, memory stays flat however long it is, and
+    the result holds the rows that show all extremes.
+
     Ctrl-C ends the run early: what is there is returned, with ``run.complete`` false.
 
     Raises ``InputError`` and ``UnknownNameError`` for options and parameters that cannot be run, and
     ``SimulationError`` where a signal or a derivative is not finite or the step becomes too small; its
     ``partial`` is the result up to the last good instant.
     """
-    run = Simulation(compiled, options, parameters, initial_state)
+    run = Simulation(compiled, options, parameters, initial_state, log)
     return run_to_the_end(run, progress)
 
 

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,10 +23,13 @@ from armblocks.simulation.diagnosis import (
     integration_failure,
     stiffness_hint,
 )
-from armblocks.simulation.plan import changed_parameters, make_plan, parameter_vector
-from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult, signal_path
+from armblocks.simulation.plan import LogRequest, changed_parameters, make_plan, parameter_vector
+from armblocks.simulation.result import LoggedFile, ParameterChange, RunReport, SimulationResult, signal_path
 from armblocks.simulation.run_state import RunState, check_state, settings_text, slot_names
 from armblocks.simulation.stretch import Rows, Stretch, first_window
+
+if TYPE_CHECKING:
+    from armblocks.simulation.run_log import RunLog
 
 Array = NDArray[np.float64]
 
@@ -74,13 +78,15 @@ class Simulation:
         options: SimulationOptions,
         parameters: Mapping[str, ArrayLike] | ArrayLike | None = None,
         initial_state: RunState | None = None,
+        log: LogRequest | None = None,
     ) -> None:
         self.compiled = compiled
         self.options = options
         self._p = parameter_vector(compiled, parameters)
         if initial_state is not None:
             check_state(compiled, initial_state)
-        self._plan = make_plan(compiled, options, 0.0 if initial_state is None else initial_state.time)
+        start = 0.0 if initial_state is None else initial_state.time
+        self._plan = make_plan(compiled, options, start, logged=log is not None)
         started = perf_counter()
         compiled.prepare(self._plan.tableau)
         self._preparation_time = perf_counter() - started
@@ -99,6 +105,22 @@ class Simulation:
         self._changes: tuple[ParameterChange, ...] = ()
         self._chunk = 1000
         self._spent = 0.0
+        self._log: RunLog | None = None
+        self._window: int | None = None
+        if log is not None:
+            from armblocks.simulation.run_log import (
+                RunLog,
+                window_rows,
+            )  # a run without a log loads no writers
+
+            self._log = RunLog(
+                log,
+                compiled.signals_layout,
+                compiled.aliases,
+                compiled.states.size,
+                self._plan.instants.count,
+            )
+            self._window = window_rows(1 + compiled.states.size + compiled.signals_layout.size)
 
     # Where the run stands.
 
@@ -168,8 +190,8 @@ class Simulation:
                 if stretch.integration is not None and stretch.integration.stiff:
                     stretch.integration = self._change_method(stretch.integration)
                 started, taken = perf_counter(), self._steps_of(stretch)
-                chunk = int(min(self._chunk, left))
-                stretch.advance(chunk, pause, None)
+                chunk = int(min(self._chunk_of(stretch), left))
+                stretch.advance(chunk, pause, None if self._log is None else self._consume)
                 now = perf_counter()
                 taken = self._steps_of(stretch) - taken
                 left -= taken
@@ -193,6 +215,14 @@ class Simulation:
     @staticmethod
     def _steps_of(stretch: Stretch) -> int:
         return stretch.recorded if stretch.integration is None else stretch.integration.accepted
+
+    def _chunk_of(self, stretch: Stretch) -> int:
+        """How many steps to take at once: with a window, about as many as fill half of it at most."""
+        if self._window is None:
+            return self._chunk
+        steps = max(1, self._steps_of(stretch))
+        recorded = max(1, stretch.recorded - stretch.first)
+        return max(1, min(self._chunk, int(self._window // 2 * steps / recorded)))
 
     def set(self, parameters: Mapping[str, ArrayLike]) -> None:
         """Give tunable parameters, ``block.parameter``, other values from the time reached on.
@@ -284,8 +314,10 @@ class Simulation:
         plan, begin = self._plan, self.recorded
         integration = None
         if self._tableau is not None:
-            integration = self._begin_integration(first_window(plan.instants, begin, None))
-        self._stretches.append(Stretch(plan.instants, begin, self._p, integration, None))
+            integration = self._begin_integration(first_window(plan.instants, begin, self._window))
+        if self._stretches:
+            self._hand_over(self._stretches[-1])
+        self._stretches.append(Stretch(plan.instants, begin, self._p, integration, self._window))
         self._changed = False
         return self._stretches[-1]
 
@@ -377,6 +409,26 @@ class Simulation:
                 when = f"last from {fired:.9g} s on" if fired > -np.inf else "from the start on"
                 self._note(f"assertion '{compiled.guard_names[guard]}' did not hold, {when}")
 
+    def _consume(self, rows: Rows) -> None:
+        """Write a window to the log; rows that are there already, after an interruption, are left out."""
+        assert self._log is not None
+        rows = rows.after(self._log.rows)
+        if not rows.time.size:
+            return
+        compiled = self.compiled
+        signals = rows.signals(compiled)
+        bad = first_bad_signal(compiled, rows.time, signals, rows.algebraic)
+        good = rows.time.size if bad is None else bad[1]
+        self._log.append(rows.time[:good], rows.states[:good], signals[:, :good])
+        if bad is not None:
+            self._fail(bad[0])
+
+    def _hand_over(self, stretch: Stretch) -> None:
+        """What a stretch still holds goes into the log."""
+        if self._log is not None and self._failure is None:
+            stretch.settle()
+            self._consume(stretch.rows())
+
     def _fail(self, failure: SimulationError) -> None:
         """Raise with what is good so far."""
         self._failure = failure
@@ -386,14 +438,19 @@ class Simulation:
         """The result; raises the failure with it as its ``partial``."""
         began = perf_counter()
         compiled = self.compiled
-        parts = self._rows() or [self._stretches[-1].rows()]
-        time = _joined([rows.time for rows in parts])
-        states = _joined([rows.states for rows in parts])
-        signals = _joined([rows.signals(compiled) for rows in parts], axis=1)
-        bad = first_bad_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
-        if bad is not None:
-            failure, good = bad
-            time, states, signals = time[:good], states[:good], signals[:, :good]
+        if failure is None or self._failure is None:
+            self._hand_over(self._stretches[-1])
+        if self._log is None:
+            parts = self._rows() or [self._stretches[-1].rows()]
+            time = _joined([rows.time for rows in parts])
+            states = _joined([rows.states for rows in parts])
+            signals = _joined([rows.signals(compiled) for rows in parts], axis=1)
+            bad = first_bad_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
+            if bad is not None:
+                failure, good = bad
+                time, states, signals = time[:good], states[:good], signals[:, :good]
+        else:
+            time, states, signals = self._log.view(compiled.signals_layout.size)
         integrations = [part.integration for part in self._stretches if part.integration is not None]
         if integrations:
             self._note(stiffness_hint(compiled, integrations[-1], self._stretches[-1].p))
@@ -429,7 +486,10 @@ class Simulation:
                 message=self._message,
             ),
             final_state=None if failure is not None else self.state(),
+            log=None if self._log is None else LoggedFile(path=self._log.path, rows=self._log.rows),
         )
+        if self._log is not None and (self.finished or failure is not None):
+            self._log.finish(result)
         if failure is not None:
             failure.partial = result
             raise failure

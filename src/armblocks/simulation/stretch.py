@@ -28,6 +28,14 @@ class Rows:
     algebraic: Array
     p: Array
 
+    def after(self, number: int) -> Rows:
+        """Those from instant ``number`` on."""
+        skip = max(0, number - self.begin)
+        parts = (self.time, self.states, self.discrete, self.algebraic)
+        time, states, discrete, algebraic = (part[skip:] for part in parts)
+        begin = self.begin + skip
+        return Rows(begin=begin, time=time, states=states, discrete=discrete, algebraic=algebraic, p=self.p)
+
     def signals(self, compiled: CompiledSystem) -> Array:
         """All signals at these instants, ``(ny, N)``."""
         return compiled.evaluate_signals(self.time, self.states, self.discrete, self.algebraic, self.p)
@@ -49,7 +57,10 @@ class Stretch:
     ) -> None:
         self.p = p
         self.integration = integration
+        self.first = begin
+        """Number of its first instant."""
         self.begin = begin
+        """Number of the first one that is held."""
         self.window = window
         self._instants = instants
         self._time = first_window(instants, begin, window)

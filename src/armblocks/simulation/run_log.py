@@ -1,0 +1,137 @@
+"""Runs that write their signals to a file while they go on, and keep a view of them in memory.
+
+However long the run, it holds one window of instants, what the writer is writing, and the view: so many rows
+that a figure shows nothing less than all of them would. The view keeps whole rows, never mixtures: of each
+stretch of instants the first row and those in which some signal is lowest or highest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.equations import Signature
+from armblocks.errors import FormatError
+from armblocks.simulation.export import description_of, open_log
+from armblocks.simulation.plan import LogRequest
+from armblocks.simulation.result import SimulationResult, element_names, signal_path
+
+Array = NDArray[np.float64]
+
+VIEW_ROWS = 20_000
+"""Rows of the view, roughly: some for each pixel of a figure."""
+WINDOW_NUMBERS = 2_000_000
+"""Doubles of the window, 16 MB."""
+
+
+def window_rows(width: int) -> int:
+    """How many instants of so many numbers are held at once."""
+    return max(256, min(65_536, WINDOW_NUMBERS // width))
+
+
+class View:
+    """Rows of a growing table that show all of its extremes. A row is one column of ``append``'s argument."""
+
+    def __init__(self, total: int, watched: Sequence[int]) -> None:
+        """``total`` rows are to come; the extremes of the ``watched`` quantities are kept."""
+        self._watched = list(watched)
+        self._length = max(1, math.ceil(total * (1 + 2 * len(self._watched)) / VIEW_ROWS))
+        self._kept: list[Array] = []
+        self._pending: list[Array] = []
+        self._seen = 0
+
+    def append(self, columns: Array) -> None:
+        """More rows, ``(quantities, N)``."""
+        start, count = 0, columns.shape[1]
+        while start < count:
+            end = min(count, start + self._length - self._seen)
+            self._pending.append(self._extremes(columns[:, start:end]))
+            self._seen += end - start
+            start = end
+            if self._seen == self._length:
+                self._flush()
+
+    def rows(self) -> Array:
+        """What is kept, ``(quantities, rows)``."""
+        parts = [*self._kept, *self._pending]
+        return np.concatenate(parts, axis=1) if parts else np.empty((0, 0))
+
+    def _flush(self) -> None:
+        joined = np.concatenate(self._pending, axis=1)
+        self._kept.append(self._extremes(joined) if len(self._pending) > 1 else joined)
+        self._pending, self._seen = [], 0
+
+    def _extremes(self, columns: Array) -> Array:
+        if columns.shape[1] <= 1 or self._length == 1:
+            return columns.copy()
+        watched = columns[self._watched]
+        places = {0, *watched.argmin(axis=1).tolist(), *watched.argmax(axis=1).tolist()}
+        return columns[:, sorted(places)]
+
+
+class RunLog:
+    """The file and the view of one run. Writing goes on beside the run, in a thread of its own."""
+
+    def __init__(
+        self, request: LogRequest, layout: Signature, aliases: Mapping[str, str], states: int, instants: int
+    ) -> None:
+        """Raises ``UnknownNameError`` for signals and file types, ``FormatError`` for places."""
+        names = [signal_path(name, layout, aliases, "log") for name in request.signals] or list(layout.names)
+        self.path = request.path
+        self.rows = 0
+        self._places = np.array([k for name in names for k in range(*_span(layout, name))], dtype=np.intp)
+        self._all = len(self._places) == layout.size
+        columns = [column for name in names for column in element_names(layout[name])]
+        self._file = open_log(request.path, columns)
+        self._states = states
+        self._view = View(instants, [1 + states + k for k in self._places.tolist()])
+        self._thread = ThreadPoolExecutor(1)
+        self._writing: Future[None] | None = None
+
+    def append(self, time: Array, states: Array, signals: Array) -> None:
+        """More instants: ``time (N,)``, ``states (N, nx)``, ``signals (ny, N)``, which are not changed later.
+
+        Raises ``FormatError`` where what came before could not be written.
+        """
+        self._wait()
+        self.rows += time.size
+        chosen = signals if self._all else signals[self._places]
+        self._writing = self._thread.submit(self._file.append, time.copy(), chosen)
+        self._view.append(np.concatenate([time[np.newaxis], states.T, signals]))
+
+    def view(self, signals: int) -> tuple[Array, Array, Array]:
+        """Time ``(N,)``, states ``(N, nx)`` and signals ``(ny, N)`` of the rows that are kept in memory."""
+        rows = self._view.rows() if self.rows else np.empty((1 + self._states + signals, 0))
+        first = 1 + self._states
+        return rows[0], np.ascontiguousarray(rows[1:first].T), rows[first:]
+
+    def finish(self, result: SimulationResult) -> None:
+        """Complete the file, with how the run went."""
+        try:
+            self._wait()
+            self._file.finish(description_of(result))
+        finally:
+            self._thread.shutdown()
+
+    def _wait(self) -> None:
+        if self._writing is None:
+            return
+        try:
+            self._writing.result()
+        except OSError as error:
+            self._file.abandon()
+            raise FormatError(
+                f"the log cannot be written any more ({error.strerror or error})",
+                where=str(self.path),
+                fix="make room on the disk, or log fewer signals with a longer sample time",
+            ) from error
+        self._writing = None
+
+
+def _span(layout: Signature, name: str) -> tuple[int, int]:
+    place = layout.ranges[name]
+    return place.start, place.stop

@@ -1,0 +1,35 @@
+"""What a person is told during a long run."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from armblocks.cli import progress as module
+from armblocks.cli.progress import RunProgress
+
+
+@pytest.mark.parametrize(
+    ("spent", "fraction", "told"),
+    [(10.0, 0.5, "about 10 s left"), (60.0, 0.1, "about 9 min left"), (3600.0, 0.25, "about 3.0 h left")],
+)
+def test_a_long_run_tells_how_long_the_rest_takes(
+    spent: float, fraction: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    text = io.StringIO()
+    with RunProgress("model", Console(file=text, width=200)) as progress:
+        now[0] += spent
+        progress(1.0, fraction, 3.0)
+    assert f"t = 1 s, 3 x real time, {told}" in text.getvalue()
+
+
+def test_a_run_that_is_nearly_done_tells_no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    text = io.StringIO()
+    with RunProgress("model", Console(file=text, width=200)) as progress:
+        now[0] += 5.0
+        progress(1.0, 0.9, 3.0)
+    assert "left" not in text.getvalue()

@@ -1,0 +1,222 @@
+"""Runs that are written to a file while they go on: the same numbers, flat memory, nothing lost."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from hybrid_systems import bouncing_ball, relay_oscillator, sampled_loop
+from small_systems import oscillator, scalar, van_der_pol_pid
+from small_systems import system as small_system
+
+from armblocks.compiler.native_integrator import Integration
+from armblocks.compiler.system import CompiledSystem, compile_system
+from armblocks.equations import SimulationOptions, signature
+from armblocks.errors import FormatError, InputError, SimulationError, UnknownNameError
+from armblocks.simulation import LogRequest, Simulation, SimulationResult, run_log, simulate
+from armblocks.simulation.run_log import View
+
+SYSTEMS = {
+    "van_der_pol": compile_system(van_der_pol_pid()),
+    "ball": compile_system(bouncing_ball(0.9)),
+    "sampled": compile_system(sampled_loop(0.3)),
+    "relay": compile_system(relay_oscillator()),
+    "source": compile_system(
+        small_system("source", signals=signature(("ramp/y", ())), outputs=lambda t, x, p: 2.0 * t)
+    ),
+}
+
+
+def read(path: Path) -> tuple[list[str], np.ndarray]:
+    """Names and columns of a log."""
+    if path.suffix == ".parquet":
+        table = pq.read_table(str(path))
+        columns = [table.column(name).to_numpy() for name in table.column_names]  # pyright: ignore
+        return table.column_names, np.array(columns)
+    with path.open(newline="") as stream:
+        rows = list(csv.reader(stream))
+    return rows[0], np.array([[float(value) for value in row] for row in rows[1:]]).T
+
+
+def logged(
+    system: CompiledSystem, path: Path, options: SimulationOptions, signals: tuple[str, ...] = ()
+) -> SimulationResult:
+    return simulate(system, options, log=LogRequest(path=path, signals=signals))
+
+
+@pytest.fixture
+def small_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows of a few instants, so that short runs have many and steps have more than one."""
+    monkeypatch.setattr("armblocks.simulation.run_log.window_rows", lambda width: 7)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv"])
+@pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.013), ("rodas5p", None)])
+@pytest.mark.parametrize("name", list(SYSTEMS))
+@pytest.mark.usefixtures("small_windows")
+def test_a_log_holds_the_bits_of_a_run_in_memory(
+    name: str, solver: str, step: float | None, suffix: str, tmp_path: Path
+) -> None:
+    options = SimulationOptions(stop_time=4.0, sample_time=0.01, solver=solver, step=step)
+    whole = simulate(SYSTEMS[name], options)
+    result = logged(SYSTEMS[name], tmp_path / f"log{suffix}", options)
+    names, columns = read(tmp_path / f"log{suffix}")
+    assert tuple(names) == ("time", *whole.columns())
+    assert columns[0].tobytes() == whole.time.tobytes()
+    assert columns[1:].tobytes() == whole.signals.tobytes()
+    assert result.log is not None and result.log.rows == whole.time.size
+    assert result.run.steps == whole.run.steps and result.run.complete
+    assert result.final_state is not None and whole.final_state is not None
+    assert result.final_state.states.tobytes() == whole.final_state.states.tobytes()
+    # What stays in memory are rows of the whole.
+    places = np.searchsorted(whole.time, result.time)
+    assert result.signals.tobytes() == whole.signals[:, places].tobytes()
+    assert result.states.tobytes() == whole.states[places].tobytes()
+
+
+def test_a_view_keeps_the_extremes_and_stays_small() -> None:
+    rng = np.random.default_rng(3)
+    table = rng.normal(size=(5, 300_000))
+    view = View(table.shape[1], watched=[1, 2, 4])
+    for start in range(0, 300_000, 1777):
+        view.append(table[:, start : start + 1777])
+    kept = view.rows()
+    assert kept.shape[1] < 1.1 * run_log.VIEW_ROWS
+    assert np.isin(kept[0], table[0]).all()
+    for row in (1, 2, 4):
+        assert kept[row].min() == table[row].min() and kept[row].max() == table[row].max()
+    # Every stretch of the table has its own extremes in it.
+    length = 300_000 * 7 // run_log.VIEW_ROWS
+    for start in range(0, 300_000 - length, length):
+        assert np.isin(table[2, start : start + length].max(), kept[2])
+
+
+def test_a_short_run_is_kept_whole(tmp_path: Path) -> None:
+    options = SimulationOptions(stop_time=4.0)
+    result = logged(SYSTEMS["relay"], tmp_path / "log.parquet", options)
+    assert result.signals.tobytes() == simulate(SYSTEMS["relay"], options).signals.tobytes()
+
+
+def test_signals_are_chosen_by_name_and_the_file_says_how_the_run_went(tmp_path: Path) -> None:
+    path = tmp_path / "log.parquet"
+    result = logged(SYSTEMS["van_der_pol"], path, SimulationOptions(stop_time=2.0), ("pid/u", "position"))
+    names, _ = read(path)
+    assert names == ["time", "pid/u", "position/y"]
+    told = json.loads(pq.read_metadata(str(path)).metadata[b"armblocks"])  # pyright: ignore
+    assert told["run"]["steps"] == result.run.steps and told["run"]["complete"]
+    assert "all 1001 instants in" in repr(result)
+
+
+@pytest.mark.usefixtures("small_windows")
+def test_parameters_changed_amid_a_logged_run_are_in_the_log(tmp_path: Path) -> None:
+    system = compile_system(oscillator())
+    options = SimulationOptions(stop_time=3.0, sample_time=0.01)
+
+    def run(log: LogRequest | None) -> Simulation:
+        simulation = Simulation(system, options, log=log)
+        simulation.advance(1.234)
+        simulation.set({"mass.omega": 3.0})
+        simulation.advance()
+        return simulation
+
+    whole = run(None).result()
+    run(LogRequest(path=tmp_path / "log.parquet")).result()
+    _, columns = read(tmp_path / "log.parquet")
+    assert columns[1:].tobytes() == whole.signals.tobytes()
+
+
+@pytest.mark.usefixtures("small_windows")
+@pytest.mark.parametrize("moment", ["before", "after"])
+def test_an_interruption_loses_nothing_and_the_run_can_go_on(
+    moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C in the very middle of a chunk, before or after its window was taken over."""
+    options = SimulationOptions(stop_time=4.0, sample_time=0.01)
+    whole = simulate(SYSTEMS["relay"], options)
+    calls = [0]
+
+    def interrupting(method: Callable[..., None]) -> Callable[..., None]:
+        def call(self: Integration, *arguments: object) -> None:
+            calls[0] += 1
+            if calls[0] % 17 == 16 and moment == "before":
+                raise KeyboardInterrupt
+            method(self, *arguments)
+            if calls[0] % 17 == 16 and moment == "after":
+                raise KeyboardInterrupt
+
+        return call
+
+    run = Simulation(SYSTEMS["relay"], options, log=LogRequest(path=tmp_path / "log.parquet"))
+    monkeypatch.setattr(Integration, "back_to", interrupting(Integration.back_to))
+    interruptions = 0
+    while not run.finished:
+        try:
+            run.advance()
+        except KeyboardInterrupt:
+            interruptions += 1
+    run.result()
+    assert interruptions > 0
+    _, columns = read(tmp_path / "log.parquet")
+    assert columns[0].tobytes() == whole.time.tobytes()
+    assert columns[1:].tobytes() == whole.signals.tobytes()
+
+
+@pytest.mark.usefixtures("small_windows")
+def test_a_run_that_fails_leaves_a_complete_file_up_to_there(tmp_path: Path) -> None:
+    options = SimulationOptions(stop_time=4.0, sample_time=0.01)
+    system = compile_system(scalar("blow_up", lambda t, x, p: x * x, 1.0))
+    with pytest.raises(SimulationError) as caught:
+        logged(system, tmp_path / "log.parquet", options)
+    _, columns = read(tmp_path / "log.parquet")
+    assert 0.95 < columns[0][-1] <= 1.0
+    partial = caught.value.partial
+    assert isinstance(partial, SimulationResult) and partial.log is not None
+    assert partial.log.rows == columns.shape[1]
+
+
+@pytest.mark.usefixtures("small_windows")
+def test_a_signal_that_is_not_finite_ends_the_log_before_it(tmp_path: Path) -> None:
+    system = compile_system(
+        small_system("pole", signals=signature(("pole/y", ())), outputs=lambda t, x, p: 1 / (t - 2.0))
+    )
+    with pytest.raises(SimulationError, match="signal 'pole/y' is inf at 2 s"):
+        logged(system, tmp_path / "log.csv", SimulationOptions(stop_time=4.0, sample_time=0.125))
+    _, columns = read(tmp_path / "log.csv")
+    assert columns[0][-1] == 1.875
+
+
+def test_bad_logs_are_refused_before_the_run(tmp_path: Path) -> None:
+    options = SimulationOptions()
+    with pytest.raises(UnknownNameError, match=r"no log file type named '.npz'"):
+        logged(SYSTEMS["relay"], tmp_path / "log.npz", options)
+    with pytest.raises(UnknownNameError, match="no signal named 'relai"):
+        logged(SYSTEMS["relay"], tmp_path / "log.csv", options, ("relai/y",))
+    with pytest.raises(FormatError, match="does not exist"):
+        logged(SYSTEMS["relay"], tmp_path / "nowhere" / "log.csv", options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_may_be_larger_than_memory_allows_without_one(tmp_path: Path) -> None:
+    options = SimulationOptions(stop_time=1e6, sample_time=1e-4)
+    with pytest.raises(InputError, match="or log the run to a file"):
+        Simulation(SYSTEMS["source"], options)
+    run = Simulation(SYSTEMS["source"], options, log=LogRequest(path=tmp_path / "log.parquet"))
+    run.advance(10.0)
+    run.stop("enough")
+    result = run.result()
+    assert result.log is not None and 100_001 <= result.log.rows < 200_000
+
+
+def test_a_disk_that_is_full_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: object, table: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("armblocks.simulation.export._CsvLog._append", full)
+    with pytest.raises(FormatError, match=r"the log cannot be written any more \(No space left"):
+        logged(SYSTEMS["relay"], tmp_path / "log.csv", SimulationOptions(stop_time=4.0))
+    assert list(tmp_path.iterdir()) == []
