@@ -167,3 +167,4 @@ def test_a_run_is_logged_while_it_goes_on(
     result = invoke(*arguments, "--log-signals", "x1, x2")
     assert result.exit_code == 0, result.output
     assert pq.read_table("all.parquet").column_names == ["time", "x1/y", "x2/y"]
+    assert "all 101 instants: all.parquet" in result.output

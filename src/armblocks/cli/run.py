@@ -16,6 +16,7 @@ from armblocks.errors import FormatError, LimitWarning, SimulationError
 
 if TYPE_CHECKING:
     from armblocks import Diagram, SimulationResult
+    from armblocks.report.writing import ReportFiles
 
 
 class DataFormat(StrEnum):
@@ -86,16 +87,7 @@ def run(
     signals = [name.strip() for name in log_signals.split(",")] if log_signals else []
     settings.update(parameters=parameters, initial_state=from_state, log=log, log_signals=signals)
     result, failure = _simulate(diagram, settings)
-    with warnings.catch_warnings():
-        # The summary below says every limit that is broken; once is enough.
-        warnings.simplefilter("ignore", LimitWarning)
-        files = ab.write_report(
-            folder,
-            diagram,
-            result,
-            formats=("svg", "png") if figures else (),
-            data=("csv", "parquet", *(extra.value for extra in formats or [])),
-        )
+    files = _report(folder, diagram, result, figures, formats or [])
     if save_state is not None and result.final_state is not None:
         result.final_state.save(save_state)
     console = results_console()
@@ -103,6 +95,8 @@ def run(
     print_displays(diagram, result, console)
     print_motions(diagram, result, console)
     print_files(files, console)
+    if result.log is not None:
+        console.print(f"all {result.log.rows} instants: {result.log.path}", highlight=False)
     if open_report:
         typer.launch(str(files.page))
     if failure is not None:
@@ -127,6 +121,23 @@ def _simulate(diagram: Diagram, settings: dict[str, Any]) -> tuple[SimulationRes
             if not isinstance(error.partial, ab.SimulationResult):
                 raise
             return error.partial, error
+
+
+def _report(
+    folder: Path, diagram: Diagram, result: SimulationResult, figures: bool, formats: list[DataFormat]
+) -> ReportFiles:
+    import armblocks as ab
+
+    with warnings.catch_warnings():
+        # The summary says every limit that is broken; once is enough.
+        warnings.simplefilter("ignore", LimitWarning)
+        return ab.write_report(
+            folder,
+            diagram,
+            result,
+            formats=("svg", "png") if figures else (),
+            data=("csv", "parquet", *(extra.value for extra in formats)),
+        )
 
 
 def _writable_folder(folder: Path) -> Path:
