@@ -9,6 +9,7 @@ import armblocks as ab
 from armblocks.blocks import (
     Constant,
     Expression,
+    FromFile,
     Gain,
     Integrator,
     ResettableIntegrator,
@@ -144,3 +145,15 @@ def test_what_cannot_be_differentiated_is_refused() -> None:
     result = ab.sensitivity(decay(), "k.gain", "x", **TIGHT)
     with pytest.raises(UnknownNameError, match="there is no parameter named 'k'"):
         _ = result["x", "k"]
+
+
+def test_a_table_that_is_read_by_index_is_refused_and_all_else_beside_it_is_right() -> None:
+    builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=2.0, sample_time=0.5))
+    table = builder.add("table", FromFile(data=((0.0, 1.0), (1.0, 3.0), (2.0, -1.0))))
+    builder.add("sum", Integrator(), builder.add("gain", Gain(gain=2.0), table))
+    diagram = builder.build()
+    with pytest.raises(InputError, match=r"'table\.data' is a table that is read by index"):
+        ab.sensitivity(diagram, "table.data", "sum")
+    found = ab.sensitivity(diagram, ["gain.gain"], ["sum"])
+    # d/dk of k times the integral of the table is that integral: 0, 0.75, 2, 3, 3 at the half seconds
+    assert found["sum", "gain.gain"] == pytest.approx([0.0, 0.75, 2.0, 3.0, 3.0], rel=1e-5, abs=1e-6)

@@ -6,6 +6,7 @@ from armblocks.blocks import (
     arithmetic,
     arm_plant,
     branching,
+    constraints,
     continuous,
     delays,
     discontinuities,
@@ -66,6 +67,7 @@ from armblocks.blocks.arithmetic import (
 )
 from armblocks.blocks.arm_plant import ArmPlant
 from armblocks.blocks.branching import If, SwitchCase
+from armblocks.blocks.constraints import AlgebraicConstraint
 from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
 from armblocks.blocks.delays import Delay, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
 from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
@@ -137,6 +139,7 @@ from armblocks.blocks.logic import (
     IntervalTestDynamic,
     LogicalOperator,
     RelationalOperator,
+    TruthTable,
 )
 from armblocks.blocks.lookup import (
     DirectLookup,
@@ -287,6 +290,7 @@ BLOCKS = BlockLibrary(
         sinks,
         ending,
         arithmetic,
+        constraints,
         gains,
         reductions,
         matrices,
@@ -322,6 +326,7 @@ __all__ = [
     "PID2DOF",
     "Abs",
     "ActionSubsystem",
+    "AlgebraicConstraint",
     "AnalogFilter",
     "AngleAxis2T",
     "AngleDifference",
@@ -535,6 +540,7 @@ __all__ = [
     "Trapezoidal",
     "TriggeredSubsystem",
     "Trigonometry",
+    "TruthTable",
     "UnaryMinus",
     "UniformRandomNumber",
     "UnitDelay",

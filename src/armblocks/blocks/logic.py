@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
+from itertools import product
 from typing import ClassVar
 
-from casadi import SX, logic_and, logic_not, logic_or
+import numpy as np
+from casadi import SX, if_else, logic_and, logic_not, logic_or
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
@@ -33,6 +35,7 @@ from armblocks.diagram import (
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
+_MOST_CONDITIONS = 12
 _RELATIONS = ("==", "~=", "<", "<=", ">", ">=")
 _GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
     "AND": (logic_and, False),
@@ -310,6 +313,84 @@ class CombinatorialLogic(Block):
         for k in range(u["u"].numel()):
             row = 2.0 * row + (u["u"][k] != 0.0)
         return {"y": choose(row, [p["table"][k, :].T for k in range(p["table"].shape[0])])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthTable(Block):
+    """A decision table: y = the actions of the first decision whose conditions all hold.
+
+    Each row of ``decisions`` says of every condition whether it has to be true (1), false (0) or may be
+    either (-1), and the same row of ``actions`` what comes out then. Every combination must be decided; a
+    last row of -1 is for all others.
+    """
+
+    family: ClassVar[str] = "logic"
+    title: ClassVar[str] = "Truth Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="2 where the slow pulse is there, else 1 where the fast one is, else 0.",
+        parameters={
+            "decisions": ((1.0, -1.0), (0.0, 1.0), (-1.0, -1.0)),
+            "actions": ((2.0,), (1.0,), (0.0,)),
+        },
+        inputs={
+            "u": made("Mux").by(
+                u1=made("PulseGenerator", period=4.0).named("slow"),
+                u2=made("PulseGenerator", period=1.0).named("fast"),
+            )
+        },
+    )
+
+    decisions: ArrayLike = parameter(
+        ((1.0, 1.0), (-1.0, -1.0)),
+        dimensions=(2,),
+        tunable=False,
+        minimum=-1.0,
+        maximum=1.0,
+        doc="one row for each decision: 1 true, 0 false, -1 either",
+    )
+    actions: ArrayLike = parameter(((1.0,), (0.0,)), dimensions=(2,), doc="what comes out, one row for each")
+
+    def check(self) -> None:
+        rows = np.asarray(self.decisions, dtype=np.float64)
+        if rows.shape[0] != shape_of(self.actions)[0] or not np.isin(rows, (-1.0, 0.0, 1.0)).all():
+            raise InputError(
+                f"there are {rows.shape[0]} decisions and {shape_of(self.actions)[0]} actions",
+                where="TruthTable",
+                allowed="an action for each decision, of entries 1, 0 and -1",
+                fix="correct the table",
+            )
+        if rows.shape[1] > _MOST_CONDITIONS:
+            raise InputError(
+                f"there are {rows.shape[1]} conditions",
+                where="TruthTable.decisions",
+                allowed=f"at most {_MOST_CONDITIONS}",
+                fix="decide in several tables",
+            )
+        table = rows.tolist()
+        for given in product((0, 1), repeat=rows.shape[1]):
+            if any(all(want in (-1.0, one) for want, one in zip(row, given)) for row in table):
+                continue
+            raise InputError(
+                f"the conditions {list(given)} are not decided",
+                where="TruthTable.decisions",
+                allowed="a decision for every combination of conditions",
+                fix="add a last row of -1 for all others",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the conditions (m,)", shape=(shape_of(self.decisions)[1],)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        columns = shape_of(self.actions)[1]
+        return (Port("y", "the action", shape=(columns,) if columns > 1 else ()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        rows: list[list[float]] = np.asarray(self.decisions, dtype=np.float64).tolist()
+        action = p["actions"][len(rows) - 1, :].T
+        for k in reversed(range(len(rows) - 1)):
+            asked = [(u["u"][i] != 0.0) == want for i, want in enumerate(rows[k]) if want >= 0.0]
+            action = if_else(reduce(logic_and, asked, SX(1.0)), p["actions"][k, :].T, action)
+        return {"y": action}
 
 
 def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:

@@ -65,6 +65,9 @@ class Block(ABC):
     A Derivative block behind ``q`` then gives ``qd`` itself, to the last bit: a joint that stands still has
     the speed 0, and not 1e-17, which Coulomb friction would see."""
 
+    implicit_outputs: ClassVar[tuple[str, ...]] = ()
+    """Outputs that are unknowns: what ``outputs`` gives for such a one is not its value but what has to be 0
+    by the choice of it. Where Newton's method has to search, it begins at ``initial_guesses``."""
     sampled: ClassVar[bool] = False
     """Whether the block works at the ticks of a clock only; it then has the parameter ``sample_time``."""
     virtual: ClassVar[bool] = False
@@ -187,6 +190,10 @@ class Block(ABC):
 
     def initial_outputs(self, p: Signals) -> Signals:
         """Held outputs of a sampled block before its first tick, where they are not 0."""
+        return {}
+
+    def initial_guesses(self, p: Signals) -> Signals:
+        """Where to begin the search for every one of ``implicit_outputs``."""
         return {}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

@@ -19,6 +19,7 @@ from casadi import (
     jacobian,
     logic_and,
     logic_or,
+    repmat,
     substitute,
     vertcat,
     vertsplit,
@@ -182,7 +183,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
         initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),
-        initial_algebraic=function("initial_algebraic", p, w0=[SX.zeros(loops.w.numel())]),
+        initial_algebraic=function("initial_algebraic", p, w0=[loops.guesses]),
         breakpoints=function(
             "breakpoints",
             p,
@@ -249,8 +250,10 @@ class _Tracing:
         self.symbols = symbols
         self._clock_of = clock_of or {}
         self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
+        self._left_over: dict[Value, SX] = {}
         self.unknowns: dict[Value, SX] = {}
-        """What stands for values that were needed before they were worked out: the cuts of the loops."""
+        """What stands for values that were needed before they were worked out, the cuts of the loops, and for
+        outputs that are implicit."""
 
     def work_out(self, node: Node) -> None:
         """Put the equations of one node over the values of the nodes that it needs."""
@@ -280,6 +283,11 @@ class _Tracing:
         (flat,) = group.rate(node.order).call(arguments, True, False)
         parts = _split(flat, [slot.size for slot in group.slots])
         self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
+        for name in self.network.diagram.blocks[node.block].implicit_outputs:
+            if (SlotKind.OUTPUT, name) in self._values[node]:
+                self._left_over[Value(node, SlotKind.OUTPUT, name)] = self._values[node].pop(
+                    (SlotKind.OUTPUT, name)
+                )
         if node.block in self._clock_of:
             ticks = symbols.m[self._clock_of[node.block]]
             if ON in self.network.diagram.gates.get(node.block, {}):
@@ -307,13 +315,23 @@ class _Tracing:
         if value.node.group == HELD:
             held = self.symbols.discrete[f"{value.node.block}/{value.name}"]
             return SX.zeros(held.numel()) if value.node.order else held
-        if value.node in self._values:
-            return self._values[value.node][value.kind, value.name]
+        known = self._values.get(value.node, {}).get((value.kind, value.name))
+        if known is not None:
+            return known
         if value not in self.unknowns:
             slots = self.network.equations[value.node.block].groups[value.node.group].slots
             size = next(slot.size for slot in slots if (slot.kind, slot.name) == (value.kind, value.name))
             self.unknowns[value] = SX.sym("w", size)
         return self.unknowns[value]
+
+    def residuals(self) -> SX:
+        """What has to be 0, for each unknown in turn."""
+        return vertcat(
+            *[
+                self._left_over[value] if value in self._left_over else self.value(value) - unknown
+                for value, unknown in self.unknowns.items()
+            ]
+        )
 
 
 class Implicit:
@@ -325,20 +343,29 @@ class Implicit:
         self.slots = Signature()
         self.w = SX.sym("w", 0)
         self.residual = SX(0, 1)
+        self.guesses = SX(0, 1)
         self._cuts, self._solution = SX(0, 1), SX(0, 1)
         if not tracing.unknowns:
             return
         network, loops = model.flow, model.flow_order.loops
         where = f"diagram '{network.diagram.name}'"
         cuts = vertcat(*tracing.unknowns.values())
-        residual = vertcat(*[tracing.value(value) - cut for value, cut in tracing.unknowns.items()])
-        around = [loops[value.node] for value, cut in tracing.unknowns.items() for _ in range(cut.numel())]
+        residual = tracing.residuals()
+        own = {value: (f"{value.node.block}/{value.name}",) for value in tracing.unknowns}
+        around = [
+            loops.get(value.node, own[value])
+            for value, cut in tracing.unknowns.items()
+            for _ in range(cut.numel())
+        ]
         check_solvable(cuts, residual, symbols.p, values, around, where)
         solution, remaining = solve_affine(cuts, residual)
         names = [
             _unknown_name(value) + (f"[{k}]" if cut.numel() > 1 else "")
             for value, cut in tracing.unknowns.items()
             for k in range(cut.numel())
+        ]
+        self.guesses = vertcat(*[_guess(network, symbols, *entry) for entry in tracing.unknowns.items()])[
+            remaining
         ]
         self.slots = Signature(tuple(Slot(names[k]) for k in remaining))
         self.w = SX.sym("w", len(remaining))
@@ -353,6 +380,15 @@ class Implicit:
         """One column with the solutions in place of the cuts."""
         column = vertcat(*parts, SX(0, 1))
         return substitute(column, self._cuts, self._solution) if self._cuts.numel() else column
+
+
+def _guess(network: Network, symbols: _Symbols, value: Value, unknown: SX) -> SX:
+    """Where the search for an unknown begins: where its block says, else at 0."""
+    block = network.diagram.blocks[value.node.block]
+    if value.node.order or value.kind is not SlotKind.OUTPUT or value.name not in block.implicit_outputs:
+        return SX.zeros(unknown.numel())
+    guess = block.initial_guesses(symbols.parameters_of(value.node.block))[value.name]
+    return repmat(guess, unknown.numel(), 1) if guess.numel() == 1 else flatten(guess, guess.shape)
 
 
 def _unknown_name(value: Value) -> str:
@@ -380,7 +416,7 @@ def _updated(model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit) -
     if not tick.unknowns:
         return [updated]
     cuts = vertcat(*tick.unknowns.values())
-    residual = vertcat(*[tick.value(value) - cut for value, cut in tick.unknowns.items()])
+    residual = tick.residuals()
     solution, remaining = solve_affine(cuts, residual)
     if remaining and depends_on(residual[remaining], symbols.m):
         value = next(iter(tick.unknowns))

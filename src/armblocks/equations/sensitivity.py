@@ -21,6 +21,7 @@ from casadi import SX, Function, densify, depends_on, dot, fabs, fmax, if_else, 
 from armblocks.equations.hybrid_system import HybridSystem
 from armblocks.equations.signatures import Signature, Slot, signature
 from armblocks.equations.symbols import flatten
+from armblocks.equations.table_reading import tables_read
 from armblocks.equations.traced_function import TracedFunction
 from armblocks.errors import InputError
 
@@ -38,8 +39,8 @@ def sensitivity_system(
 ) -> HybridSystem:
     """The system with the derivatives of ``outputs`` (paths of signals) by ``parameters`` (paths) as signals.
 
-    Raises ``UnknownNameError`` for names, ``InputError`` for a parameter that moves a breakpoint, and where
-    events and implicit equations come together.
+    Raises ``UnknownNameError`` for names, ``InputError`` for a parameter that moves a breakpoint or is a
+    table that is read by index, and where events and implicit equations come together.
     """
     return _Augmented(system, parameters, outputs).system()
 
@@ -88,6 +89,20 @@ class _Augmented:
                     allowed="parameters that move no breakpoint",
                     fix="take the difference of two runs for this one",
                 )
+        functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
+        for traced in (*functions, system.reset):
+            for slot, place, count in tables_read(traced.casadi_function()):
+                if traced.inputs.names[slot] != "p":
+                    continue
+                for name in parameters:
+                    given = system.parameters.ranges[name]
+                    if given.start < place + count and place < given.stop:
+                        raise InputError(
+                            f"the parameter '{name}' is a table that is read by index",
+                            where=system.name,
+                            allowed="parameters that are no entries of such tables",
+                            fix="take the difference of two runs for this one",
+                        )
         if system.guard_names and system.algebraic.size:
             raise InputError(
                 f"the events of '{system.guard_names[0]}' and the implicit equation of "

@@ -51,6 +51,30 @@ def reads_tables(function: Function) -> bool:
     return any(function.instruction_id(k) == casadi.OP_PRINTME for k in range(function.n_instructions()))
 
 
+def tables_read(function: Function) -> set[tuple[int, int, int]]:
+    """Which tables a function reads: the input that each is part of, its first place there, its length."""
+    found: set[tuple[int, int, int]] = set()
+    if not reads_tables(function):
+        return found
+    inputs: dict[int, tuple[int, int]] = {}  # which input a work slot holds now
+    constants: dict[int, float] = {}
+    for k in range(function.n_instructions()):
+        number, sources = function.instruction_id(k), function.instruction_input(k)
+        target = function.instruction_output(k)[0]
+        if number == casadi.OP_OUTPUT:
+            continue
+        if number == casadi.OP_PRINTME and sources[0] in inputs and constants.get(sources[1], 0.0) < 0.0:
+            slot, place = inputs[sources[0]]
+            found.add((slot, place, int(-constants[sources[1]])))
+        inputs.pop(target, None)
+        constants.pop(target, None)
+        if number == casadi.OP_INPUT:
+            inputs[target] = (sources[0], sources[1])
+        elif number == casadi.OP_CONST:
+            constants[target] = function.instruction_constant(k)
+    return found
+
+
 def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[Any]:
     """The values of a function that reads tables: every operation by CasADi, every read here. Slow."""
     outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]

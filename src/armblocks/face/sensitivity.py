@@ -67,8 +67,9 @@ def sensitivity(
     the same error control; ticks, implicit equations and the instants of events are accounted for.
     ``values``: other values of parameters; ``settings`` those of the run, as in :func:`simulate`.
 
-    Raises ``UnknownNameError`` for names; ``InputError`` for a parameter that says when a signal jumps, and
-    where events and implicit equations come together; ``SimulationError`` as a run does.
+    Raises ``UnknownNameError`` for names; ``InputError`` for a parameter that says when a signal jumps or
+    is a table that is read by index, and where events and implicit equations come together;
+    ``SimulationError`` as a run does.
     """
     described = described_diagram(diagram, values)
     system = compile_diagram(described).system

@@ -1,0 +1,141 @@
+"""Algebraic constraints against closed forms; decision tables against Python's own."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    AlgebraicConstraint,
+    Clock,
+    Constant,
+    Derivative,
+    Expression,
+    Gain,
+    Integrator,
+    MatrixGain,
+    Mux,
+    SineWave,
+    Sum,
+    TruthTable,
+    ZeroOrderHold,
+)
+from armblocks.errors import AlgebraicLoopError, InputError
+
+RUNS: list[dict[str, Any]] = [
+    {"solver": "rk4", "step": 0.01},
+    {"solver": "rk45", "rtol": 1e-9, "atol": 1e-12},
+    {"solver": "rodas5p", "rtol": 1e-9, "atol": 1e-12},
+]
+
+
+def constrained(formula: str, initial: float = 0.0) -> ab.DiagramBuilder:
+    """z such that formula(z, t) = 0, its derivative and integral, and what a sampled block sees of it."""
+    builder = ab.DiagramBuilder("constrained", settings=ab.SimulationOptions(stop_time=2.0, sample_time=0.1))
+    z = builder.add("z", AlgebraicConstraint(initial=initial))
+    time = builder.add("time", Clock())
+    f = builder.add("f", Expression(formula=formula, inputs=2), z, time)
+    builder.connect(f, z["u"])
+    builder.add("rate", Derivative(), z)
+    builder.add("integral", Integrator(), z)
+    builder.add("held", ZeroOrderHold(sample_time=0.5), z)
+    return builder
+
+
+@pytest.mark.parametrize("settings", RUNS)
+def test_the_root_is_the_one_next_to_the_start_and_moves_along(settings: dict[str, Any]) -> None:
+    for sign in (1.0, -1.0):
+        result = ab.simulate(constrained("u1 ^ 2 - 1 - u2", initial=3.0 * sign).build(), **settings)
+        expected = sign * np.sqrt(1.0 + result.time)
+        np.testing.assert_allclose(result["z"], expected, rtol=1e-9)
+        np.testing.assert_allclose(result["rate"], 0.5 / expected, rtol=1e-8)
+        exact = sign * 2.0 / 3.0 * ((1.0 + result.time) ** 1.5 - 1.0)
+        np.testing.assert_allclose(result["integral"], exact, rtol=1e-6, atol=1e-9)
+        held = expected[np.floor(result.time / 0.5 + 1e-9).astype(int) * 5]
+        np.testing.assert_allclose(result["held"], held, rtol=1e-9)
+
+
+def test_a_linear_equation_is_solved_while_compiling() -> None:
+    diagram = constrained("4 * u1 - u2").build()
+    assert ab.compile_diagram(diagram).system.algebraic.size == 0
+    result = ab.simulate(diagram)
+    assert np.array_equal(result["z"], result.time / 4.0)
+    np.testing.assert_allclose(result["rate"], 0.25, rtol=1e-15)
+
+
+def test_a_vector_is_solved_as_a_whole() -> None:
+    matrix = ((2.0, 1.0), (-1.0, 3.0))
+    builder = ab.DiagramBuilder("vector", settings=ab.SimulationOptions(stop_time=1.0))
+    z = builder.add("z", AlgebraicConstraint(initial=(0.0, 0.0)))
+    right = builder.add("right", SineWave(phase=(0.0, 1.0)))
+    builder.connect(
+        builder.add("f", Sum(signs="+-"), builder.add("A", MatrixGain(gain=matrix), z), right), z["u"]
+    )
+    result = ab.simulate(builder.build())
+    np.testing.assert_allclose(result["z"] @ np.transpose(matrix), result["right"], rtol=1e-14, atol=1e-15)
+
+
+def test_two_constraints_that_hang_together() -> None:
+    """a + b = 3 and a b = 2 with a > b: 2 and 1."""
+    builder = ab.DiagramBuilder("pair", settings=ab.SimulationOptions(stop_time=1.0))
+    a = builder.add("a", AlgebraicConstraint(initial=3.0))
+    b = builder.add("b", AlgebraicConstraint(initial=0.5))
+    builder.connect(builder.add("sum", Expression(formula="u1 + u2 - 3", inputs=2), a, b), a["u"])
+    builder.connect(builder.add("product", Expression(formula="u1 * u2 - 2", inputs=2), a, b), b["u"])
+    result = ab.simulate(builder.build())
+    np.testing.assert_allclose(result["a"], 2.0, rtol=1e-12)
+    np.testing.assert_allclose(result["b"], 1.0, rtol=1e-12)
+
+
+def test_an_input_without_influence_is_refused() -> None:
+    builder = ab.DiagramBuilder("alone")
+    z = builder.add("z", AlgebraicConstraint(), builder.add("one", Constant()))
+    builder.add("double", Gain(gain=2.0), z)
+    with pytest.raises(AlgebraicLoopError, match="z/z"):
+        ab.simulate(builder.build())
+
+
+def test_its_linear_system_is_that_of_the_implicit_function() -> None:
+    """x' = z with z^3 + z = u + x: at z = 1 the slope is 1 / 4."""
+    builder = ab.DiagramBuilder("flow")
+    z = builder.add("z", AlgebraicConstraint(initial=0.9))
+    x = builder.add("x", Integrator(initial=1.5), z)
+    drive = builder.add("drive", Constant(value=0.5))
+    builder.connect(
+        builder.add("f", Expression(formula="u1^3 + u1 - u2 - u3", inputs=3), z, x, drive), z["u"]
+    )
+    linear = ab.linearize(builder.build(), inputs="drive.value", outputs="z")
+    np.testing.assert_allclose([linear.A, linear.B, linear.C, linear.D], 0.25, rtol=1e-9)
+
+
+DECISIONS = ((1.0, -1.0, 0.0), (0.0, 1.0, -1.0), (-1.0, 0.0, 1.0), (-1.0, -1.0, -1.0))
+ACTIONS = ((1.0, 10.0), (2.0, 20.0), (3.0, 30.0), (4.0, 40.0))
+
+
+def decided(conditions: tuple[int, ...]) -> tuple[float, ...]:
+    for wanted, action in zip(DECISIONS, ACTIONS):
+        if all(want in (-1.0, float(given)) for want, given in zip(wanted, conditions)):
+            return action
+    raise AssertionError("the last row decides")
+
+
+@pytest.mark.parametrize("conditions", list(itertools.product((0, 1), repeat=3)))
+@pytest.mark.parametrize("settings", RUNS[:2])
+def test_the_first_decision_that_fits_is_taken(conditions: tuple[int, ...], settings: dict[str, Any]) -> None:
+    builder = ab.DiagramBuilder("table", settings=ab.SimulationOptions(stop_time=1.0))
+    given = [builder.add(f"c{k}", Constant(value=5.0 * value)) for k, value in enumerate(conditions)]
+    table = TruthTable(decisions=DECISIONS, actions=ACTIONS)
+    builder.add("table", table, builder.add("mux", Mux(inputs=3), *given))
+    result = ab.simulate(builder.build(), **settings)
+    assert tuple(result["table"][-1]) == decided(conditions)
+
+
+def test_tables_that_do_not_decide_are_refused() -> None:
+    with pytest.raises(InputError, match=r"the conditions \[0, 1\] are not decided"):
+        TruthTable(decisions=((1.0, -1.0), (-1.0, 0.0)), actions=((1.0,), (0.0,)))
+    with pytest.raises(InputError, match=r"there are 2 decisions and 1 actions"):
+        TruthTable(actions=((1.0,),))
+    with pytest.raises(InputError, match=r"there are 13 conditions"):
+        TruthTable(decisions=((-1.0,) * 13,), actions=((1.0,),))
