@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -52,6 +53,25 @@ def prepare(*extras: str) -> None:
     if code != 0:
         sys.exit(f"pip could not install armblocks (exit code {code}); its own message stands above")
     STAMP.write_text(json.dumps({"digest": wanted_by_pyproject, "extras": together}), encoding="utf-8")
+
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def prepare_browser() -> None:
+    """See that there is a browser for the journeys through the studio; on Debian and Ubuntu, install one.
+
+    Exits with a message where there is none and none can be installed: a check that is left out is no check.
+    """
+    if any(shutil.which(name) for name in BROWSERS):
+        return
+    if shutil.which("apt-get") and hasattr(os, "geteuid"):
+        sudo = [] if os.geteuid() == 0 else ["sudo", "-n"]
+        apt = [*sudo, "apt-get", "-q", "-y", "-o", "DPkg::Lock::Timeout=500"]
+        say("== install chromium")
+        if run(*apt, "update") == 0 and run(*apt, "install", "--no-install-recommends", "chromium") == 0:
+            return
+    sys.exit(f"the tests of the studio need a browser: install one of {', '.join(BROWSERS)}")
 
 
 def _runs() -> bool:

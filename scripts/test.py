@@ -10,11 +10,13 @@ import argparse
 import sys
 import time
 
-from environment import BINARIES, PYTHON, ROOT, prepare, run, say
+from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, run, say
 
-SOURCES = ("src", "tests", "scripts", "docs", "benchmarks")
+SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py")
 
 STEPS: dict[str, tuple[str | object, ...]] = {
+    "page": (PYTHON, "hatch_build.py"),
+    "web types": (PYTHON, "scripts/studio_types.py", "--check"),
     "lint": (BINARIES / "ruff", "check", *SOURCES),
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),
     "types": (BINARIES / "pyright", "--warnings"),
@@ -37,6 +39,7 @@ def main() -> int:
         if name not in STEPS:
             parser.error(f"there is no step named '{name}'; the steps are {', '.join(STEPS)}")
     prepare("test")
+    prepare_browser()
     outcome: dict[str, tuple[int, float]] = {}
     for name, command in STEPS.items():
         if asked and name not in asked:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import armblocks as ab
-from armblocks.blocks import BLOCKS, Clock
+from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, diagram_views
-from armblocks.diagram.structure import PASS_THROUGH, Subsystem
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.face.block_examples import caption
 from armblocks.formats import diagram_to_python
@@ -54,17 +53,6 @@ def test_a_robot_without_a_name_cannot_be_said_in_python() -> None:
         FormatError, match=r"neither a shipped one nor that of a file.*write the diagram as JSON"
     ):
         diagram_to_python(ab.load_diagram("falling_pendulum"))
-
-
-def test_a_diagram_inside_a_block_cannot_be_said_in_python() -> None:
-    builder = ab.DiagramBuilder("outer")
-    builder.add(
-        "inner",
-        Subsystem(diagram=dataclasses.replace(PASS_THROUGH, name="other")),
-        builder.add("clock", Clock()),
-    )
-    with pytest.raises(FormatError, match=r"a Subsystem holds a diagram of its own, 'other'.*all levels"):
-        diagram_to_python(builder.build())
 
 
 def test_an_unknown_block_has_no_example() -> None:

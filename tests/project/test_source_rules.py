@@ -22,6 +22,8 @@ FORBIDDEN_IMPORTS = {
     "socket",
     "requests",
 }
+DOORS = {"studio/launch.py": {"socket", "urllib"}}
+"""Files that may import one of these, for what they are there for."""
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "manager", "core", "misc", "common"}
 LONGEST_FUNCTION = 80
 
@@ -55,16 +57,15 @@ def test_public_definitions_have_docstrings(tree: ast.Module) -> None:
     assert [node.name for node in public_definitions(tree) if not ast.get_docstring(node)] == []
 
 
-def test_nothing_is_evaluated_pickled_or_fetched(tree: ast.Module) -> None:
+def test_nothing_is_evaluated_pickled_or_fetched(tree: ast.Module, request: pytest.FixtureRequest) -> None:
+    forbidden = FORBIDDEN_IMPORTS - DOORS.get(request.node.callspec.id, set())
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id not in FORBIDDEN_CALLS, f"line {node.lineno}"
         if isinstance(node, ast.Import):
-            assert not {name.name.split(".")[0] for name in node.names} & FORBIDDEN_IMPORTS, (
-                f"line {node.lineno}"
-            )
+            assert not {name.name.split(".")[0] for name in node.names} & forbidden, f"line {node.lineno}"
         if isinstance(node, ast.ImportFrom):
-            assert (node.module or "").split(".")[0] not in FORBIDDEN_IMPORTS, f"line {node.lineno}"
+            assert (node.module or "").split(".")[0] not in forbidden, f"line {node.lineno}"
         if isinstance(node, ast.keyword) and node.arg == "allow_pickle":
             assert isinstance(node.value, ast.Constant), f"line {node.lineno}"
             assert node.value.value is False, f"line {node.lineno}"

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from armblocks.cli import bench, blocks, linearize, listing, run, show, trim
+from armblocks.cli import bench, blocks, linearize, listing, run, show, studio, trim
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
@@ -53,6 +53,7 @@ app.command("show")(show.show)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)
 app.command("bench")(bench.bench)
+app.command("studio")(studio.studio)
 
 
 def _say_version(asked: bool) -> None:

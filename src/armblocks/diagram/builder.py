@@ -167,7 +167,13 @@ class DiagramBuilder:
 
     def build(self) -> Diagram:
         """The frozen diagram, after all checks of :func:`armblocks.diagram.check.check_diagram`."""
-        diagram = Diagram(
+        diagram = self.draft()
+        check_diagram(diagram)
+        return diagram
+
+    def draft(self) -> Diagram:
+        """The frozen diagram as it stands, unchecked: a drawing in progress."""
+        return Diagram(
             name=self.name,
             blocks=self._blocks,
             connections=tuple(Connection(source, target) for target, source in self._wires.items()),
@@ -176,8 +182,6 @@ class DiagramBuilder:
             extras=self._extras,
             description=self.description,
         )
-        check_diagram(diagram)
-        return diagram
 
     def _next_port(self, kind: type[Inport | Outport]) -> int:
         given = [block.port for block in self._blocks.values() if isinstance(block, kind)]

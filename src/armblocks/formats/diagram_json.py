@@ -65,7 +65,7 @@ _DOCUMENT_KEYS = ("format", "name", "description", "blocks", "connections", "lay
 _INNER_KEYS = ("name", "description", "blocks", "connections", "layout", "settings")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
-_WIRE = re.compile(r"([^/]+)/([^/\s]+) -> ([^/]+)/([^/\s]+)")
+_WIRE = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
 _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 _NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
 
@@ -81,19 +81,22 @@ def diagram_from_bytes(
     *,
     folder: Path | None = None,
     trust: bool = False,
+    draft: bool = False,
 ) -> Diagram:
     """The checked diagram of a document; ``library`` holds the block types that it may use.
 
     ``name`` is what messages call the file; a robot's path is relative to ``folder``, and ``resolve_robot``
     turns a shipped name or a path into a robot. Python functions that the diagram names are only loaded,
-    which runs their file, with ``trust``. Raises ``FormatError`` for what the format forbids,
+    which runs their file, with ``trust``. With ``draft`` the diagram may be one that cannot run yet: open
+    inputs, shapes that do not fit. Raises ``FormatError`` for what the format forbids,
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, and ``DiagramError`` for a
     diagram that cannot be built. All name the file, and the line where the fault has one.
     """
     root = read_document(data, name, MOST_BYTES, DEEPEST)
     members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
-    reader = _Reader(library, RobotReader(members.get("robots"), folder, resolve_robot, trust=trust))
+    robots = RobotReader(members.get("robots"), folder, resolve_robot, trust=trust)
+    reader = _Reader(library, robots, draft=draft)
     return reader.diagram(root, _DOCUMENT_KEYS, Path(name).stem)
 
 
@@ -228,12 +231,13 @@ def _joined(node: Node, error: ArmblocksError) -> str:
 class _Reader:
     """Makes the diagrams of one document."""
 
-    def __init__(self, library: BlockLibrary, robots: RobotReader) -> None:
+    def __init__(self, library: BlockLibrary, robots: RobotReader, *, draft: bool) -> None:
         self.library = library
         self.robots = robots
+        self.draft = draft
 
     def diagram(self, node: Node, known: tuple[str, ...], name: str) -> Diagram:
-        """The checked diagram of an object; ``name`` where it says none."""
+        """The diagram of an object, checked unless it is a draft; ``name`` where it says none."""
         extras: Extras = {}
         members = _split(node, known, extras, "")
         settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
@@ -258,7 +262,7 @@ class _Reader:
                 key, place.x, place.y, width=place.width, height=place.height, flipped=place.flipped
             )
         with _located(node):
-            return builder.build()
+            return builder.draft() if self.draft else builder.build()
 
     def _block(self, key: str, node: Node, extras: Extras) -> Block:
         if "type" not in node.members():

@@ -35,8 +35,8 @@ _WITHOUT_FRICTION = {
 def diagram_to_python(diagram: Diagram) -> str:
     """Lines that build the diagram as ``diagram`` and run it as ``result``.
 
-    Robots must be shipped ones, or those of a file. Raises ``FormatError`` for another robot, and
-    for a diagram inside a block. Layout, description and unknown keys of a file are not written.
+    Robots must be shipped ones, or those of a file. Raises ``FormatError`` for another robot. Layout,
+    description and unknown keys of a file are not written.
     """
     order = _reading_order(diagram)
     kinds = sorted({diagram.blocks[name].type_name() for name in order})
@@ -161,13 +161,6 @@ def _construction(block: Block, robots: Mapping[Robot, str]) -> str:
         value = block.parameter_value(rule.name)
         if not rule.required and rule.check(rule.default, "") == value:
             continue
-        if isinstance(value, Diagram):
-            raise FormatError(
-                f"a {block.title} holds a diagram of its own, '{value.name}'",
-                where=f"{block.type_name()}.{rule.name}",
-                allowed="diagrams of one level",
-                fix="write the diagram as JSON, which holds all levels",
-            )
         stated.append(f"{rule.name}={robots[value] if isinstance(value, Robot) else _value(value)}")
     return f"{block.type_name()}({', '.join(stated)})"
 

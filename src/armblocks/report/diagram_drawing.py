@@ -139,7 +139,8 @@ def _trend(path: str, view: View | None, result: SimulationResult | None) -> Tre
     )
 
 
-def _block(box: Box, trend: Trend | None) -> list[Mark]:
+def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
+    """A block without its name: outline, port names and face, where its box stands."""
     shape = _shape(box)
     marks: list[Mark] = [block_faces.outline(shape, box.x, box.y, box.width, box.height, box.flipped)]
     room = Room(box.x, box.y, box.width, box.height)
@@ -150,6 +151,11 @@ def _block(box: Box, trend: Trend | None) -> list[Mark]:
         marks += _signs(box)
     if shape is not FaceShape.BAR:
         marks += block_faces.face(box.block, room, trend)
+    return marks
+
+
+def _block(box: Box, trend: Trend | None) -> list[Mark]:
+    shape, marks = _shape(box), block_marks(box, trend)
     lx, ly, lw, _ = _label(box)
     name = shorten(box.name, NAME_SIZE, lw + 1)
     if shape is FaceShape.CIRCLE:

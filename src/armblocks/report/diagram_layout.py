@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from armblocks.diagram import Block, Diagram
+from armblocks.diagram import Block, Diagram, Placement
 from armblocks.report.block_faces import FaceShape, face_size, port_labels
 from armblocks.report.text_width import text_width
 
@@ -65,17 +65,20 @@ class Box:
 
 def boxes(diagram: Diagram) -> dict[str, Box]:
     """Every block's box: from the diagram's layout if it names all blocks, else from :func:`layered`."""
-    sized = {name: sized_box(name, block) for name, block in diagram.blocks.items()}
     if not diagram.layout or set(diagram.layout) < set(diagram.blocks):
+        sized = {name: sized_box(name, block) for name, block in diagram.blocks.items()}
         return _turned(diagram, layered(diagram, sized))
-    placed: dict[str, Box] = {}
-    for name, box in sized.items():
-        place = diagram.layout[name]
-        width, height = place.width or box.width, place.height or box.height
-        placed[name] = _with_ports(
-            replace(box, x=place.x, y=place.y, width=width, height=height, flipped=place.flipped)
-        )
+    placed = {name: standing_box(name, block, diagram.layout[name]) for name, block in diagram.blocks.items()}
     return _turned(diagram, _straightened(diagram, placed))
+
+
+def standing_box(name: str, block: Block, place: Placement) -> Box:
+    """The box of a block that stands at ``place``, whatever is connected to it."""
+    sized = sized_box(name, block)
+    width, height = place.width or sized.width, place.height or sized.height
+    return _with_ports(
+        replace(sized, x=place.x, y=place.y, width=width, height=height, flipped=place.flipped)
+    )
 
 
 def _straightened(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
@@ -120,6 +123,8 @@ def _turned(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
             for wire in diagram.connections
             if wire.target.block == name
         }
+        if len(height) < count:
+            continue  # a drawing in progress: nothing says yet from where the open input will come
         ports = [spot.name for spot in box.inputs]
         # From behind comes what comes most nearly straight; a loop's return never does.
         behind = {

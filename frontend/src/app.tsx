@@ -1,0 +1,80 @@
+import { useComputedColorScheme } from '@mantine/core'
+import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps, type IDockviewPanelProps } from 'dockview-react'
+import { lazy, Suspense } from 'react'
+import { Canvas } from './canvas/canvas'
+import { ConnectDialog } from './canvas/connect_dialog'
+import { BlockDialog } from './inspector/block_dialog'
+import { Palette } from './library/palette'
+import { QuickInsert } from './library/quick_insert'
+import { Notices } from './notices'
+import { TopBar } from './run/top_bar'
+import { Timeline } from './run/timeline'
+import { Shortcuts } from './shortcuts'
+import { Scopes } from './scopes/scopes'
+
+const RobotView = lazy(() => import('./robot/robot_view'))
+
+const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
+  library: Palette,
+  canvas: Canvas,
+  scopes: Scopes,
+  robot: () => (
+    <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
+      <RobotView />
+    </Suspense>
+  ),
+}
+
+/** A tab with nothing to press inside it: the panels stay, and only their places change. */
+function Tab({ api }: IDockviewPanelHeaderProps) {
+  return <span className="tab">{api.title}</span>
+}
+
+/** The first arrangement: library, canvas, robot, and the scopes below. */
+function arrange({ api }: DockviewReadyEvent): void {
+  api.addPanel({ id: 'canvas', component: 'canvas', title: 'Diagram' })
+  api.addPanel({
+    id: 'library',
+    component: 'library',
+    title: 'Library',
+    position: { referencePanel: 'canvas', direction: 'left' },
+    initialWidth: 216,
+  })
+  api.addPanel({
+    id: 'robot',
+    component: 'robot',
+    title: 'Robot',
+    position: { referencePanel: 'canvas', direction: 'right' },
+    initialWidth: Math.min(420, 0.28 * innerWidth),
+  })
+  api.addPanel({
+    id: 'scopes',
+    component: 'scopes',
+    title: 'Scopes',
+    position: { referencePanel: 'canvas', direction: 'below' },
+    initialHeight: Math.min(300, 0.34 * innerHeight),
+  })
+}
+
+export function App() {
+  const scheme = useComputedColorScheme('light')
+  return (
+    <div className="studio">
+      <TopBar />
+      <main className="dock">
+        <DockviewReact
+          className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'}
+          components={panels}
+          defaultTabComponent={Tab}
+          onReady={arrange}
+        />
+      </main>
+      <Timeline />
+      <BlockDialog />
+      <QuickInsert />
+      <ConnectDialog />
+      <Shortcuts />
+      <Notices />
+    </div>
+  )
+}

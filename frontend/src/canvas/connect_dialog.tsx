@@ -1,0 +1,65 @@
+import { Button, Group, Modal, Select, Stack } from '@mantine/core'
+import { useEffect, useMemo, useState } from 'react'
+import { create } from 'zustand'
+import { change, useStudio } from '../store'
+
+const useConnectDialog = create<{ opened: boolean }>(() => ({ opened: false }))
+
+/** Open the dialog that draws a wire by the names of its ends. */
+export function openConnectDialog(): void {
+  useConnectDialog.setState({ opened: true })
+}
+
+/** The way to draw a wire by keyboard: type the names of two ports. The selected block's are suggested. */
+export function ConnectDialog() {
+  const { opened } = useConnectDialog()
+  const blocks = useStudio((s) => s.document?.blocks)
+  const wires = useStudio((s) => s.document?.wires)
+  const selection = useStudio((s) => s.selection)
+  const [source, setSource] = useState<string | null>(null)
+  const [target, setTarget] = useState<string | null>(null)
+  const close = () => useConnectDialog.setState({ opened: false })
+  const sources = useMemo(() => Object.values(blocks ?? {}).flatMap(({ name, outputs }) => outputs.map((port) => `${name}/${port.name}`)), [blocks])
+  const targets = useMemo(() => {
+    const driven = new Set(wires?.map((wire) => wire.target))
+    return Object.values(blocks ?? {})
+      .flatMap(({ name, inputs }) => inputs.map((port) => `${name}/${port.name}`))
+      .filter((port) => !driven.has(port))
+  }, [blocks, wires])
+  useEffect(() => {
+    if (!opened) return
+    const of = (ports: string[]) => ports.find((port) => [...selection].some((name) => port.startsWith(`${name}/`))) ?? null
+    setSource(of(sources))
+    setTarget(selection.size > 1 ? of(targets) : null)
+    // The suggestion is made once, when the dialog opens.
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [opened])
+  const draw = () => {
+    if (!source || !target) return
+    close()
+    void change({ kind: 'connect', wire: { source, target } })
+  }
+  return (
+    <Modal opened={opened} onClose={close} title="Draw a wire" size="sm">
+      <form
+        onSubmit={(event) => {
+          event.preventDefault()
+          draw()
+        }}
+      >
+        <Stack gap="sm">
+          <Select label="From the output" data={sources} value={source} onChange={setSource} searchable selectFirstOptionOnChange data-autofocus={!source || undefined} nothingFoundMessage="no such output" />
+          <Select label="To the input" data={targets} value={target} onChange={setTarget} searchable selectFirstOptionOnChange data-autofocus={source ? true : undefined} nothingFoundMessage="no such free input" />
+          <Group justify="flex-end" gap="xs">
+            <Button variant="default" onClick={close}>
+              Cancel
+            </Button>
+            <Button type="submit" disabled={!source || !target}>
+              Connect
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  )
+}

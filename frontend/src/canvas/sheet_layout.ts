@@ -1,0 +1,102 @@
+import type { SheetBlock, Wire } from '../protocol'
+import { route, type Net, type Obstacle, type RoutedNet, type WireEnd } from './router'
+
+const NAME_SIZE = 11
+const NAME_ROOM = 20
+
+export const wireKey = (wire: Wire): string => `${wire.source} -> ${wire.target}`
+export const blockOf = (port: string): string => port.slice(0, port.lastIndexOf('/'))
+export const portOf = (port: string): string => port.slice(port.lastIndexOf('/') + 1)
+
+let ruler: CanvasRenderingContext2D | null | undefined
+
+/** Width of a block's name, px. */
+export function nameWidth(name: string): number {
+  ruler ??= document.createElement('canvas').getContext('2d')
+  if (!ruler) return 6 * name.length
+  ruler.font = `${NAME_SIZE}px 'Inter Variable', sans-serif`
+  return Math.min(ruler.measureText(name).width, 168)
+}
+
+/** Blocks by name, at the places where they are drawn now (which a drag may have changed). */
+export type Places = Record<string, { x: number; y: number }>
+
+function obstacle(block: SheetBlock, at: { x: number; y: number }): Obstacle {
+  const width = nameWidth(block.name)
+  return {
+    x: at.x,
+    y: at.y,
+    width: block.width,
+    height: block.height,
+    label: [at.x + (block.width - width) / 2, at.y + block.height + 2, width, NAME_ROOM - 4],
+  }
+}
+
+function end(block: SheetBlock, at: { x: number; y: number }, port: string, output: boolean): WireEnd | undefined {
+  const spot = (output ? block.outputs : block.inputs).find(({ name }) => name === port)
+  return spot && { x: at.x + spot.x, y: at.y + spot.y, dx: spot.dx, dy: spot.dy }
+}
+
+/**
+ * The wires of a sheet. What was laid is kept as long as no end of the net moved and no block was put on its way, so an
+ * edit costs what it touches and not the whole sheet.
+ */
+export class SheetRoutes {
+  private routed = new Map<string, RoutedNet>()
+  private nets = new Map<string, string>()
+  private obstacles = new Map<string, string>()
+
+  update(blocks: Record<string, SheetBlock>, wires: Wire[], places: Places): Map<string, RoutedNet> {
+    const nets = collect(blocks, wires, places)
+    const obstacles = new Map(Object.values(blocks).map((block) => [block.name, obstacle(block, places[block.name] ?? block.place)]))
+    const moved: Obstacle[] = []
+    const keys = new Map<string, string>()
+    for (const [name, box] of obstacles) {
+      const key = `${box.x} ${box.y} ${box.width} ${box.height}`
+      keys.set(name, key)
+      if (this.obstacles.get(name) !== key) moved.push(box)
+    }
+    this.obstacles = keys
+    const kept = new Map<string, RoutedNet>()
+    const fresh: Net[] = []
+    const described = new Map<string, string>()
+    for (const net of nets) {
+      const description = JSON.stringify([net.source, net.targets])
+      described.set(net.key, description)
+      const old = this.routed.get(net.key)
+      if (old && this.nets.get(net.key) === description && !moved.some((box) => crosses(old, box))) kept.set(net.key, old)
+      else fresh.push(net)
+    }
+    this.nets = described
+    const laid = fresh.length ? route([...obstacles.values()], fresh, kept) : new Map<string, RoutedNet>()
+    this.routed = new Map([...kept, ...laid])
+    return this.routed
+  }
+}
+
+function collect(blocks: Record<string, SheetBlock>, wires: Wire[], places: Places): Net[] {
+  const nets = new Map<string, Net>()
+  for (const wire of wires) {
+    const from = blocks[blockOf(wire.source)]
+    const to = blocks[blockOf(wire.target)]
+    if (!from || !to) continue
+    const source = end(from, places[from.name] ?? from.place, portOf(wire.source), true)
+    const target = end(to, places[to.name] ?? to.place, portOf(wire.target), false)
+    if (!source || !target) continue
+    const net = nets.get(wire.source) ?? { key: wire.source, source, targets: [] }
+    net.targets.push({ key: wireKey(wire), end: target })
+    nets.set(wire.source, net)
+  }
+  return [...nets.values()]
+}
+
+function crosses({ paths }: RoutedNet, box: Obstacle): boolean {
+  const [left, right, top, low] = [box.x - 4, box.x + box.width + 4, box.y - 4, box.y + box.height + 4]
+  for (const path of paths.values())
+    for (let k = 1; k < path.length; k++) {
+      const [a, b] = [path[k - 1]!, path[k]!]
+      if (Math.max(a[0], b[0]) > left && Math.min(a[0], b[0]) < right && Math.max(a[1], b[1]) > top && Math.min(a[1], b[1]) < low)
+        return true
+    }
+  return false
+}

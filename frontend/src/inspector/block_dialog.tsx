@@ -1,0 +1,167 @@
+import { Button, Code, Group, Modal, NativeSelect, Stack, Switch, Text, TextInput } from '@mantine/core'
+import { useEffect, useMemo, useState } from 'react'
+import { Refusal } from '../connection'
+import type { ParameterRule, SheetBlock } from '../protocol'
+import { change, line, useStudio } from '../store'
+import { valueText } from './value_text'
+
+const CHECK_DELAY_MS = 200
+
+/** The parameters of a block, made from its own declaration: what each is, its unit, what is allowed, what it means. */
+export function BlockDialog() {
+  const name = useStudio((s) => s.editing)
+  const block = useStudio((s) => (s.editing ? s.document?.blocks[s.editing] : undefined))
+  const edit = useStudio((s) => s.edit)
+  if (!name || !block) return null
+  return <Dialog key={name} block={block} onClose={() => edit(null)} />
+}
+
+function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) {
+  const kind = useStudio((s) => s.library.get(block.type))
+  const start = useMemo(
+    () => Object.fromEntries((kind?.parameters ?? []).map((rule) => [rule.name, valueText(block.parameters[rule.name])])),
+    [block, kind],
+  )
+  const [typed, setTyped] = useState<Record<string, string>>(start)
+  const [faults, setFaults] = useState<Record<string, string>>({})
+  if (!kind) return null
+  const changed = kind.parameters.filter(({ name }) => typed[name] !== start[name])
+  const wrong = Object.values(faults).some(Boolean)
+  const apply = async () => {
+    if (wrong) return false
+    if (!changed.length) return true
+    const values = Object.fromEntries(changed.map((rule) => [rule.name, sent(rule, typed[rule.name] ?? '')]))
+    return (await change({ kind: 'parameters', block: block.name, values })) !== undefined
+  }
+  const [summary, ...rest] = kind.documentation.split('\n\n')
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title={
+        <Group gap="xs">
+          <b>{block.name}</b>
+          <Text size="sm" c="dimmed">
+            {kind.title}
+          </Text>
+        </Group>
+      }
+      size="md"
+    >
+      <form
+        onSubmit={(event) => {
+          event.preventDefault()
+          void apply().then((done) => done && onClose())
+        }}
+      >
+        <Stack gap="sm">
+          <Text size="sm">{summary}</Text>
+          {rest.length > 0 && (
+            <details className="more">
+              <summary>More</summary>
+              {rest.map((paragraph) => (
+                <Text key={paragraph} size="sm" className="paragraph">
+                  {paragraph}
+                </Text>
+              ))}
+            </details>
+          )}
+          {kind.parameters.map((rule, index) => (
+            <Field
+              key={rule.name}
+              rule={rule}
+              type={block.type}
+              text={typed[rule.name] ?? ''}
+              focus={index === 0}
+              onText={(text) => setTyped((now) => ({ ...now, [rule.name]: text }))}
+              onFault={(fault) => setFaults((now) => (now[rule.name] === fault ? now : { ...now, [rule.name]: fault }))}
+            />
+          ))}
+          {kind.parameters.length === 0 && <Text size="sm">This block has no parameters.</Text>}
+          <Group justify="flex-end" gap="xs">
+            <Button variant="default" onClick={onClose}>
+              Cancel
+            </Button>
+            <Button variant="default" disabled={wrong || !changed.length} onClick={() => void apply()}>
+              Apply
+            </Button>
+            <Button type="submit" disabled={wrong}>
+              OK
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  )
+}
+
+interface FieldProps {
+  rule: ParameterRule
+  type: string
+  text: string
+  focus: boolean
+  onText: (text: string) => void
+  onFault: (fault: string) => void
+}
+
+function Field({ rule, type, text, focus, onText, onFault }: FieldProps) {
+  const robots = useStudio((s) => s.welcome?.robots)
+  const files = useStudio((s) => s.welcome?.files)
+  const { fault, value } = useCheck(rule, type, text, onFault)
+  const label = (
+    <>
+      {rule.name}
+      {rule.unit && <span className="unit"> {rule.unit}</span>}
+    </>
+  )
+  const common = { label, description: rule.doc, size: 'sm' as const, 'data-autofocus': focus || undefined }
+  if (rule.kind === 'boolean')
+    return <Switch label={label} description={rule.doc} checked={text === 'true'} onChange={(event) => onText(String(event.currentTarget.checked))} />
+  if (rule.kind === 'choice')
+    return <NativeSelect {...common} data={rule.choices} value={text} onChange={(event) => onText(event.currentTarget.value)} />
+  if (rule.kind === 'robot') {
+    const known = [...(robots ?? []), ...(files ?? [])]
+    return <NativeSelect {...common} data={known.includes(text) ? known : [text, ...known]} value={text} onChange={(event) => onText(event.currentTarget.value)} />
+  }
+  return (
+    <TextInput
+      {...common}
+      value={text}
+      onChange={(event) => onText(event.currentTarget.value)}
+      error={fault || undefined}
+      rightSection={value && value !== text && <Code className="meaning">= {value}</Code>}
+      rightSectionWidth={value && value !== text ? 16 + 7.2 * (value.length + 2) : undefined}
+      classNames={{ input: 'typed' }}
+    />
+  )
+}
+
+/** What the server says of a text while it is typed: its value, or what is wrong with it. */
+function useCheck(rule: ParameterRule, type: string, text: string, onFault: (fault: string) => void) {
+  const [state, setState] = useState({ fault: '', value: '' })
+  useEffect(() => {
+    if (['boolean', 'choice', 'robot'].includes(rule.kind)) return
+    let current = true
+    const report = (fault: string, value: string) => {
+      if (!current) return
+      setState({ fault, value })
+      onFault(fault)
+    }
+    const timer = setTimeout(() => {
+      line.ask({ kind: 'typed', type, parameter: rule.name, text }).then(
+        (value) => report('', valueText(value)),
+        (error: unknown) => error instanceof Refusal && report(`${error.what}. Allowed: ${error.allowed}`, ''),
+      )
+    }, CHECK_DELAY_MS)
+    return () => {
+      current = false
+      clearTimeout(timer)
+    }
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [text])
+  return state
+}
+
+function sent(rule: ParameterRule, text: string): unknown {
+  return rule.kind === 'boolean' ? text === 'true' : text
+}

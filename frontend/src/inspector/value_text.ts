@@ -1,0 +1,13 @@
+/** A parameter's value as one types it: `[1 2; 3 4]`, a robot by its name. */
+export function valueText(value: unknown): string {
+  if (Array.isArray(value)) {
+    const rows = value as unknown[]
+    if (rows.some((row) => Array.isArray(row))) return `[${rows.map((row) => (row as unknown[]).map(valueText).join(' ')).join('; ')}]`
+    return `[${rows.map(valueText).join(' ')}]`
+  }
+  if (value && typeof value === 'object' && 'source' in value) {
+    const { robot, source } = value as { robot: string; source: string }
+    return source || robot
+  }
+  return value === null || value === undefined ? '' : String(value)
+}

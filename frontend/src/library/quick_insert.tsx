@@ -1,0 +1,87 @@
+import { Modal, TextInput } from '@mantine/core'
+import { useEffect, useMemo, useState } from 'react'
+import { create } from 'zustand'
+import { insertBlock } from '../canvas/insert'
+import { useStudio } from '../store'
+import { Face } from './palette'
+import { matching } from './search'
+
+const MOST_SHOWN = 8
+
+interface QuickInsertState {
+  opened: boolean
+  typed: string
+  at: { x: number; y: number } | null
+}
+
+const useQuickInsert = create<QuickInsertState>(() => ({ opened: false, typed: '', at: null }))
+
+/** Open the list of blocks with what was typed so far; the block goes to `at` (screen px) or to a free place. */
+export function openQuickInsert(typed: string, at: { x: number; y: number } | null = null): void {
+  useQuickInsert.setState({ opened: true, typed, at })
+}
+
+/** Type a few letters, press Enter: the way to add a block by keyboard alone. */
+export function QuickInsert() {
+  const { opened, typed, at } = useQuickInsert()
+  const library = useStudio((s) => s.welcome?.library)
+  const [chosen, setChosen] = useState(0)
+  const found = useMemo(() => matching(library ?? [], typed).slice(0, MOST_SHOWN), [library, typed])
+  useEffect(() => setChosen(0), [typed])
+  const close = () => useQuickInsert.setState({ opened: false })
+  const insert = (index: number) => {
+    const kind = found[index]
+    if (!kind) return
+    close()
+    insertBlock(kind.type, at ? place(at) : freePlace())
+  }
+  return (
+    <Modal opened={opened} onClose={close} withCloseButton={false} size="sm" padding="xs" yOffset="18vh" title={undefined}>
+      <TextInput
+        aria-label="Add a block"
+        placeholder="Add a block: type its name"
+        data-autofocus
+        value={typed}
+        onChange={(event) => useQuickInsert.setState({ typed: event.currentTarget.value })}
+        onKeyDown={(event) => {
+          if (event.key === 'ArrowDown') setChosen(Math.min(chosen + 1, found.length - 1))
+          else if (event.key === 'ArrowUp') setChosen(Math.max(chosen - 1, 0))
+          else if (event.key === 'Enter') insert(chosen)
+          else return
+          event.preventDefault()
+        }}
+      />
+      <div role="listbox" aria-label="Blocks" className="found">
+        {found.map((kind, index) => (
+          <button key={kind.type} type="button" role="option" aria-selected={index === chosen} onClick={() => insert(index)} onMouseEnter={() => setChosen(index)}>
+            <Face kind={kind} />
+            <span>
+              <b>{kind.title}</b>
+              <small>{kind.summary}</small>
+            </span>
+          </button>
+        ))}
+        {found.length === 0 && <p className="empty">No block matches “{typed}”.</p>}
+      </div>
+    </Modal>
+  )
+}
+
+function place(at: { x: number; y: number }): { x: number; y: number } {
+  const pane = document.querySelector('.react-flow__viewport')
+  const matrix = new DOMMatrix(pane ? getComputedStyle(pane).transform : undefined)
+  const corner = document.querySelector('.react-flow')?.getBoundingClientRect()
+  return { x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a, y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a }
+}
+
+/** Right of the selected block, or right of everything: a new block never lies on another. */
+function freePlace(): { x: number; y: number } {
+  const { document: open, selection } = useStudio.getState()
+  const blocks = Object.values(open?.blocks ?? {})
+  const [last] = blocks.filter(({ name }) => selection.has(name))
+  let at = last ? { x: last.place.x + last.width + 90, y: last.place.y + last.height / 2 } : { x: 120, y: 120 }
+  if (!last && blocks.length) at = { x: Math.min(...blocks.map((b) => b.place.x)) + 40, y: Math.max(...blocks.map((b) => b.place.y + b.height)) + 80 }
+  const taken = (x: number, y: number) => blocks.some((b) => x > b.place.x - 60 && x < b.place.x + b.width + 60 && y > b.place.y - 45 && y < b.place.y + b.height + 45)
+  while (taken(at.x, at.y)) at = { x: at.x, y: at.y + 20 }
+  return at
+}

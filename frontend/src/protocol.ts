@@ -1,0 +1,492 @@
+/* Made from src/armblocks/studio/messages.py by scripts/studio_types.py: do not edit. */
+
+export interface Messages {
+  envelope: Envelope;
+  server: ServerMessage;
+}
+/**
+ * A request with its number.
+ */
+export interface Envelope {
+  number: number;
+  request:
+    | Open
+    | New
+    | Attach
+    | Look
+    | Change
+    | Undo
+    | Redo
+    | Save
+    | ArrangeBlocks
+    | Run
+    | Control
+    | SetSpeed
+    | Tune
+    | TypedValue
+    | Scene
+    | Pose;
+}
+/**
+ * Open a file of the project, or the shipped example of this name.
+ */
+export interface Open {
+  kind: "open";
+  path?: string;
+  example?: string;
+}
+/**
+ * Begin an empty drawing.
+ */
+export interface New {
+  kind: "new";
+}
+/**
+ * Show a document that is open already: after a reload, or in a second page.
+ */
+export interface Attach {
+  kind: "attach";
+  document: string;
+}
+/**
+ * Look at the sheet inside a subsystem; the empty path is the whole model.
+ */
+export interface Look {
+  kind: "look";
+  document: string;
+  inside: string[];
+}
+/**
+ * Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once.
+ */
+export interface Change {
+  kind: "change";
+  document: string;
+  key: string;
+  inside?: string[];
+  edit: AddBlocks | RemoveBlocks | Connect | MoveBlocks | Rename | SetParameters | GroupBlocks | SetSettings | Describe;
+}
+/**
+ * Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
+ */
+export interface AddBlocks {
+  kind: "add";
+  blocks: NewBlock[];
+  wires?: Wire[];
+}
+/**
+ * A block to be put on the sheet. ``parameters`` states those that are not at their default.
+ */
+export interface NewBlock {
+  name: string;
+  type: string;
+  parameters?: {
+    [k: string]: unknown;
+  };
+  place: Place;
+}
+/**
+ * Where a block stands: top left corner and, if not its own, its size in px.
+ */
+export interface Place {
+  x: number;
+  y: number;
+  width?: number | null;
+  height?: number | null;
+  flipped?: boolean;
+}
+/**
+ * A wire between two ports, written ``block/port``.
+ */
+export interface Wire {
+  source: string;
+  target: string;
+}
+/**
+ * Take blocks and wires off the sheet; the wires of the blocks go with them.
+ */
+export interface RemoveBlocks {
+  kind: "remove";
+  blocks?: string[];
+  wires?: Wire[];
+}
+/**
+ * Draw a wire. With ``replace`` the input's present wire gives way.
+ */
+export interface Connect {
+  kind: "connect";
+  wire: Wire;
+  replace?: boolean;
+}
+/**
+ * Put blocks elsewhere: one drag is one edit, however many blocks were in hand.
+ */
+export interface MoveBlocks {
+  kind: "move";
+  places: {
+    [k: string]: Place;
+  };
+}
+/**
+ * Give a block another name; its wires and its place go with it.
+ */
+export interface Rename {
+  kind: "rename";
+  block: string;
+  name: string;
+}
+/**
+ * Change parameters of one block. Wires to ports that thereby vanish are removed.
+ */
+export interface SetParameters {
+  kind: "parameters";
+  block: string;
+  values: {
+    [k: string]: unknown;
+  };
+}
+/**
+ * Put blocks into a subsystem of their own; its ports are the wires that are cut thereby.
+ */
+export interface GroupBlocks {
+  kind: "group";
+  blocks: string[];
+  name: string;
+}
+/**
+ * Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks.
+ */
+export interface SetSettings {
+  kind: "settings";
+  values: {
+    [k: string]: number | string | null;
+  };
+}
+/**
+ * Change the model's one-line description.
+ */
+export interface Describe {
+  kind: "describe";
+  text: string;
+}
+/**
+ * Take the last edit back.
+ */
+export interface Undo {
+  kind: "undo";
+  document: string;
+}
+/**
+ * Do again what was undone.
+ */
+export interface Redo {
+  kind: "redo";
+  document: string;
+}
+/**
+ * Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile.
+ */
+export interface Save {
+  kind: "save";
+  document: string;
+  path?: string;
+  overwrite?: boolean;
+}
+/**
+ * Lay the blocks out anew, from left to right.
+ */
+export interface ArrangeBlocks {
+  kind: "arrange";
+  document: string;
+  inside?: string[];
+}
+/**
+ * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
+ */
+export interface Run {
+  kind: "run";
+  document: string;
+  speed?: number | null;
+}
+/**
+ * Say how a run goes on.
+ */
+export interface Control {
+  kind: "control";
+  run: string;
+  action: "pause" | "resume" | "step" | "stop";
+}
+/**
+ * Change the speed of a run; ``None``: as fast as possible.
+ */
+export interface SetSpeed {
+  kind: "speed";
+  run: string;
+  speed?: number | null;
+}
+/**
+ * Change a tunable parameter of a run that is under way.
+ */
+export interface Tune {
+  kind: "tune";
+  run: string;
+  parameter: string;
+  value: unknown;
+}
+/**
+ * Ask what a text typed into a parameter's field means: its value, or what is wrong with it.
+ */
+export interface TypedValue {
+  kind: "typed";
+  type: string;
+  parameter: string;
+  text: string;
+}
+/**
+ * Ask for the bodies of the robot that a block shows.
+ */
+export interface Scene {
+  kind: "scene";
+  document: string;
+  block: string;
+}
+/**
+ * Ask where the links of a block's robot are at joint coordinates ``q`` (rad, m).
+ */
+export interface Pose {
+  kind: "pose";
+  document: string;
+  block: string;
+  q: number[];
+}
+/**
+ * Only for the page's types: everything that the server sends as text.
+ */
+export interface ServerMessage {
+  event: Reply | Welcome | Opened | Changed | Checked | RunStarted | RunProgress;
+}
+/**
+ * The answer to a request: ``fault`` where it was refused.
+ */
+export interface Reply {
+  kind: "reply";
+  number: number;
+  value?: {
+    [k: string]: unknown;
+  };
+  fault?: Fault | null;
+}
+/**
+ * Why a request was refused, in the parts of an ``ArmblocksError``.
+ */
+export interface Fault {
+  what: string;
+  where: string;
+  allowed: string;
+  fix: string;
+}
+/**
+ * The first message: the library, the examples, the files and the documents that are open.
+ */
+export interface Welcome {
+  kind: "welcome";
+  version: string;
+  library: BlockType[];
+  robots: string[];
+  solvers: string[];
+  examples: {
+    [k: string]: string;
+  };
+  files: string[];
+  documents: DocumentState[];
+}
+/**
+ * A type of block in the library palette. ``face`` is the drawing of one with the default parameters.
+ */
+export interface BlockType {
+  type: string;
+  title: string;
+  family: string;
+  summary: string;
+  documentation: string;
+  width: number;
+  height: number;
+  face: string;
+  parameters: ParameterRule[];
+}
+/**
+ * One parameter of a type of block, as its dialog needs it.
+ */
+export interface ParameterRule {
+  name: string;
+  kind: string;
+  doc: string;
+  unit: string;
+  default: unknown;
+  tunable: boolean;
+  choices: string[];
+  allowed: string;
+}
+/**
+ * Where a document stands.
+ */
+export interface DocumentState {
+  document: string;
+  version: number;
+  title: string;
+  path: string | null;
+  dirty: boolean;
+  undo: string;
+  redo: string;
+}
+/**
+ * A whole document, for a page that shows it from now on.
+ */
+export interface Opened {
+  kind: "opened";
+  state: DocumentState;
+  inside: string[];
+  sheet: Sheet;
+}
+/**
+ * The whole drawing.
+ */
+export interface Sheet {
+  name: string;
+  description: string;
+  blocks: {
+    [k: string]: SheetBlock;
+  };
+  wires: Wire[];
+  settings: {
+    [k: string]: number | string | null;
+  };
+}
+/**
+ * A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes.
+ */
+export interface SheetBlock {
+  name: string;
+  type: string;
+  title: string;
+  place: Place;
+  width: number;
+  height: number;
+  face: string;
+  inputs: PortSpot[];
+  outputs: PortSpot[];
+  opens: boolean;
+  parameters: {
+    [k: string]: unknown;
+  };
+}
+/**
+ * A port on the edge of its block: px from the block's corner, and the direction of its wire.
+ */
+export interface PortSpot {
+  name: string;
+  doc: string;
+  label: string;
+  unit: string;
+  x: number;
+  y: number;
+  dx: number;
+  dy: number;
+}
+/**
+ * A document went from one version to another.
+ */
+export interface Changed {
+  kind: "changed";
+  state: DocumentState;
+  before: number;
+  change: SheetChange;
+}
+/**
+ * From one version of the drawing to the next.
+ */
+export interface SheetChange {
+  blocks: {
+    [k: string]: SheetBlock | null;
+  };
+  wires_added: Wire[];
+  wires_removed: Wire[];
+  description?: string | null;
+  settings?: {
+    [k: string]: number | string | null;
+  } | null;
+}
+/**
+ * What the background check found in one version of a document; ``wires`` by source port.
+ */
+export interface Checked {
+  kind: "checked";
+  document: string;
+  version: number;
+  findings: Finding[];
+  wires: {
+    [k: string]: WireKind;
+  };
+}
+/**
+ * What the background check says; ``block`` and ``port`` are ``""`` where it is of the whole drawing.
+ */
+export interface Finding {
+  severity: "error" | "warning";
+  block: string;
+  port: string;
+  what: string;
+  fix: string;
+}
+/**
+ * What runs on the wires that leave a port.
+ */
+export interface WireKind {
+  shape: number[];
+  unit: string;
+}
+/**
+ * A run has begun: what it records and how it is to be shown.
+ */
+export interface RunStarted {
+  kind: "run_started";
+  document: string;
+  run: string;
+  stop_time: number;
+  channels: Channel[];
+  views: ViewOf[];
+  aliases: {
+    [k: string]: string;
+  };
+  tunables: string[];
+}
+/**
+ * One recorded signal of a run and where its numbers lie in the columns of a frame.
+ */
+export interface Channel {
+  name: string;
+  shape: number[];
+  unit: string;
+}
+/**
+ * A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``.
+ */
+export interface ViewOf {
+  block: string;
+  kind: string;
+  signals: string[];
+  labels: string[];
+  title: string;
+}
+/**
+ * Where a run stands.
+ */
+export interface RunProgress {
+  kind: "run_progress";
+  run: string;
+  state: "running" | "paused" | "done" | "stopped" | "failed";
+  time: number;
+  real_time_factor: number;
+  message: string;
+  fault?: Fault | null;
+}

@@ -1,0 +1,180 @@
+import { ActionIcon, Badge, Button, Group, Menu, NumberInput, Select, Text, Tooltip } from '@mantine/core'
+import {
+  IconArrowBackUp,
+  IconArrowForwardUp,
+  IconDeviceFloppy,
+  IconLayoutDistributeHorizontal,
+  IconMenu2,
+  IconPlayerPauseFilled,
+  IconPlayerPlayFilled,
+  IconPlayerSkipForwardFilled,
+  IconPlayerStopFilled,
+  IconPlus,
+} from '@tabler/icons-react'
+import { useEffect } from 'react'
+import { openQuickInsert } from '../library/quick_insert'
+import { ask, change, useStudio } from '../store'
+import { useCursor } from './cursor'
+
+const SPEEDS = [
+  { value: '', label: 'as fast as possible' },
+  ...['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} × real time` })),
+]
+
+async function run(speed: string): Promise<void> {
+  const { document } = useStudio.getState()
+  if (!document) return
+  useCursor.setState({ time: null, playing: false })
+  await ask({ kind: 'run', document: document.state.document, speed: speed ? Number(speed) : null })
+}
+
+/** Save under the present name; asks for one where there is none. */
+export async function save(): Promise<void> {
+  const { document } = useStudio.getState()
+  if (!document) return
+  const path = document.state.path ?? window.prompt('Save as (a file of this folder)', `${document.name}.json`)
+  if (path) await ask({ kind: 'save', document: document.state.document, path })
+}
+
+let speed = ''
+
+export function TopBar() {
+  const document = useStudio((s) => s.document)
+  const state = useStudio((s) => s.run?.state)
+  const runKey = useStudio((s) => s.run?.run)
+  const busy = state === 'running' || state === 'paused'
+  const key = document?.state.document ?? ''
+  const control = (action: 'pause' | 'resume' | 'step' | 'stop') => runKey && void ask({ kind: 'control', run: runKey, action })
+  const start = () => (state === 'paused' ? control('resume') : void run(speed))
+
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (!(event.ctrlKey || event.metaKey)) return
+      const pressed = event.key.toLowerCase()
+      if (pressed === 'enter') start()
+      else if (pressed === 's') void save()
+      else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) void ask({ kind: 'undo', document: key })
+      else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) void ask({ kind: 'redo', document: key })
+      else if (pressed === 'k') openQuickInsert('')
+      else return
+      event.preventDefault()
+    }
+    addEventListener('keydown', onKey)
+    return () => removeEventListener('keydown', onKey)
+  })
+
+  return (
+    <header className="top-bar">
+      <FileMenu />
+      <Text fw={600} className="title" title={document?.description}>
+        {document?.state.title ?? 'armblocks'}
+        {document?.state.dirty && <span aria-label="changed"> •</span>}
+      </Text>
+      <Group gap={2} role="group" aria-label="Edit">
+        <Tool label={document?.state.undo ? `Undo ${document.state.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!document?.state.undo} onClick={() => void ask({ kind: 'undo', document: key })} />
+        <Tool label={document?.state.redo ? `Redo ${document.state.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!document?.state.redo} onClick={() => void ask({ kind: 'redo', document: key })} />
+        <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!document} onClick={() => void save()} />
+        <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!document} onClick={() => openQuickInsert('')} />
+        <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!document} onClick={() => void ask({ kind: 'arrange', document: key, inside: document?.inside ?? [] })} />
+      </Group>
+      <Group gap={4} role="group" aria-label="Run" className="run-controls">
+        <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!document || state === 'running'} onClick={start}>
+          {state === 'paused' ? 'Resume' : 'Run'}
+        </Button>
+        <Tool label="Pause" icon={IconPlayerPauseFilled} disabled={state !== 'running'} onClick={() => control('pause')} />
+        <Tool label="Step" icon={IconPlayerSkipForwardFilled} disabled={state !== 'paused'} onClick={() => control('step')} />
+        <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
+        <NumberInput
+          size="xs"
+          w={92}
+          aria-label="Stop time, s"
+          hideControls
+          min={0}
+          suffix=" s"
+          value={Number(document?.settings['stop_time'] ?? 10)}
+          onBlur={(event) => {
+            const value = Number.parseFloat(event.currentTarget.value)
+            if (document && value > 0 && value !== document.settings['stop_time']) void change({ kind: 'settings', values: { stop_time: value } })
+          }}
+        />
+        <Select
+          size="xs"
+          w={160}
+          aria-label="Speed"
+          data={SPEEDS}
+          defaultValue=""
+          allowDeselect={false}
+          onChange={(value) => {
+            speed = value ?? ''
+            if (busy && runKey) void ask({ kind: 'speed', run: runKey, speed: speed ? Number(speed) : null })
+          }}
+        />
+      </Group>
+      <RunState />
+    </header>
+  )
+}
+
+function Tool({ label, icon: Icon, disabled, onClick }: { label: string; icon: React.ComponentType<{ size: number }>; disabled: boolean; onClick: () => void }) {
+  return (
+    <Tooltip label={label} openDelay={400}>
+      <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={disabled} onClick={onClick}>
+        <Icon size={17} />
+      </ActionIcon>
+    </Tooltip>
+  )
+}
+
+function FileMenu() {
+  const welcome = useStudio((s) => s.welcome)
+  const diagrams = welcome?.files.filter((file) => file.endsWith('.json')) ?? []
+  return (
+    <Menu position="bottom-start" shadow="md" width={320}>
+      <Menu.Target>
+        <ActionIcon variant="subtle" color="gray" aria-label="Menu">
+          <IconMenu2 size={18} />
+        </ActionIcon>
+      </Menu.Target>
+      <Menu.Dropdown mah="80vh" style={{ overflow: 'auto' }}>
+        <Menu.Item onClick={() => void ask({ kind: 'new' })}>New diagram</Menu.Item>
+        <Menu.Label>Files of this folder</Menu.Label>
+        {diagrams.length === 0 && <Menu.Item disabled>none</Menu.Item>}
+        {diagrams.slice(0, 30).map((path) => (
+          <Menu.Item key={path} onClick={() => void ask({ kind: 'open', path })}>
+            {path}
+          </Menu.Item>
+        ))}
+        <Menu.Label>Examples</Menu.Label>
+        {Object.entries(welcome?.examples ?? {}).map(([example, description]) => (
+          <Menu.Item key={example} onClick={() => void ask({ kind: 'open', example })}>
+            {example}
+            <Text size="xs" c="dimmed">
+              {description}
+            </Text>
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  )
+}
+
+function RunState() {
+  const run = useStudio((s) => s.run)
+  if (!run) return <span className="run-state" />
+  const colour = { running: 'orange', paused: 'gray', done: 'teal', stopped: 'gray', failed: 'red' }[run.state]
+  return (
+    <span className="run-state">
+      <Text size="sm" className="numbers">
+        {run.time.toFixed(2)} s
+      </Text>
+      {run.realTimeFactor > 0 && (
+        <Text size="xs" c="dimmed" className="numbers">
+          {run.realTimeFactor >= 100 ? run.realTimeFactor.toFixed(0) : run.realTimeFactor.toFixed(1)} × real time
+        </Text>
+      )}
+      <Badge color={colour} variant="light" title={run.message || run.fault?.what}>
+        {run.state}
+      </Badge>
+    </span>
+  )
+}

@@ -1,0 +1,240 @@
+import { create } from 'zustand'
+import { Connection, Refusal, type EventOf, type Request, type ServerEvent } from './connection'
+import type {
+  BlockType,
+  Channel,
+  Checked,
+  DocumentState,
+  Envelope,
+  Fault,
+  Finding,
+  Sheet,
+  SheetBlock,
+  ViewOf,
+  Wire,
+  WireKind,
+} from './protocol'
+import { samples } from './samples'
+
+export type Edit = Extract<Envelope['request'], { kind: 'change' }>['edit']
+
+/** The document on the screen: what the server last said of it. */
+export interface OpenDocument {
+  state: DocumentState
+  /** Names of the subsystems on the way to the sheet on the screen. */
+  inside: string[]
+  name: string
+  description: string
+  blocks: Record<string, SheetBlock>
+  wires: Wire[]
+  settings: Sheet['settings']
+  findings: Finding[]
+  wireKinds: Record<string, WireKind>
+}
+
+export interface RunView {
+  run: string
+  state: 'running' | 'paused' | 'done' | 'stopped' | 'failed'
+  time: number
+  stopTime: number
+  realTimeFactor: number
+  message: string
+  fault: Fault | null
+  channels: Channel[]
+  views: ViewOf[]
+  aliases: Record<string, string>
+  tunables: string[]
+}
+
+export interface Notice {
+  id: number
+  what: string
+  fix: string
+}
+
+interface Studio {
+  connected: boolean
+  welcome: EventOf<'welcome'> | null
+  library: Map<string, BlockType>
+  document: OpenDocument | null
+  run: RunView | null
+  selection: ReadonlySet<string>
+  editing: string | null
+  notices: Notice[]
+  select: (names: Iterable<string>) => void
+  edit: (block: string | null) => void
+  dismiss: (id: number) => void
+}
+
+export const useStudio = create<Studio>((set) => ({
+  connected: false,
+  welcome: null,
+  library: new Map(),
+  document: null,
+  run: null,
+  selection: new Set(),
+  editing: null,
+  notices: [],
+  select: (names) => set({ selection: new Set(names) }),
+  edit: (editing) => set({ editing }),
+  dismiss: (id) => set((s) => ({ notices: s.notices.filter((notice) => notice.id !== id) })),
+}))
+
+const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
+
+function changed(document: OpenDocument, event: EventOf<'changed'>): OpenDocument {
+  const { change, state } = event
+  const blocks = { ...document.blocks }
+  for (const [name, block] of Object.entries(change.blocks)) {
+    if (block) blocks[name] = block
+    else delete blocks[name]
+  }
+  const removed = new Set(change.wires_removed.map(wireKey))
+  return {
+    ...document,
+    state,
+    blocks,
+    name: document.inside.length ? document.name : state.title,
+    wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...change.wires_added],
+    description: change.description ?? document.description,
+    settings: change.settings ?? document.settings,
+  }
+}
+
+function checked(document: OpenDocument, event: Checked): OpenDocument {
+  if (event.version !== document.state.version) return document
+  // While something is wrong nothing new is known of the wires; what was known still helps the eye.
+  const wireKinds = event.findings.length ? document.wireKinds : event.wires
+  return { ...document, findings: event.findings, wireKinds }
+}
+
+function receive(event: ServerEvent): void {
+  const { document, run } = useStudio.getState()
+  switch (event.kind) {
+    case 'welcome': {
+      useStudio.setState({
+        welcome: event,
+        library: new Map(event.library.map((kind) => [kind.type, kind])),
+      })
+      if (document) void ask({ kind: 'look', document: document.state.document, inside: document.inside }).then(() => line.resend())
+      else openFromAddress(event)
+      break
+    }
+    case 'opened': {
+      const { state, sheet, inside } = event
+      const same = document?.state.document === state.document
+      const moved = same && document.inside.join('/') !== inside.join('/')
+      if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
+      useStudio.setState({
+        document: {
+          state,
+          inside,
+          ...sheet,
+          findings: same ? document.findings : [],
+          wireKinds: same ? document.wireKinds : {},
+        },
+        ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
+      })
+      if (!same) samples.clear()
+      break
+    }
+    case 'changed':
+      if (document?.state.document !== event.state.document) break
+      if (event.before !== document.state.version && event.state.version !== document.state.version)
+        void ask({ kind: 'look', document: event.state.document, inside: document.inside })
+      else useStudio.setState({ document: changed(document, event) })
+      break
+    case 'checked':
+      if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
+      break
+    case 'run_started':
+      samples.begin(event.run, event.channels, event.aliases)
+      useStudio.setState({
+        run: {
+          run: event.run,
+          state: 'running',
+          time: 0,
+          stopTime: event.stop_time,
+          realTimeFactor: 0,
+          message: '',
+          fault: null,
+          channels: event.channels,
+          views: event.views,
+          aliases: event.aliases,
+          tunables: event.tunables,
+        },
+      })
+      break
+    case 'run_progress':
+      if (run?.run === event.run)
+        useStudio.setState({
+          run: {
+            ...run,
+            state: event.state,
+            time: event.time,
+            realTimeFactor: event.real_time_factor,
+            message: event.message,
+            fault: event.fault ?? null,
+          },
+        })
+      if (event.fault) notify(event.fault)
+      break
+    case 'reply':
+      break
+  }
+}
+
+function openFromAddress(welcome: EventOf<'welcome'>): void {
+  const wanted = decodeURIComponent(location.hash.slice(1))
+  if (wanted && wanted in welcome.examples) void ask({ kind: 'open', example: wanted })
+  else if (wanted) void ask({ kind: 'open', path: wanted })
+  else if (welcome.documents[0]) void ask({ kind: 'attach', document: welcome.documents[0].document })
+  else void ask({ kind: 'open', example: 'kr180model' })
+}
+
+export const line = new Connection(
+  receive,
+  (frame) => samples.receive(frame),
+  (connected) => useStudio.setState({ connected }),
+)
+
+let notices = 0
+
+/** Show what was refused, or why a run ended, in words. */
+function notify({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix'>): void {
+  const notice = { id: ++notices, what: where ? `${where}: ${what}` : what, fix }
+  useStudio.setState((s) => ({ notices: [...s.notices.slice(-4), notice] }))
+}
+
+/** Ask the server; a refusal becomes a notice, and the promise then gives undefined. */
+export async function ask<T = unknown>(request: Request): Promise<T | undefined> {
+  try {
+    return await line.ask<T>(request)
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error
+    notify(error)
+    return undefined
+  }
+}
+
+/** Carry out an edit of the document on the screen. */
+export function change(edit: Edit): Promise<unknown> {
+  const document = useStudio.getState().document
+  if (!document) return Promise.resolve(undefined)
+  const { state, inside } = document
+  return ask({ kind: 'change', document: state.document, key: crypto.randomUUID(), inside, edit })
+}
+
+/** Look at the sheet inside a subsystem; the empty path is the whole model. */
+export function look(inside: string[]): void {
+  const document = useStudio.getState().document
+  if (document) void ask({ kind: 'look', document: document.state.document, inside })
+}
+
+/** A name for a new block that no other has: "Gain", "Gain 2", … */
+export function freeName(wish: string, taken: Iterable<string>): string {
+  const folded = new Set([...taken].map((name) => name.toLowerCase()))
+  if (!folded.has(wish.toLowerCase())) return wish
+  const stem = wish.replace(/ \d+$/, '')
+  for (let k = 2; ; k++) if (!folded.has(`${stem} ${k}`.toLowerCase())) return `${stem} ${k}`
+}

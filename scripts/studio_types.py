@@ -1,0 +1,72 @@
+"""Write what the studio's page takes from Python: the types of the messages and the colours.
+
+``python3 scripts/studio_types.py`` writes ``frontend/src/protocol.ts`` and ``frontend/src/tones.css``; with
+``--check`` it only says whether they are as they should be.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from armblocks.report.style import FONT_STACK, MONO_STACK, PALETTE
+from armblocks.studio.schema import message_schema
+
+FRONTEND = Path(__file__).resolve().parent.parent / "frontend"
+BANNER = "/* Made from src/armblocks/studio/messages.py by scripts/studio_types.py: do not edit. */"
+
+
+def types() -> str:
+    """The TypeScript types of all messages."""
+    with tempfile.TemporaryDirectory() as folder:
+        schema = Path(folder) / "messages.json"
+        schema.write_text(json.dumps(message_schema()), encoding="utf-8")
+        command = [
+            str(FRONTEND / "node_modules" / ".bin" / "json2ts"),
+            *("-i", str(schema), "--bannerComment", BANNER, "--unreachableDefinitions", "false"),
+        ]
+        return subprocess.run(command, check=True, capture_output=True, text=True, cwd=FRONTEND).stdout
+
+
+def tones() -> str:
+    """The colours of all figures as custom properties, and the classes that drawings of blocks use."""
+
+    def properties(theme: str) -> str:
+        return "\n".join(
+            f"  --{tone.value}: {shade.light if theme == 'light' else shade.dark};"
+            for tone, shade in PALETTE.items()
+        )
+
+    classes = "\n".join(
+        f".f-{name} {{ fill: var(--{name}); }}\n.s-{name} {{ stroke: var(--{name}); }}"
+        for name in (tone.value for tone in PALETTE)
+    )
+    banner = "/* Made from armblocks.report.style by scripts/studio_types.py: do not edit. */"
+    return (
+        f"{banner}\n:root {{\n{properties('light')}\n  --font: 'Inter Variable', {FONT_STACK};\n"
+        f"  --mono: 'JetBrains Mono Variable', {MONO_STACK};\n}}\n"
+        f":root[data-mantine-color-scheme='dark'] {{\n{properties('dark')}\n}}\n{classes}\n"
+    )
+
+
+def main() -> int:
+    """Write or check both files."""
+    wanted = {FRONTEND / "src" / "protocol.ts": types(), FRONTEND / "src" / "tones.css": tones()}
+    stale = [
+        path for path, text in wanted.items() if not path.exists() or path.read_text(encoding="utf-8") != text
+    ]
+    if "--check" in sys.argv:
+        for path in stale:
+            print(f"{path.name} is not up to date: run python3 scripts/studio_types.py")
+        return 1 if stale else 0
+    for path in stale:
+        path.write_text(wanted[path], encoding="utf-8")
+        print(f"wrote {path.name}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,49 @@
+"""``armblocks studio``: draw, run and watch models in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armblocks.cli.terminal import messages_console
+from armblocks.errors import FormatError
+
+
+def studio(
+    model: Annotated[
+        str, typer.Argument(help="A shipped example's name, or a diagram file.", show_default="an example")
+    ] = "",
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Folder whose files the studio opens and saves.", show_default="this folder"),
+    ] = None,
+    port: Annotated[
+        int, typer.Option(help="Port on this machine; 0 takes a free one.", min=0, max=65535)
+    ] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
+) -> None:
+    """Open the studio in the browser: build a diagram, run it, watch scopes and arm. Ctrl-C ends it."""
+    import armblocks as ab
+    from armblocks.studio.launch import serve
+
+    root = folder or Path.cwd()
+    if model and model not in ab.list_examples():
+        path = Path(model)
+        if not path.is_file():
+            raise FormatError(
+                "there is no such file and no such example",
+                where=model,
+                allowed=f"a diagram file, or one of {', '.join(ab.list_examples())}",
+                fix="check the name",
+            )
+        root = folder or path.resolve().parent
+        model = path.resolve().relative_to(root.resolve()).as_posix()
+    console = messages_console()
+
+    def announce(link: str) -> None:
+        console.print(f"The studio is at {link}", soft_wrap=True, highlight=False)
+        console.print("The link is good for one visit. Ctrl-C ends the studio.")
+
+    serve(root, model, port=port, open_browser=browser, announce=announce)

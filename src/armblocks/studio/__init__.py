@@ -1,0 +1,1 @@
+"""The studio: diagrams drawn, run and watched in the browser."""

@@ -1,0 +1,367 @@
+"""What a person does to a diagram, as data: each edit is a pure function from one diagram to the next.
+
+A drawing in progress is a :class:`~armblocks.diagram.Diagram` that nobody has checked: inputs may be open and
+widths may disagree; that is told beside the blocks, it does not forbid the edit. What an edit does refuse is
+what no drawing could show: a name that is taken, a port that is not there, a second driver of one input, a
+parameter that its block does not allow.
+
+Parameters arrive as JSON values and are checked by the block's own declarations. Nothing is evaluated.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Connection, Diagram, ParameterKind, Placement, PortRef
+from armblocks.diagram.names import check_block_name, folded
+from armblocks.equations import SimulationOptions
+from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.studio.nesting import grouped, with_block
+from armblocks.studio.parameter_values import ResolveRobot, parameter_value
+
+DEFAULT_ROBOT = "puma560"
+"""The arm that a robot block starts with when it is dropped on the sheet."""
+MOST_BLOCKS = 20_000
+"""Blocks that one sheet may hold in the editor."""
+
+
+class Message(BaseModel):
+    """A value that travels between page and server: unknown members are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Place(Message):
+    """Where a block stands: top left corner and, if not its own, its size in px."""
+
+    x: float
+    y: float
+    width: float | None = None
+    height: float | None = None
+    flipped: bool = False
+
+
+class NewBlock(Message):
+    """A block to be put on the sheet. ``parameters`` states those that are not at their default."""
+
+    name: str
+    type: str
+    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
+    place: Place
+
+
+class Wire(Message):
+    """A wire between two ports, written ``block/port``."""
+
+    source: str
+    target: str
+
+
+class AddBlocks(Message):
+    """Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate."""
+
+    kind: Literal["add"] = "add"
+    blocks: list[NewBlock]
+    wires: list[Wire] = Field(default_factory=list[Wire])
+
+
+class RemoveBlocks(Message):
+    """Take blocks and wires off the sheet; the wires of the blocks go with them."""
+
+    kind: Literal["remove"] = "remove"
+    blocks: list[str] = Field(default_factory=list[str])
+    wires: list[Wire] = Field(default_factory=list[Wire])
+
+
+class Connect(Message):
+    """Draw a wire. With ``replace`` the input's present wire gives way."""
+
+    kind: Literal["connect"] = "connect"
+    wire: Wire
+    replace: bool = False
+
+
+class MoveBlocks(Message):
+    """Put blocks elsewhere: one drag is one edit, however many blocks were in hand."""
+
+    kind: Literal["move"] = "move"
+    places: dict[str, Place]
+
+
+class Rename(Message):
+    """Give a block another name; its wires and its place go with it."""
+
+    kind: Literal["rename"] = "rename"
+    block: str
+    name: str
+
+
+class SetParameters(Message):
+    """Change parameters of one block. Wires to ports that thereby vanish are removed."""
+
+    kind: Literal["parameters"] = "parameters"
+    block: str
+    values: dict[str, Any]
+
+
+class GroupBlocks(Message):
+    """Put blocks into a subsystem of their own; its ports are the wires that are cut thereby."""
+
+    kind: Literal["group"] = "group"
+    blocks: list[str]
+    name: str
+
+
+class SetSettings(Message):
+    """Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks."""
+
+    kind: Literal["settings"] = "settings"
+    values: dict[str, float | str | None]
+
+
+class Describe(Message):
+    """Change the model's one-line description."""
+
+    kind: Literal["describe"] = "describe"
+    text: Annotated[str, Field(max_length=2000)]
+
+
+Edit = Annotated[
+    AddBlocks
+    | RemoveBlocks
+    | Connect
+    | MoveBlocks
+    | Rename
+    | SetParameters
+    | GroupBlocks
+    | SetSettings
+    | Describe,
+    Field(discriminator="kind"),
+]
+"""Everything that can be done to a drawing, and so everything that can be undone."""
+
+
+def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    """The diagram after an edit; the one given stays as it is. ``resolve_robot`` finds the robots it names.
+
+    Raises ``DiagramError``, ``UnknownNameError`` or ``InputError`` for an edit that cannot be carried out.
+    """
+    match edit:
+        case AddBlocks():
+            return _add(edit, diagram, resolve_robot)
+        case RemoveBlocks():
+            return _remove(edit, diagram)
+        case Connect():
+            return _connect([edit.wire], diagram, replace=edit.replace)
+        case MoveBlocks():
+            return _move(edit, diagram)
+        case Rename():
+            return _rename(edit, diagram)
+        case SetParameters():
+            return _set_parameters(edit, diagram, resolve_robot)
+        case GroupBlocks():
+            return grouped(edit.blocks, edit.name, diagram)
+        case SetSettings():
+            return _set_settings(edit, diagram)
+        case Describe():
+            return dataclasses.replace(diagram, description=edit.text)
+
+
+def summary(edit: Edit) -> str:
+    """The edit in a few words, for the menu entry "Undo …"."""
+    match edit:
+        case AddBlocks():
+            return f"add {_listed([block.name for block in edit.blocks])}"
+        case RemoveBlocks(blocks=blocks, wires=wires):
+            return f"delete {_listed(blocks)}" if blocks else f"delete {_counted(len(wires), 'wire')}"
+        case Connect():
+            return f"connect {edit.wire.source} to {edit.wire.target}"
+        case MoveBlocks():
+            return f"move {_listed(list(edit.places))}"
+        case Rename():
+            return f"rename {edit.block}"
+        case SetParameters():
+            return f"change {edit.block}"
+        case GroupBlocks():
+            return f"group {_counted(len(edit.blocks), 'block')}"
+        case SetSettings():
+            return "change the settings"
+        case Describe():
+            return "change the description"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else _counted(len(names), "block")
+
+
+def _counted(count: int, thing: str) -> str:
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    where = f"diagram '{diagram.name}'"
+    blocks, layout = dict(diagram.blocks), dict(diagram.layout)
+    if len(blocks) + len(edit.blocks) > MOST_BLOCKS:
+        raise DiagramError(
+            f"the sheet would hold {len(blocks) + len(edit.blocks)} blocks",
+            where=where,
+            allowed=f"at most {MOST_BLOCKS}",
+            fix="group some of them into subsystems",
+        )
+    taken = {folded(name): name for name in blocks}
+    for new in edit.blocks:
+        _check_free(new.name, taken, where)
+        taken[folded(new.name)] = new.name
+        blocks[new.name] = _made(new, resolve_robot)
+        layout[new.name] = _placement(new.place)
+    added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
+    return _connect(edit.wires, added, replace=False)
+
+
+def _check_free(name: str, taken: Mapping[str, str], where: str) -> None:
+    check_block_name(name, where)
+    other = taken.get(folded(name))
+    if other is not None:
+        raise DiagramError(
+            f"a block is already named '{other}'",
+            where=where,
+            allowed="every name once, however it is capitalised",
+            fix="choose another name",
+        )
+
+
+def _made(new: NewBlock, resolve_robot: ResolveRobot) -> Block:
+    kind = BLOCKS[new.type]
+    rules = {rule.name: rule for rule in kind.parameters()}
+    values: dict[str, Any] = {}
+    for name, value in new.parameters.items():
+        if name not in rules:
+            raise UnknownNameError(f"parameter of {new.type}", name, rules, where=f"block '{new.name}'")
+        values[name] = parameter_value(rules[name], value, f"block '{new.name}'", resolve_robot)
+    for name, rule in rules.items():
+        if rule.required and name not in values:
+            default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
+            values[name] = parameter_value(rule, default, f"block '{new.name}'", resolve_robot)
+    return kind(**values)
+
+
+def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
+    gone = {_known(name, diagram) for name in edit.blocks}
+    cut = {_connection(wire) for wire in edit.wires}
+    for wire in cut:
+        if wire not in diagram.connections:
+            raise DiagramError(
+                f"there is no wire {wire}",
+                where=f"diagram '{diagram.name}'",
+                allowed="a wire of this sheet",
+                fix="reload the page if it shows one there",
+            )
+    return dataclasses.replace(
+        diagram,
+        blocks={name: block for name, block in diagram.blocks.items() if name not in gone},
+        layout={name: place for name, place in diagram.layout.items() if name not in gone},
+        connections=tuple(
+            wire
+            for wire in diagram.connections
+            if wire not in cut and wire.source.block not in gone and wire.target.block not in gone
+        ),
+    )
+
+
+def _connect(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
+    connections = {wire.target: wire for wire in diagram.connections}
+    for wire in wires:
+        made = _connection(wire)
+        _check_port(made.source, diagram, output=True)
+        _check_port(made.target, diagram, output=False)
+        present = connections.get(made.target)
+        if present is not None and not replace:
+            raise DiagramError(
+                f"input '{made.target}' is already driven by '{present.source}'",
+                where=f"diagram '{diagram.name}'",
+                allowed="one wire for each input",
+                fix="delete that wire first, or join the signals with a Sum or a Mux",
+            )
+        connections[made.target] = made
+    return dataclasses.replace(diagram, connections=tuple(connections.values())) if wires else diagram
+
+
+def _connection(wire: Wire) -> Connection:
+    return Connection(_port(wire.source), _port(wire.target))
+
+
+def _port(text: str) -> PortRef:
+    block, slash, port = text.rpartition("/")
+    if not slash:
+        raise DiagramError(f"'{text}' is no port", allowed="block/port", fix="name the block and the port")
+    return PortRef(block, port)
+
+
+def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
+    block = diagram.blocks[_known(ref.block, diagram)]
+    ports = [port.name for port in (block.output_ports() if output else block.input_ports())]
+    if ref.port not in ports:
+        side = "output" if output else "input"
+        raise UnknownNameError(f"{side} port", ref.port, ports, where=f"block '{ref.block}' ({block.title})")
+
+
+def _move(edit: MoveBlocks, diagram: Diagram) -> Diagram:
+    layout = dict(diagram.layout)
+    for name, place in edit.places.items():
+        layout[_known(name, diagram)] = _placement(place)
+    return dataclasses.replace(diagram, layout=layout)
+
+
+def _placement(place: Place) -> Placement:
+    return Placement(**place.model_dump())
+
+
+def _rename(edit: Rename, diagram: Diagram) -> Diagram:
+    _known(edit.block, diagram)
+    taken = {folded(name): name for name in diagram.blocks if name != edit.block}
+    _check_free(edit.name, taken, f"diagram '{diagram.name}'")
+
+    def renamed(name: str) -> str:
+        return edit.name if name == edit.block else name
+
+    def moved(ref: PortRef) -> PortRef:
+        return PortRef(renamed(ref.block), ref.port)
+
+    return dataclasses.replace(
+        diagram,
+        blocks={renamed(name): block for name, block in diagram.blocks.items()},
+        layout={renamed(name): place for name, place in diagram.layout.items()},
+        connections=tuple(Connection(moved(wire.source), moved(wire.target)) for wire in diagram.connections),
+    )
+
+
+def _set_parameters(edit: SetParameters, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    old = diagram.blocks[_known(edit.block, diagram)]
+    rules = {rule.name: rule for rule in old.parameters()}
+    where = f"block '{edit.block}' ({old.title})"
+    values: dict[str, Any] = {}
+    for name, value in edit.values.items():
+        if name not in rules:
+            raise UnknownNameError("parameter", name, rules, where=where)
+        values[name] = parameter_value(rules[name], value, where, resolve_robot)
+    return with_block(diagram, edit.block, dataclasses.replace(old, **values))
+
+
+def _set_settings(edit: SetSettings, diagram: Diagram) -> Diagram:
+    known = [field.name for field in dataclasses.fields(SimulationOptions)]
+    for name in edit.values:
+        if name not in known:
+            raise UnknownNameError("setting", name, known, where=f"diagram '{diagram.name}'")
+    values: dict[str, Any] = dict(edit.values)
+    return dataclasses.replace(diagram, settings=dataclasses.replace(diagram.settings, **values))
+
+
+def _known(name: str, diagram: Diagram) -> str:
+    if name not in diagram.blocks:
+        raise UnknownNameError("block", name, diagram.blocks, where=f"diagram '{diagram.name}'")
+    return name

@@ -1,0 +1,401 @@
+"""Everything that page and server say to each other over the websocket; the page's types are made from here.
+
+A page sends :data:`Request` with a number of its own choosing; the server answers each with a :class:`Reply`
+of the same number, and sends :data:`Event` whenever something happened: also to the other pages that show
+the same document. Samples of a run come as binary frames, see :mod:`armblocks.studio.frames`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from armblocks.studio.edits import Edit, Message, Place, Wire
+
+# -- what a page shows ---------------------------------------------------------------------------------------
+
+
+class PortSpot(Message):
+    """A port on the edge of its block: px from the block's corner, and the direction of its wire."""
+
+    name: str
+    doc: str
+    label: str
+    unit: str
+    x: float
+    y: float
+    dx: int
+    dy: int
+
+
+class SheetBlock(Message):
+    """A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes."""
+
+    name: str
+    type: str
+    title: str
+    place: Place
+    width: float
+    height: float
+    face: str
+    inputs: list[PortSpot]
+    outputs: list[PortSpot]
+    opens: bool
+    """Whether there is a sheet inside."""
+    parameters: dict[str, Any]
+    """Values in the form of :func:`~armblocks.studio.parameter_values.parameter_json`."""
+
+
+class Sheet(Message):
+    """The whole drawing."""
+
+    name: str
+    description: str
+    blocks: dict[str, SheetBlock]
+    wires: list[Wire]
+    settings: dict[str, float | str | None]
+
+
+class SheetChange(Message):
+    """From one version of the drawing to the next."""
+
+    blocks: dict[str, SheetBlock | None]
+    """Blocks that are new or other than before; ``None`` for those that are gone."""
+    wires_added: list[Wire]
+    wires_removed: list[Wire]
+    description: str | None = None
+    settings: dict[str, float | str | None] | None = None
+
+
+class Finding(Message):
+    """What the background check says; ``block`` and ``port`` are ``""`` where it is of the whole drawing."""
+
+    severity: Literal["error", "warning"]
+    block: str
+    port: str
+    what: str
+    fix: str
+
+
+class WireKind(Message):
+    """What runs on the wires that leave a port."""
+
+    shape: list[int]
+    unit: str
+
+
+class ParameterRule(Message):
+    """One parameter of a type of block, as its dialog needs it."""
+
+    name: str
+    kind: str
+    doc: str
+    unit: str
+    default: Any
+    tunable: bool
+    choices: list[str]
+    allowed: str
+
+
+class BlockType(Message):
+    """A type of block in the library palette. ``face`` is the drawing of one with the default parameters."""
+
+    type: str
+    title: str
+    family: str
+    summary: str
+    documentation: str
+    width: float
+    height: float
+    face: str
+    parameters: list[ParameterRule]
+
+
+class ViewOf(Message):
+    """A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``."""
+
+    block: str
+    kind: str
+    signals: list[str]
+    labels: list[str]
+    title: str
+
+
+class Channel(Message):
+    """One recorded signal of a run and where its numbers lie in the columns of a frame."""
+
+    name: str
+    shape: list[int]
+    unit: str
+
+
+class DocumentState(Message):
+    """Where a document stands."""
+
+    document: str
+    version: int
+    title: str
+    path: str | None
+    dirty: bool
+    undo: str
+    redo: str
+
+
+# -- requests ------------------------------------------------------------------------------------------------
+
+
+class Open(Message):
+    """Open a file of the project, or the shipped example of this name."""
+
+    kind: Literal["open"] = "open"
+    path: str = ""
+    example: str = ""
+
+
+class New(Message):
+    """Begin an empty drawing."""
+
+    kind: Literal["new"] = "new"
+
+
+class Attach(Message):
+    """Show a document that is open already: after a reload, or in a second page."""
+
+    kind: Literal["attach"] = "attach"
+    document: str
+
+
+class Change(Message):
+    """Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once."""
+
+    kind: Literal["change"] = "change"
+    document: str
+    key: str
+    inside: list[str] = Field(default_factory=list[str])
+    """Names of the subsystems on the way to the sheet that is edited."""
+    edit: Edit
+
+
+class Look(Message):
+    """Look at the sheet inside a subsystem; the empty path is the whole model."""
+
+    kind: Literal["look"] = "look"
+    document: str
+    inside: list[str]
+
+
+class Undo(Message):
+    """Take the last edit back."""
+
+    kind: Literal["undo"] = "undo"
+    document: str
+
+
+class Redo(Message):
+    """Do again what was undone."""
+
+    kind: Literal["redo"] = "redo"
+    document: str
+
+
+class Save(Message):
+    """Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile."""
+
+    kind: Literal["save"] = "save"
+    document: str
+    path: str = ""
+    overwrite: bool = False
+
+
+class ArrangeBlocks(Message):
+    """Lay the blocks out anew, from left to right."""
+
+    kind: Literal["arrange"] = "arrange"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+
+
+class Run(Message):
+    """Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible."""
+
+    kind: Literal["run"] = "run"
+    document: str
+    speed: float | None = Field(default=None, gt=0, le=1000)
+
+
+class Control(Message):
+    """Say how a run goes on."""
+
+    kind: Literal["control"] = "control"
+    run: str
+    action: Literal["pause", "resume", "step", "stop"]
+
+
+class SetSpeed(Message):
+    """Change the speed of a run; ``None``: as fast as possible."""
+
+    kind: Literal["speed"] = "speed"
+    run: str
+    speed: float | None = Field(default=None, gt=0, le=1000)
+
+
+class Tune(Message):
+    """Change a tunable parameter of a run that is under way."""
+
+    kind: Literal["tune"] = "tune"
+    run: str
+    parameter: str
+    value: Any
+
+
+class TypedValue(Message):
+    """Ask what a text typed into a parameter's field means: its value, or what is wrong with it."""
+
+    kind: Literal["typed"] = "typed"
+    type: str
+    parameter: str
+    text: str
+
+
+class Scene(Message):
+    """Ask for the bodies of the robot that a block shows."""
+
+    kind: Literal["scene"] = "scene"
+    document: str
+    block: str
+
+
+class Pose(Message):
+    """Ask where the links of a block's robot are at joint coordinates ``q`` (rad, m)."""
+
+    kind: Literal["pose"] = "pose"
+    document: str
+    block: str
+    q: list[float]
+
+
+Request = Annotated[
+    Open
+    | New
+    | Attach
+    | Look
+    | Change
+    | Undo
+    | Redo
+    | Save
+    | ArrangeBlocks
+    | Run
+    | Control
+    | SetSpeed
+    | Tune
+    | TypedValue
+    | Scene
+    | Pose,
+    Field(discriminator="kind"),
+]
+
+
+class Envelope(Message):
+    """A request with its number."""
+
+    number: int
+    request: Request
+
+
+# -- answers and events --------------------------------------------------------------------------------------
+
+
+class Fault(Message):
+    """Why a request was refused, in the parts of an ``ArmblocksError``."""
+
+    what: str
+    where: str
+    allowed: str
+    fix: str
+
+
+class Reply(Message):
+    """The answer to a request: ``fault`` where it was refused."""
+
+    kind: Literal["reply"] = "reply"
+    number: int
+    value: Any = None
+    fault: Fault | None = None
+
+
+class Welcome(Message):
+    """The first message: the library, the examples, the files and the documents that are open."""
+
+    kind: Literal["welcome"] = "welcome"
+    version: str
+    library: list[BlockType]
+    robots: list[str]
+    solvers: list[str]
+    examples: dict[str, str]
+    files: list[str]
+    documents: list[DocumentState]
+
+
+class Opened(Message):
+    """A whole document, for a page that shows it from now on."""
+
+    kind: Literal["opened"] = "opened"
+    state: DocumentState
+    inside: list[str]
+    sheet: Sheet
+
+
+class Changed(Message):
+    """A document went from one version to another."""
+
+    kind: Literal["changed"] = "changed"
+    state: DocumentState
+    before: int
+    change: SheetChange
+
+
+class Checked(Message):
+    """What the background check found in one version of a document; ``wires`` by source port."""
+
+    kind: Literal["checked"] = "checked"
+    document: str
+    version: int
+    findings: list[Finding]
+    wires: dict[str, WireKind]
+
+
+class RunStarted(Message):
+    """A run has begun: what it records and how it is to be shown."""
+
+    kind: Literal["run_started"] = "run_started"
+    document: str
+    run: str
+    stop_time: float
+    channels: list[Channel]
+    views: list[ViewOf]
+    aliases: dict[str, str]
+    tunables: list[str]
+
+
+class RunProgress(Message):
+    """Where a run stands."""
+
+    kind: Literal["run_progress"] = "run_progress"
+    run: str
+    state: Literal["running", "paused", "done", "stopped", "failed"]
+    time: float
+    real_time_factor: float
+    message: str
+    fault: Fault | None = None
+
+
+Event = Annotated[
+    Reply | Welcome | Opened | Changed | Checked | RunStarted | RunProgress, Field(discriminator="kind")
+]
+
+
+class ServerMessage(Message):
+    """Only for the page's types: everything that the server sends as text."""
+
+    event: Event

@@ -1,0 +1,143 @@
+"""Diagrams inside blocks: how one is found, put back when it was edited, and made from other blocks."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+from armblocks.diagram import Block, Connection, Diagram, Inport, Outport, Placement, PortRef, Subsystem
+from armblocks.diagram.names import check_block_name, folded
+from armblocks.errors import DiagramError, UnknownNameError
+
+_MARGIN = 120.0
+"""px between the blocks of a new subsystem and its ends."""
+
+
+def inside(diagram: Diagram, path: Sequence[str]) -> Diagram:
+    """The diagram inside the subsystem of this path, the diagram itself for the empty one.
+
+    Raises ``UnknownNameError`` for a path on which there is no subsystem.
+    """
+    for name in path:
+        block = diagram.blocks.get(name)
+        if not isinstance(block, Subsystem):
+            known = [key for key, other in diagram.blocks.items() if isinstance(other, Subsystem)]
+            raise UnknownNameError("subsystem", name, known, where=f"diagram '{diagram.name}'")
+        diagram = block.diagram
+    return diagram
+
+
+def with_inside(diagram: Diagram, path: Sequence[str], inner: Diagram) -> Diagram:
+    """The diagram with another one inside the subsystem of this path."""
+    if not path:
+        return inner
+    block = diagram.blocks[path[0]]
+    assert isinstance(block, Subsystem)
+    changed = dataclasses.replace(block, diagram=with_inside(block.diagram, path[1:], inner))
+    return with_block(diagram, path[0], changed)
+
+
+def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
+    """The diagram with another block in the place of one; wires to ports that it has not are removed."""
+    into = {port.name for port in block.input_ports()}
+    out = {port.name for port in block.output_ports()}
+    return dataclasses.replace(
+        diagram,
+        blocks={**diagram.blocks, name: block},
+        connections=tuple(
+            wire
+            for wire in diagram.connections
+            if (wire.source.block != name or wire.source.port in out)
+            and (wire.target.block != name or wire.target.port in into)
+        ),
+    )
+
+
+def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
+    """The diagram with some of its blocks inside a new subsystem; no signal changes by it.
+
+    Every source outside that feeds the group becomes an In block, every port of the group that feeds
+    something outside an Out block, named after that source or port.
+    """
+    where = f"diagram '{diagram.name}'"
+    group = {entry: diagram.block(entry) for entry in names}
+    if not group:
+        raise DiagramError("no blocks were chosen", where=where, allowed="one or more", fix="select some")
+    check_block_name(name, where)
+    if any(folded(other) == folded(name) for other in diagram.blocks if other not in group):
+        raise DiagramError(
+            f"a block is already named '{name}'",
+            where=where,
+            allowed="a name that is free",
+            fix="choose another",
+        )
+    entering = sorted(
+        {w.source for w in diagram.connections if w.target.block in group and w.source.block not in group}
+    )
+    leaving = sorted(
+        {w.source for w in diagram.connections if w.source.block in group and w.target.block not in group}
+    )
+    free = _FreeNames(group)
+    ins = {source: free.name(source) for source in entering}
+    outs = {source: free.name(source) for source in leaving}
+    inner_wires = [
+        wire if wire.source.block in group else Connection(PortRef(ins[wire.source], "y"), wire.target)
+        for wire in diagram.connections
+        if wire.target.block in group
+    ]
+    inner = Diagram(
+        name=name,
+        blocks={
+            **group,
+            **{key: Inport(port=number) for number, key in enumerate(ins.values(), start=1)},
+            **{key: Outport(port=number) for number, key in enumerate(outs.values(), start=1)},
+        },
+        connections=(*inner_wires, *(Connection(port, PortRef(key, "u")) for port, key in outs.items())),
+        layout=_inner_layout(diagram, list(group), list(ins.values()), list(outs.values())),
+    )
+    outer_wires = [
+        wire if wire.source.block not in group else Connection(PortRef(name, outs[wire.source]), wire.target)
+        for wire in diagram.connections
+        if wire.target.block not in group
+    ]
+    outer_wires += [Connection(source, PortRef(name, key)) for source, key in ins.items()]
+    places = [diagram.layout[entry] for entry in group]
+    middle = Placement(
+        x=round(sum(place.x for place in places) / len(places)),
+        y=round(sum(place.y for place in places) / len(places)),
+    )
+    return dataclasses.replace(
+        diagram,
+        blocks={k: b for k, b in diagram.blocks.items() if k not in group} | {name: Subsystem(diagram=inner)},
+        connections=tuple(outer_wires),
+        layout={k: p for k, p in diagram.layout.items() if k not in group} | {name: middle},
+    )
+
+
+def _inner_layout(
+    diagram: Diagram, group: Sequence[str], ins: Sequence[str], outs: Sequence[str]
+) -> dict[str, Placement]:
+    """The blocks as they stood, the ends in a column on either side."""
+    places = {name: diagram.layout[name] for name in group}
+    left = min(place.x for place in places.values()) - _MARGIN
+    right = max(place.x for place in places.values()) + _MARGIN + 60.0
+    top = min(place.y for place in places.values())
+    for x, column in ((left, ins), (right, outs)):
+        for row, name in enumerate(column):
+            places[name] = Placement(x=x, y=top + 60.0 * row)
+    return places
+
+
+class _FreeNames:
+    """Names for the ends of a group, each once."""
+
+    def __init__(self, taken: dict[str, Block]) -> None:
+        self._taken = {folded(name) for name in taken}
+
+    def name(self, source: PortRef) -> str:
+        wish = source.block if source.port == "y" else source.port
+        number = 1
+        while folded(found := wish if number == 1 else f"{wish} {number}") in self._taken:
+            number += 1
+        self._taken.add(folded(found))
+        return found

@@ -1,0 +1,224 @@
+"""The process that runs one model: started ahead of time, given one job, gone when the run has ended.
+
+A job is JSON: ``diagram`` (a canonical document), ``folder`` (for the robot files that it names), ``run``
+and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fast as possible). Commands
+arrive as the requests of :mod:`armblocks.studio.messages`; between two pieces of the run they are obeyed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+import signal
+import sys
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import perf_counter, sleep
+from typing import Any, Literal
+
+import numpy as np
+
+from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram, diagram_views
+from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.face.diagram_run import DiagramRun
+from armblocks.face.model import CompiledDiagram
+from armblocks.simulation import SimulationResult
+from armblocks.studio import messages as say
+from armblocks.studio.frames import sample_frame
+from armblocks.studio.parameter_values import number_value
+
+FRAME_SECONDS = 1 / 60
+MOST_MEMORY = 8 * 2**30
+"""Bytes of address space of a worker."""
+MOST_CPU_SECONDS = 3600
+
+
+def work(pipe: Connection) -> None:
+    """Import what a run needs, wait for the job, run it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server
+    _limit()
+    importlib.import_module("armblocks.compiler.native_integrator")  # slow, and needed by every run
+    with contextlib.suppress(EOFError, OSError):
+        job = json.loads(pipe.recv_bytes())
+        _Run(pipe, job).run()
+
+
+def _limit() -> None:
+    if sys.platform == "win32":
+        return
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS))
+
+
+class _Run:
+    def __init__(self, pipe: Connection, job: dict[str, Any]) -> None:
+        self.pipe = pipe
+        self.key: str = job["run"]
+        self.document: str = job["document"]
+        self.speed: float | None = job["speed"]
+        self.folder = Path(job["folder"])
+        self.source: str = job["diagram"]
+        self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
+        self.time = 0.0
+        self.count = 0
+        self.began = perf_counter()
+        self.paced_from = (0.0, self.began)
+
+    def run(self) -> None:
+        """The whole run, to its end or to the reason why it has none."""
+        try:
+            self._go()
+        except SimulationError as error:
+            self._send_rest(error.partial)
+            self._fail(error)
+        except ArmblocksError as error:
+            self._fail(error)
+        except MemoryError:
+            fix = "record fewer samples, or shorten the run"
+            self._fail(SimulationError("the run needs more memory than it may have", fix=fix))
+
+    def _go(self) -> None:
+        diagram = formats.diagram_from_bytes(
+            self.source.encode(), "model", BLOCKS, formats.load_robot, folder=self.folder
+        )
+        run = CompiledDiagram(diagram).begin()
+        self._tell_start(diagram, run)
+        while True:
+            self._advance(run)
+            self._send_samples(run)
+            if run.finished:
+                self._end("done", run.result().run.message)
+                return
+            self._progress()
+            if not self._listen(run):
+                self._end("stopped", f"stopped at {self.time:g} s")
+                return
+
+    def _advance(self, run: DiagramRun) -> None:
+        """Go on for one frame: one instant while paused, as far as the clock says, or as far as it gets."""
+        if self.state == "paused":
+            recorded = run.recorded
+            while run.recorded == recorded and not run.finished:
+                run.advance(steps=1)
+        elif self.speed is None:
+            run.advance(wall_time=FRAME_SECONDS)
+        else:
+            from_time, from_clock = self.paced_from
+            due = from_time + self.speed * (perf_counter() - from_clock)
+            run.advance(max(due, np.nextafter(run.time, np.inf)), wall_time=FRAME_SECONDS)
+
+    def _listen(self, run: DiagramRun) -> bool:
+        """Obey what has been said, wait while paused or ahead of the clock; ``False`` to stop."""
+        while True:
+            wait = 0.0
+            if self.state == "paused":
+                wait = 0.5
+            elif self.speed is not None:
+                wait = FRAME_SECONDS
+            if not self.pipe.poll(wait):
+                if self.state == "paused":
+                    continue
+                return True
+            command = json.loads(self.pipe.recv_bytes())
+            match command["kind"], command.get("action"):
+                case "control", "stop":
+                    return False
+                case "control", "pause":
+                    self.state = "paused"
+                    self._progress()
+                case "control", "resume":
+                    self.state = "running"
+                    self.paced_from = (self.time, perf_counter())
+                    self._progress()
+                case "control", "step":
+                    return True
+                case "speed", _:
+                    self.speed = command["speed"]
+                    self.paced_from = (self.time, perf_counter())
+                case _:
+                    self._tune(run, command["parameter"], command["value"])
+
+    def _tune(self, run: DiagramRun, parameter: str, value: Any) -> None:
+        """Change a parameter from here on; a refusal is told and the run goes on."""
+        try:
+            run.set(parameter, number_value(value, parameter) if isinstance(value, str) else value)
+        except ArmblocksError as error:
+            self._progress(error.what, _fault(error))
+
+    # -- what the hub is told --------------------------------------------------------------------------------
+
+    def _tell(self, event: say.Message) -> None:
+        self.pipe.send_bytes(b"J" + event.model_dump_json().encode())
+
+    def _tell_start(self, diagram: Diagram, run: DiagramRun) -> None:
+        compiled = run.simulation.compiled
+        self._tell(
+            say.RunStarted(
+                document=self.document,
+                run=self.key,
+                stop_time=run.stop_time,
+                channels=[
+                    say.Channel(name=slot.name, shape=list(slot.shape), unit=slot.unit)
+                    for slot in compiled.signals_layout
+                ],
+                views=[
+                    say.ViewOf(
+                        block=name,
+                        kind=view.kind.value,
+                        signals=list(view.signals),
+                        labels=list(view.labels),
+                        title=view.title,
+                    )
+                    for name, view in diagram_views(diagram)
+                ],
+                aliases=dict(compiled.aliases),
+                tunables=list(compiled.parameters.names),
+            )
+        )
+
+    def _send_samples(self, run: DiagramRun) -> None:
+        fresh = run.simulation.samples(self.count)
+        if fresh.time.size:
+            self.pipe.send_bytes(b"S" + sample_frame(self.key, fresh.begin, fresh.time, fresh.signals))
+            self.count = fresh.end
+        self.time = run.time
+
+    def _send_rest(self, partial: object) -> None:
+        """What is good of a run that failed."""
+        if isinstance(partial, SimulationResult) and partial.time.size > self.count:
+            time, signals = partial.time[self.count :], partial.signals[:, self.count :]
+            self.pipe.send_bytes(b"S" + sample_frame(self.key, self.count, time, signals))
+            self.time = float(partial.time[-1])
+
+    def _progress(self, message: str = "", fault: say.Fault | None = None) -> None:
+        factor = self.time / max(perf_counter() - self.began, 1e-9)
+        self._tell(
+            say.RunProgress(
+                run=self.key,
+                state=self.state,
+                time=self.time,
+                real_time_factor=factor,
+                message=message,
+                fault=fault,
+            )
+        )
+
+    def _end(self, state: Literal["done", "stopped"], message: str) -> None:
+        self.state = state
+        self._progress(message)
+        # The pipe's end must not overtake what is in it.
+        sleep(0.05)
+
+    def _fail(self, error: ArmblocksError) -> None:
+        self.state = "failed"
+        self._progress(error.what, _fault(error))
+        sleep(0.05)
+
+
+def _fault(error: ArmblocksError) -> say.Fault:
+    return say.Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)

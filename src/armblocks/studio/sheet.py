@@ -1,0 +1,177 @@
+"""A diagram as the page draws it: boxes, ports, faces, wires; and what changed since another diagram."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+from typing import Any
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Connection, Diagram, ParameterKind, Placement, Subsystem
+from armblocks.equations import SimulationOptions
+from armblocks.errors import ArmblocksError
+from armblocks.formats import load_robot
+from armblocks.report.block_faces import FaceShape, face_size, port_labels
+from armblocks.report.diagram_drawing import block_marks
+from armblocks.report.diagram_layout import Box, boxes, standing_box
+from armblocks.report.picture import Picture
+from armblocks.report.svg import svg_marks
+from armblocks.studio.edits import DEFAULT_ROBOT, Place, Wire
+from armblocks.studio.messages import BlockType, ParameterRule, PortSpot, Sheet, SheetBlock, SheetChange
+from armblocks.studio.parameter_values import parameter_json
+
+
+def placed(diagram: Diagram) -> Diagram:
+    """The diagram with a place for every block: its own where all have one, else laid out; subsystems too."""
+    for name, block in diagram.blocks.items():
+        if isinstance(block, Subsystem) and (inner := placed(block.diagram)) is not block.diagram:
+            changed = dataclasses.replace(block, diagram=inner)
+            diagram = dataclasses.replace(diagram, blocks={**diagram.blocks, name: changed})
+    return diagram if set(diagram.blocks) <= set(diagram.layout) else arranged(diagram)
+
+
+def arranged(diagram: Diagram) -> Diagram:
+    """The diagram laid out anew, from left to right."""
+    found = boxes(dataclasses.replace(diagram, layout={}))
+    layout = {name: Placement(x=round(box.x), y=round(box.y)) for name, box in found.items()}
+    return dataclasses.replace(diagram, layout=layout)
+
+
+def sheet(diagram: Diagram) -> Sheet:
+    """The whole drawing of a diagram whose blocks all have a place."""
+    return Sheet(
+        name=diagram.name,
+        description=diagram.description,
+        blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
+        wires=[_wire(wire) for wire in diagram.connections],
+        settings=_settings(diagram.settings),
+    )
+
+
+def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
+    """What is other in ``after``. Blocks that are the same objects are not looked at."""
+    blocks: dict[str, SheetBlock | None] = {name: None for name in before.blocks if name not in after.blocks}
+    for name, block in after.blocks.items():
+        if before.blocks.get(name) is not block or before.layout.get(name) != after.layout.get(name):
+            blocks[name] = _sheet_block(name, block, after)
+    old, new = set(before.connections), set(after.connections)
+    return SheetChange(
+        blocks=blocks,
+        wires_added=[_wire(wire) for wire in sorted(new - old)],
+        wires_removed=[_wire(wire) for wire in sorted(old - new)],
+        description=after.description if after.description != before.description else None,
+        settings=_settings(after.settings) if after.settings != before.settings else None,
+    )
+
+
+@lru_cache(maxsize=1)
+def library() -> tuple[BlockType, ...]:
+    """Every type of block, for the palette and the dialogs."""
+    return tuple(_block_type(kind) for kind in BLOCKS.values())
+
+
+def _block_type(kind: type[Block]) -> BlockType:
+    block = _default(kind)
+    box = standing_box("", block, Placement(x=0.0, y=0.0))
+    return BlockType(
+        type=kind.type_name(),
+        title=kind.title,
+        family=kind.family,
+        summary=kind.summary(),
+        documentation=(kind.__doc__ or "").strip(),
+        width=box.width,
+        height=box.height,
+        face=_face(box),
+        parameters=[
+            ParameterRule(
+                name=rule.name,
+                kind=rule.kind.value,
+                doc=rule.doc,
+                unit=rule.unit,
+                default=None if rule.required else parameter_json(rule.default),
+                tunable=rule.tunable,
+                choices=list(rule.choices),
+                allowed=rule.describe(),
+            )
+            for rule in kind.parameters()
+            if rule.kind is not ParameterKind.DIAGRAM
+        ],
+    )
+
+
+def _default(kind: type[Block]) -> Block:
+    robots = {
+        rule.name: load_robot(DEFAULT_ROBOT)
+        for rule in kind.parameters()
+        if rule.required and rule.kind is ParameterKind.ROBOT
+    }
+    return kind(**robots)
+
+
+def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
+    place = diagram.layout[name]
+    drawn = _drawn(block, place.width, place.height, place.flipped)
+    return drawn.model_copy(update={"name": name, "place": Place(**dataclasses.asdict(place))})
+
+
+@lru_cache(maxsize=4096)
+def _drawn(block: Block, width: float | None, height: float | None, flipped: bool) -> SheetBlock:
+    """A block in a place of its own: blocks that look alike are drawn once."""
+    place = Placement(x=0.0, y=0.0, width=width, height=height, flipped=flipped)
+    box = standing_box("", block, place)
+    into, out = port_labels(block)
+    return SheetBlock(
+        name="",
+        type=block.type_name(),
+        title=block.title,
+        place=Place(x=0.0, y=0.0),
+        width=box.width,
+        height=box.height,
+        face=_face(box),
+        inputs=_spots(box, into, inputs=True),
+        outputs=_spots(box, out, inputs=False),
+        opens=isinstance(block, Subsystem),
+        parameters={
+            rule.name: parameter_json(block.parameter_value(rule.name))
+            for rule in block.parameters()
+            if rule.kind is not ParameterKind.DIAGRAM
+        },
+    )
+
+
+def _face(box: Box) -> str:
+    try:
+        marks = block_marks(box)
+    except ArmblocksError:
+        # A face that cannot be drawn (a robot without links) must not stop the sheet.
+        marks = block_marks(dataclasses.replace(box, block=BLOCKS["Ground"]()))
+    return svg_marks(Picture(width=box.width, height=box.height, title="", marks=marks))
+
+
+def _spots(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[PortSpot]:
+    ports = box.block.input_ports() if inputs else box.block.output_ports()
+    spots = {spot.name: spot for spot in (box.inputs if inputs else box.outputs)}
+    shown = labels if len(labels) == len(ports) else ("",) * len(ports)
+    if face_size(box.block)[0] is FaceShape.CIRCLE:
+        shown = ("",) * len(ports)
+    return [
+        PortSpot(
+            name=port.name,
+            doc=port.doc,
+            label=label,
+            unit=port.unit,
+            x=spots[port.name].x,
+            y=spots[port.name].y,
+            dx=spots[port.name].dx,
+            dy=spots[port.name].dy,
+        )
+        for port, label in zip(ports, shown)
+    ]
+
+
+def _wire(wire: Connection) -> Wire:
+    return Wire(source=str(wire.source), target=str(wire.target))
+
+
+def _settings(options: SimulationOptions) -> dict[str, Any]:
+    return dataclasses.asdict(options)

@@ -1,0 +1,160 @@
+"""Whatever is done to a drawing can be undone, to the last byte of its file."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram
+from armblocks.errors import ArmblocksError
+from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
+from armblocks.studio.document import Document
+from armblocks.studio.edits import (
+    AddBlocks,
+    Connect,
+    Describe,
+    Edit,
+    MoveBlocks,
+    NewBlock,
+    Place,
+    RemoveBlocks,
+    Rename,
+    SetParameters,
+    SetSettings,
+    Wire,
+    summary,
+)
+from armblocks.studio.sheet import placed
+
+NAMES = ["sine", "gain", "scope", "Gain 2", "ä"]
+TYPES = ["SineWave", "Gain", "Scope", "Sum", "JTraj", "Integrator"]
+PORTS = ["sine/y", "gain/y", "gain/u", "scope/u1", "Gain 2/u", "Gain 2/y", "nobody/y", "x"]
+
+names, ports = st.sampled_from(NAMES), st.sampled_from(PORTS)
+numbers = st.floats(-1e4, 1e4, allow_nan=False)
+wires = st.builds(Wire, source=ports, target=ports)
+places = st.builds(Place, x=numbers, y=numbers, flipped=st.booleans())
+values = st.sampled_from(
+    [2.0, "2*pi", "[1 2 3]", "inf", "import os", "++-", "", None, [1.0], True, "puma560"]
+)
+parameters = st.dictionaries(st.sampled_from(["gain", "signs", "inputs", "nothing"]), values, max_size=2)
+blocks = st.builds(
+    NewBlock, name=names, type=st.sampled_from(TYPES), parameters=st.just({}) | parameters, place=places
+)
+edits: st.SearchStrategy[Edit] = st.one_of(
+    st.builds(AddBlocks, blocks=st.lists(blocks, max_size=2), wires=st.lists(wires, max_size=1)),
+    st.builds(RemoveBlocks, blocks=st.lists(names, max_size=2), wires=st.lists(wires, max_size=1)),
+    st.builds(Connect, wire=wires, replace=st.booleans()),
+    st.builds(MoveBlocks, places=st.dictionaries(names, places, max_size=2)),
+    st.builds(Rename, block=names, name=names),
+    st.builds(SetParameters, block=names, values=parameters),
+    st.builds(
+        SetSettings, values=st.dictionaries(st.sampled_from(["stop_time", "step", "x"]), numbers, max_size=1)
+    ),
+    st.builds(Describe, text=st.text(max_size=5)),
+)
+
+
+def content(document: Document) -> bytes:
+    return diagram_to_bytes(document.diagram, load_robot)
+
+
+def empty() -> Document:
+    return Document(Diagram(name="sheet", blocks={}), load_robot)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.lists(edits, max_size=25))
+def test_all_edits_undone_give_the_same_file_and_redone_the_same_again(todo: list[Edit]) -> None:
+    document = empty()
+    history = [content(document)]
+    for edit in todo:
+        before = document.diagram
+        try:
+            document.edit(edit)
+        except ArmblocksError:
+            assert document.diagram is before
+            continue
+        assert summary(edit) == document.undo_title
+        history.append(content(document))
+    for expected in reversed(history[:-1]):
+        document.undo()
+        assert content(document) == expected
+    assert document.undo_title == ""
+    for expected in history[1:]:
+        document.redo()
+        assert content(document) == expected
+    assert document.redo_title == ""
+
+
+def test_every_block_of_the_library_can_be_dropped_and_saved() -> None:
+    document = empty()
+    for kind in BLOCKS:
+        document.edit(AddBlocks(blocks=[NewBlock(name=kind, type=kind, place=Place(x=0, y=0))]))
+    assert len(document.diagram.blocks) == len(BLOCKS)
+    assert content(document)
+
+
+def test_wires_to_ports_that_vanish_go_with_the_edit_and_return_with_undo() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    before = document.diagram
+    document.edit(SetParameters(block="error", values={"signs": "+"}))
+    assert len(document.diagram.connections) == len(before.connections) - 2  # one input alone is named u
+    document.undo()
+    assert document.diagram is before
+    assert not document.dirty
+
+
+def refused(*todo: Edit) -> str:
+    document = empty()
+    document.edit(
+        AddBlocks(
+            blocks=[
+                NewBlock(name="sine", type="SineWave", place=Place(x=0, y=0)),
+                NewBlock(name="gain", type="Gain", place=Place(x=0, y=0)),
+            ],
+            wires=[Wire(source="sine/y", target="gain/u")],
+        )
+    )
+    with pytest.raises(ArmblocksError) as caught:
+        for edit in todo:
+            document.edit(edit)
+    return str(caught.value)
+
+
+def test_refusals_say_what_is_in_the_way() -> None:
+    place = Place(x=0, y=0)
+    second = AddBlocks(blocks=[NewBlock(name="GAIN", type="Gain", place=place)])
+    assert "a block is already named 'gain'" in refused(second)
+    assert "is already driven by 'sine/y'" in refused(Connect(wire=Wire(source="sine/y", target="gain/u")))
+    assert "'gain' is no port" in refused(Connect(wire=Wire(source="gain", target="gain/u")))
+    gone = Wire(source="gain/y", target="gain/u")
+    assert "there is no wire gain/y -> gain/u" in refused(RemoveBlocks(wires=[gone]))
+    many = [NewBlock(name=f"b{k}", type="Gain", place=place) for k in range(20_000)]
+    assert "the sheet would hold 20002 blocks" in refused(AddBlocks(blocks=many))
+    wrong = SetParameters(block="gain", values={"gain": "import os"})
+    assert "'os' is not understood here" in refused(wrong)
+    assert "is no number" in refused(SetParameters(block="gain", values={"gain": "1; x = 2"}))
+    assert "this is no value" in refused(SetParameters(block="gain", values={"gain": " "}))
+    plot = AddBlocks(blocks=[NewBlock(name="p", type="RobotPlot", parameters={"robot": 3}, place=place)])
+    assert "a robot is asked for, and int was given" in refused(plot)
+
+
+def test_there_is_an_end_to_undo_and_redo() -> None:
+    with pytest.raises(ArmblocksError, match="there is nothing to undo"):
+        empty().undo()
+    with pytest.raises(ArmblocksError, match="there is nothing to redo"):
+        empty().redo()
+
+
+@pytest.mark.parametrize(
+    ("typed", "value"),
+    [("2*pi", 6.283185307179586), ("-1/4", -0.25), ("45*deg", 0.7853981633974483), ("1e3", 1000.0)],
+)
+def test_numbers_may_be_typed_as_formulas(typed: str, value: float) -> None:
+    document = empty()
+    new = NewBlock(name="gain", type="Gain", parameters={"gain": typed}, place=Place(x=0, y=0))
+    document.edit(AddBlocks(blocks=[new]))
+    assert document.diagram.blocks["gain"].parameter_value("gain") == value

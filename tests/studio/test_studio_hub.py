@@ -1,0 +1,188 @@
+"""Documents, files and pages: what is saved, what is refused, what every page is told."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armblocks.blocks import BLOCKS
+from armblocks.errors import ArmblocksError, FormatError, InputError
+from armblocks.formats import load_diagram
+from armblocks.studio import run_worker
+from armblocks.studio.hub import Hub, Page
+from armblocks.studio.launch import serve
+from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.server import built_page
+
+Told = list[dict[str, Any]]
+
+
+def talk(
+    folder: Path, talking: Callable[[Hub, Callable[..., Awaitable[Any]], Told], Awaitable[None]]
+) -> Told:
+    """Let a page talk to a hub; what it was told."""
+    told: Told = []
+
+    async def going() -> None:
+        hub = Hub(ProjectFolder(folder))
+
+        async def hear(text: str) -> None:
+            told.append(json.loads(text))
+
+        async def hear_bytes(data: bytes) -> None:
+            raise AssertionError("no run was asked for")
+
+        page = Page(hear, hear_bytes)
+        await hub.welcome(page)
+        number = 0
+
+        async def ask(kind: str, **values: Any) -> Any:
+            nonlocal number
+            number += 1
+            await hub.answer(page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
+            reply = next(event for event in told if event["kind"] == "reply" and event["number"] == number)
+            if reply["fault"]:
+                raise InputError(reply["fault"]["what"], fix=reply["fault"]["fix"])
+            return reply["value"]
+
+        await talking(hub, ask, told)
+        await asyncio.sleep(0.4)  # the background check
+        hub.close()
+
+    asyncio.run(going())
+    return told
+
+
+GAIN = {"name": "gain", "type": "Gain", "place": {"x": 0, "y": 0}}
+
+
+def test_a_drawing_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
+    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+        key = await ask("open", example="van_der_pol_pid")
+        await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
+        await ask(
+            "change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]}
+        )  # sent twice, done once
+        await asyncio.sleep(0.4)
+        await ask("undo", document=key)
+        assert await ask("save", document=key, path="models/mine.json") == "models/mine.json"
+        await asyncio.sleep(0.4)
+
+    told = talk(tmp_path, talking)
+    assert load_diagram(tmp_path / "models" / "mine.json", BLOCKS).name == "mine"
+    checks = [event for event in told if event["kind"] == "checked"]
+    assert [(f["block"], f["port"]) for f in checks[0]["findings"]] == [("gain", "u")]
+    assert checks[-1]["findings"] == []
+    assert checks[-1]["wires"]["PID/y"]["shape"] == []
+    last = [event for event in told if event["kind"] == "changed"][-1]
+    assert last["state"]["path"] == "models/mine.json"
+    assert not last["state"]["dirty"]
+
+
+def test_a_file_that_changed_on_the_disk_is_not_overwritten_without_a_word(tmp_path: Path) -> None:
+    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+        key = await ask("new")
+        with pytest.raises(ArmblocksError, match="the drawing has no file yet"):
+            await ask("save", document=key)
+        await ask("save", document=key, path="a.json")
+        (tmp_path / "a.json").write_text("{}")
+        with pytest.raises(ArmblocksError, match="the file has changed on the disk since it was opened"):
+            await ask("save", document=key)
+        assert (tmp_path / "a.json").read_text() == "{}"
+        (tmp_path / "b.json").write_text("{}")
+        with pytest.raises(ArmblocksError, match="there is such a file already"):
+            await ask("save", document=key, path="b.json")
+        await ask("save", document=key, path="b.json", overwrite=True)
+        await ask("save", document=key)
+
+    talk(tmp_path, talking)
+    assert load_diagram(tmp_path / "b.json", BLOCKS).name == "b"
+
+
+def test_a_drawing_that_cannot_run_yet_is_saved_and_opened_again(tmp_path: Path) -> None:
+    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+        key = await ask("new")
+        await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
+        await ask("save", document=key, path="open.json")
+        hub.documents.clear()
+        await ask("open", path="open.json")
+
+    told = talk(tmp_path, talking)
+    sheets = [event["sheet"]["blocks"] for event in told if event["kind"] == "opened"]
+    assert list(sheets[-1]) == ["gain"]
+
+
+def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
+    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+        key = await ask("open", example="van_der_pol_pid")
+        with pytest.raises(ArmblocksError, match="no blocks were chosen"):
+            await ask("change", document=key, key="1", edit={"kind": "group", "blocks": [], "name": "s"})
+        group = {"kind": "group", "blocks": ["error"], "name": "pid"}
+        with pytest.raises(ArmblocksError, match="a block is already named 'pid'"):
+            await ask("change", document=key, key="2", edit=group)
+        await ask("change", document=key, key="3", edit={**group, "name": "part"})
+        await ask("look", document=key, inside=["part"])
+        inner = {"kind": "remove", "blocks": ["error"]}
+        await ask("change", document=key, key="4", inside=["part"], edit=inner)
+        with pytest.raises(ArmblocksError, match="there is no subsystem named 'error'"):
+            await ask("look", document=key, inside=["error"])
+        await ask("undo", document=key)
+        await ask("undo", document=key)  # the subsystem itself is gone: the page is shown the whole
+
+    told = talk(tmp_path, talking)
+    opened = [event for event in told if event["kind"] == "opened"]
+    assert opened[1]["inside"] == ["part"]
+    assert opened[-1]["inside"] == []
+    assert opened[-1]["sheet"]["blocks"].keys() == opened[0]["sheet"]["blocks"].keys()
+
+
+def test_robots_are_shown_and_posed_by_the_server(tmp_path: Path) -> None:
+    async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
+        key = await ask("open", example="kr180model")
+        scene = await ask("scene", document=key, block="plot")
+        assert scene["rows"] == 6
+        assert len(scene["joints"]) == 4
+        assert len(await ask("pose", document=key, block="plot", q=[0.0] * 4)) == 6
+        with pytest.raises(ArmblocksError, match="5 joint coordinates were given"):
+            await ask("pose", document=key, block="plot", q=[0.0] * 5)
+        with pytest.raises(ArmblocksError, match="the block has no robot"):
+            await ask("scene", document=key, block="speed")
+        assert await ask("typed", type="Gain", parameter="gain", text="[1 2;3 4]") == [[1.0, 2.0], [3.0, 4.0]]
+
+    talk(tmp_path, talking)
+
+
+def test_starting_says_in_words_why_it_cannot(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="this installation has no studio page"):
+        built_page(tmp_path)
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(InputError, match=r"port \d+ cannot be used"):
+            serve(tmp_path, "", port=taken.getsockname()[1], open_browser=False, announce=print)
+
+
+def test_a_run_without_memory_fails_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[bytes] = []
+
+    class Pipe:
+        def send_bytes(self, data: bytes) -> None:
+            said.append(data)
+
+    def exhausted(_: object) -> None:
+        raise MemoryError
+
+    job = {"run": "r", "document": "d", "speed": None, "folder": ".", "diagram": ""}
+    run = run_worker._Run(Pipe(), job)  # pyright: ignore
+    monkeypatch.setattr(run, "_go", lambda: exhausted(None))
+    run.run()
+    event = json.loads(said[-1][1:])
+    assert event["state"] == "failed"
+    assert event["fault"]["what"] == "the run needs more memory than it may have"

@@ -1,0 +1,192 @@
+"""What people do with the studio, done in a real browser against a real server."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+import armblocks as ab
+
+
+def block(page: Page, name: str):
+    return page.locator(f'.react-flow__node[data-id="{name}"]')
+
+
+def new_diagram(page: Page) -> None:
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name="New diagram").click()
+    expect(page.get_by_text("Type to add a block")).to_be_visible()
+
+
+def add(page: Page, typed: str) -> None:
+    """Add a block by keyboard alone."""
+    page.keyboard.press(typed[0])
+    box = page.get_by_role("textbox", name="Add a block")
+    expect(box).to_be_visible()
+    box.press_sequentially(typed[1:])
+    box.press("Enter")
+    expect(box).to_be_hidden()
+
+
+def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
+    page.get_by_role("textbox", name="Search the library").fill(kind)
+    target = page.locator(".react-flow__pane")
+    page.locator(f'.kind[data-type="{kind}"]').drag_to(target, target_position={"x": x, "y": y})
+    page.get_by_role("button", name="Clear the search").click()
+
+
+def wire(page: Page, source: str, target: str) -> None:
+    """Draw a wire with the mouse, between two handles ``block/port``."""
+
+    def middle(port: str) -> tuple[float, float]:
+        name, _, handle = port.partition("/")
+        box = block(page, name).locator(f'[data-handleid="{handle}"]').bounding_box()
+        assert box is not None
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    page.mouse.move(*middle(source))
+    page.mouse.down()
+    page.mouse.move(*middle(target), steps=5)
+    page.mouse.up()
+
+
+def run(page: Page) -> None:
+    page.keyboard.press("Control+Enter")
+    expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
+
+
+def test_the_first_example_is_shown_run_and_scrubbed(page: Page) -> None:
+    expect(page.locator(".robot canvas")).to_be_visible()
+    run(page)
+    expect(page.locator(".chart")).not_to_have_count(0)
+    expect(page.locator(".timeline .instant")).to_have_text("10.000 s")
+    slider = page.get_by_role("slider", name="Time")
+    slider.focus()
+    slider.press("Home")
+    expect(page.locator(".timeline .instant")).to_have_text("0.000 s")
+    page.get_by_role("button", name="Play the run").click()
+    expect(page.get_by_role("button", name="Hold the playback")).to_be_visible()
+    page.get_by_role("button", name="Hold the playback").click()
+
+
+def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, tmp_path: Path) -> None:
+    new_diagram(page)
+    drag_from_library(page, "SineWave", 150, 150)
+    drag_from_library(page, "Gain", 300, 150)
+    drag_from_library(page, "Scope", 450, 150)
+    expect(page.locator(".react-flow__node")).to_have_count(3)
+    expect(page.locator(".block .fault")).to_have_count(2)
+    wire(page, "Sine Wave/y", "Gain/u")
+    wire(page, "Gain/y", "Scope/u1" if page.locator('[data-handleid="u1"]').count() else "Scope/u")
+    expect(page.locator(".react-flow__edge")).to_have_count(2)
+    expect(page.locator(".block .fault")).to_have_count(0)
+    block(page, "Gain").dblclick()
+    field = page.get_by_role("textbox", name="gain")
+    field.fill("import os")
+    expect(page.get_by_text("is not understood here")).to_be_visible()
+    expect(page.get_by_role("button", name="OK", exact=True)).to_be_disabled()
+    field.fill("2*pi")
+    expect(page.get_by_text("= 6.283185307179586")).to_be_visible()
+    page.get_by_role("button", name="OK", exact=True).click()
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    run(page)
+    page.once("dialog", lambda dialog: dialog.accept("made/by hand.json"))
+    page.keyboard.press("Control+s")
+    expect(page.locator(".title")).to_have_text("by hand")
+    made = ab.load_diagram(tmp_path / "made" / "by hand.json")
+    assert made.blocks["Gain"].parameter_value("gain") == 6.283185307179586
+    assert [str(wire) for wire in made.connections][1] == "Sine Wave/y -> Gain/u"
+
+
+def test_the_same_with_the_keyboard_alone_and_undone_to_nothing(page: Page) -> None:
+    new_diagram(page)
+    for typed in ("sine wave", "integrator", "scope"):
+        add(page, typed)
+    expect(page.locator(".react-flow__node")).to_have_count(3)
+    for source, target in (("Sine", "Integrator"), ("Integrator", "Scope")):
+        page.keyboard.press(">")
+        box = page.get_by_role("combobox", name="From the output")
+        box.fill(source)
+        box.press("Enter")
+        box = page.get_by_role("combobox", name="To the input")
+        box.fill(target)
+        box.press("Enter")
+        page.get_by_role("button", name="Connect", exact=True).press("Enter")
+        expect(page.get_by_role("dialog")).to_be_hidden()
+    expect(page.locator(".react-flow__edge")).to_have_count(2)
+    run(page)
+    for _ in range(5):
+        page.keyboard.press("Control+z")
+    expect(page.locator(".react-flow__node")).to_have_count(0)
+    for _ in range(5):
+        page.keyboard.press("Control+y")
+    expect(page.locator(".react-flow__edge")).to_have_count(2)
+
+
+def test_blocks_are_grouped_entered_and_left(page: Page) -> None:
+    block(page, "T2xyz").click()
+    page.keyboard.press("Control+g")
+    expect(block(page, "Subsystem")).to_be_visible()
+    expect(block(page, "T2xyz")).to_have_count(0)
+    page.keyboard.press("Enter")
+    expect(block(page, "T2xyz")).to_be_visible()
+    expect(page.locator(".breadcrumbs")).to_have_text(re.compile("kr180model.*Subsystem"))
+    page.keyboard.press("Escape")
+    page.keyboard.press("Escape")
+    expect(block(page, "Subsystem")).to_be_visible()
+    run(page)
+    page.keyboard.press("Control+z")
+    expect(block(page, "T2xyz")).to_be_visible()
+
+
+def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
+    page.get_by_role("combobox", name="Speed").click()
+    page.get_by_role("option", name="0.5 × real time").click()
+    page.keyboard.press("Control+Enter")
+    state = page.locator(".run-state")
+    expect(state).to_contain_text("running")
+    page.get_by_role("button", name="Pause").click()
+    expect(state).to_contain_text("paused")
+    before = page.locator(".run-state .numbers").first.inner_text()
+    page.get_by_role("button", name="Step").click()
+    expect(page.locator(".run-state .numbers").first).not_to_have_text(before)
+    page.get_by_role("button", name="Resume").click()
+    expect(state).to_contain_text("running")
+    page.get_by_role("button", name="Stop").click()
+    expect(state).to_contain_text("stopped", timeout=3000)
+
+
+def test_two_pages_show_the_same_document(page: Page) -> None:
+    other = page.context.new_page()
+    other.goto(page.url)
+    other.locator(".react-flow__node").first.wait_for()
+    block(page, "T2xyz").click()
+    page.keyboard.press("Delete")
+    expect(block(other, "T2xyz")).to_have_count(0)
+    other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
+    other.keyboard.press("Control+z")
+    expect(block(page, "T2xyz")).to_be_visible()
+
+
+def test_copied_blocks_travel_as_text(page: Page) -> None:
+    block(page, "speed").click()
+    page.keyboard.press("Control+c")
+    page.wait_for_function("navigator.clipboard.readText().then((text) => text.includes('armblocks-blocks'))")
+    assert json.loads(page.evaluate("navigator.clipboard.readText()"))["blocks"][0]["name"] == "speed"
+    page.keyboard.press("Control+v")
+    expect(block(page, "speed 2")).to_be_visible()
+
+
+def test_axe_finds_nothing_serious(page: Page) -> None:
+    script = Path(__file__).parents[2] / "frontend" / "node_modules" / "axe-core" / "axe.min.js"
+    page.evaluate(script.read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+    serious = [
+        (rule["id"], rule["nodes"][0]["html"][:200])
+        for rule in found["violations"]
+        if rule["impact"] in ("serious", "critical")
+    ]
+    assert serious == []
