@@ -123,6 +123,7 @@ function Field({ rule, type, text, focus, onText, onFault }: FieldProps) {
     const known = [...(robots ?? []), ...(files ?? [])]
     return <NativeSelect {...common} data={known.includes(text) ? known : [text, ...known]} value={text} onChange={(event) => onText(event.currentTarget.value)} />
   }
+  if (rule.kind === 'table' || rule.kind === 'function') return <TextInput {...common} value={text} readOnly />
   return (
     <TextInput
       {...common}
@@ -140,7 +141,7 @@ function Field({ rule, type, text, focus, onText, onFault }: FieldProps) {
 function useCheck(rule: ParameterRule, type: string, text: string, onFault: (fault: string) => void) {
   const [state, setState] = useState({ fault: '', value: '' })
   useEffect(() => {
-    if (['boolean', 'choice', 'robot'].includes(rule.kind)) return
+    if (['boolean', 'choice', 'robot', 'table', 'function'].includes(rule.kind)) return
     let current = true
     const report = (fault: string, value: string) => {
       if (!current) return

@@ -6,8 +6,8 @@ export function valueText(value: unknown): string {
     return `[${rows.map(valueText).join(' ')}]`
   }
   if (value && typeof value === 'object' && 'source' in value) {
-    const { robot, source } = value as { robot: string; source: string }
-    return source || robot
+    const { source, ...named } = value as { source: string } & Record<string, string>
+    return source || Object.values(named).join()
   }
   return value === null || value === undefined ? '' : String(value)
 }

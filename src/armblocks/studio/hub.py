@@ -12,6 +12,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from starlette.websockets import WebSocketDisconnect
+
 from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram
@@ -31,6 +33,8 @@ MOST_DOCUMENTS = 100
 MOST_KEYS = 1000
 """Keys of edits that are remembered, so that one sent twice is done once."""
 
+GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
+"""What sending to a page raises that has left."""
 SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]
 
@@ -46,8 +50,9 @@ class Page:
 
     async def tell(self, event: say.Message) -> None:
         """Send an event; a page that is gone is nobody's trouble."""
-        with contextlib.suppress(Exception):
-            await self.send_text(event.model_dump_json())
+        text = event.model_dump_json()
+        with contextlib.suppress(*GONE):
+            await self.send_text(text)
 
 
 @dataclasses.dataclass(eq=False, kw_only=True)
@@ -309,7 +314,7 @@ class Hub:
         async def tell(event: say.Message | bytes) -> None:
             if isinstance(event, bytes):
                 pages = [page for page in self.pages if found.key in page.shows]
-                with contextlib.suppress(Exception):
+                with contextlib.suppress(*GONE):
                     await asyncio.gather(*(page.send_bytes(event) for page in pages))
             else:
                 await self.tell_all(found.key, event)

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from armblocks.diagram import Parameter, ParameterKind
+from armblocks.diagram import Parameter, ParameterKind, TimeTable, UserFunction
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import read_script
 from armblocks.robot import Robot
@@ -67,9 +67,15 @@ def number_value(text: str, where: str) -> float | list[Any]:
 
 
 def parameter_json(value: Any) -> Any:
-    """A checked value as the page gets it: infinities as text, a robot by its name and source."""
+    """A checked value as the page gets it: infinities as text, what is no plain data by its name and source."""
     if isinstance(value, Robot):
         return {"robot": value.name, "source": value.source}
+    if isinstance(value, TimeTable):
+        return {"table": f"{np.shape(value.rows)[0]} rows", "source": value.source}
+    if isinstance(value, UserFunction):
+        return {"function": value.name, "source": ""}
+    if isinstance(value, complex):
+        return f"{value.real!r}{value.imag:+}i" if value.imag else parameter_json(value.real)
     if isinstance(value, tuple):
         return [parameter_json(entry) for entry in cast("tuple[Any, ...]", value)]
     if isinstance(value, float) and math.isinf(value):
