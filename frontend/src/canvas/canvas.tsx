@@ -169,7 +169,7 @@ function Sheet() {
   const onKeyDown = (event: KeyboardEvent) => {
     // Keys belong to the sheet while it has the focus, and while nothing has it (a focused block may have gone);
     // a button elsewhere keeps only the keys that press it.
-    const focused = window.document.activeElement
+    const focused = event.target instanceof Element ? event.target : null
     if (focused instanceof HTMLInputElement || focused?.closest('[role="dialog"], [role="menu"], [role="slider"]')) return
     const ours = focused === window.document.body || sheet.current?.contains(focused)
     if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return

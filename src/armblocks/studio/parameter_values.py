@@ -67,7 +67,7 @@ def number_value(text: str, where: str) -> float | list[Any]:
 
 
 def parameter_json(value: Any) -> Any:
-    """A checked value as the page gets it: infinities as text, what is no plain data by its name and source."""
+    """A checked value as the page gets it: infinities as text, robots, tables and functions by name."""
     if isinstance(value, Robot):
         return {"robot": value.name, "source": value.source}
     if isinstance(value, TimeTable):

@@ -88,7 +88,7 @@ def _block_type(kind: type[Block]) -> BlockType:
                 kind=rule.kind.value,
                 doc=rule.doc,
                 unit=rule.unit,
-                default=None if rule.required else parameter_json(rule.default),
+                default=parameter_json(block.parameter_value(rule.name)),
                 tunable=rule.tunable,
                 choices=list(rule.choices),
                 allowed=rule.describe(),
