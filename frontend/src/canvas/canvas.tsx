@@ -207,10 +207,22 @@ function Sheet() {
     addEventListener('keydown', onKeyDown)
     return () => removeEventListener('keydown', onKeyDown)
   })
-  // The panels take their places after the first drawing: fit again when they have.
+  // The sheet fits its panel, whatever size that takes, until somebody moves it.
   useEffect(() => {
-    const timer = setTimeout(() => void flow.fitView({ padding: 0.08, maxZoom: 1.25 }), SETTLE_MS)
-    return () => clearTimeout(timer)
+    const element = sheet.current
+    if (!element) return
+    let timer = 0
+    const sized = new ResizeObserver(() => {
+      clearTimeout(timer)
+      timer = window.setTimeout(() => void flow.fitView({ padding: 0.08, maxZoom: 1.25 }), SETTLE_MS)
+    })
+    const leave = () => {
+      clearTimeout(timer)
+      sized.disconnect()
+    }
+    sized.observe(element)
+    for (const kind of ['pointerdown', 'wheel', 'keydown']) element.addEventListener(kind, leave, { once: true })
+    return leave
   }, [flow])
 
   const empty = Object.keys(blocks).length === 0
