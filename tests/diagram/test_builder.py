@@ -62,6 +62,7 @@ def test_layout_settings_and_unknown_keys_are_carried() -> None:
     ("name", "message"),
     [
         ("", "a block has an empty name"),
+        (" ", "a block has an empty name"),
         ("a/b", "the block name 'a/b' contains '/'"),
         ("a.b", r"the block name 'a\.b' contains '\.'"),
         ("a\nb", r"the block name 'a\\nb' contains '\\n'"),

@@ -229,3 +229,10 @@ def test_a_blow_up_leaves_no_warning_of_numpy() -> None:
     options = SimulationOptions(stop_time=1e6, solver="rk45", sample_time=1e5, rtol=0.1)
     with pytest.raises(SimulationError, match="not finite"):
         simulate(OSCILLATOR, options)
+
+
+def test_steps_without_number_are_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"step is 1e-12 s, and the stop time 1 s: 1e\+12 steps.*is it in seconds"
+    ):
+        simulate(OSCILLATOR, SimulationOptions(stop_time=1.0, solver="rk4", step=1e-12))

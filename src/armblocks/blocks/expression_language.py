@@ -222,7 +222,7 @@ class Formula:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."
+    return text if len(text) <= 40 else text[:37] + "..."
 
 
 _ALLOWED = "numbers, names, u[1], + - * / ^, comparisons, && || !, and the functions " + ", ".join(

@@ -14,7 +14,7 @@ def check_block_name(name: str, where: str) -> None:
     """Raise ``DiagramError`` for a name unfit for a path, ``block/port`` or ``block.parameter``."""
     allowed = f"1 to {LONGEST_NAME} characters, without '/', '.' and control characters"
     shown = repr(name if len(name) <= 60 else name[:57] + "...")
-    if not name:
+    if not name.strip():
         raise DiagramError("a block has an empty name", where=where, allowed=allowed, fix="name it")
     if len(name) > LONGEST_NAME:
         raise DiagramError(

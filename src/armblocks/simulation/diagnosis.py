@@ -120,9 +120,9 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
         f"block '{block}' causes events without end at {run.time:.15g} s, after {run.events} events in all: "
         "they follow one another at ever shorter distances, or at one instant (Zeno behaviour or chattering)",
         where=system.name,
-        allowed="at most 1000 events as good as at one instant, and distances that do not shrink to nothing",
-        fix=f"give '{block}' a hysteresis, a dead band or a state of rest (a ball that stops bouncing below "
-        "some speed), or stop the run before that time",
+        allowed="at most 1000 events as good as at one instant",
+        fix=f"give '{block}' a hysteresis, a dead band or a state of rest (no bounce below some speed), or "
+        "stop the run before",
     )
 
 

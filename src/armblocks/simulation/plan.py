@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 DEFAULT_INSTANTS = 1000
 """Intervals that are recorded where nobody says a sample time: 10 s in steps of 10 ms."""
+MOST_STEPS = 1e11
+"""Fixed steps, or ticks of a clock, in a run."""
 MOST_NUMBERS = 500_000_000
 """Recorded doubles of one run, 4 GB: beyond it the computer would suffer before the run does."""
 SMALLEST_RTOL = 1e-13
@@ -122,6 +124,9 @@ def make_plan(
                 fix="choose a smaller step",
             )
         _resolvable("step", step, stop, system.name)
+        _countable("step", step, stop, system.name)
+    for period, _ in system.sizes.clocks:
+        _countable("the period of a sampled block", period, stop, system.name)
     tableau, reason = _choose(system, options)
     fixed_step = None if tableau is None or tableau.adaptive else step
     sample_time = _sample_time(system, options, stop, fixed_step, logged=logged)
@@ -159,6 +164,17 @@ def _resolvable(name: str, step: float, stop: float, where: str) -> None:
             where=where,
             allowed=f"at least {least:.2g} s here",
             fix="choose a larger step, or count the time from another origin",
+        )
+
+
+def _countable(name: str, step: float, stop: float, where: str) -> None:
+    """Raise ``InputError`` for a step or period of which there are more in a run than anybody awaits."""
+    if stop > MOST_STEPS * step:
+        raise InputError(
+            f"{name} is {step:g} s, and the stop time {stop:g} s: {stop / step:.0e} steps",
+            where=where,
+            allowed=f"at most {MOST_STEPS:.0e}, which take hours",
+            fix="is it in seconds? Choose a longer one, or an earlier stop time",
         )
 
 

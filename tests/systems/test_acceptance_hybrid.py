@@ -1,0 +1,270 @@
+"""Hybrid and delayed systems as a stranger writes them, against closed forms; as objects and as files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import armblocks as ab
+from armblocks import blocks as bl
+
+Array = NDArray[np.float64]
+SOLVERS: Mapping[str, Mapping[str, object]] = {
+    "rk45": {"solver": "rk45", "rtol": 1e-10, "atol": 1e-12},
+    "dop853": {"solver": "dop853", "rtol": 1e-10, "atol": 1e-12},
+    "rodas5p": {"solver": "rodas5p", "rtol": 1e-9, "atol": 1e-11},
+    "rk4": {"solver": "rk4", "step": 0.005},
+}
+
+
+@pytest.fixture(params=SOLVERS)
+def run(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[..., ab.SimulationResult]:
+    """A run by one solver; the diagram that was saved and loaded gives the same bits."""
+
+    def by_solver(diagram: ab.Diagram, stop_time: float, **settings: object) -> ab.SimulationResult:
+        options = {**SOLVERS[request.param], "sample_time": stop_time / 97.0, **settings}
+        result = ab.simulate(diagram, stop_time=stop_time, **options)
+        ab.save_diagram(diagram, tmp_path / "saved.json")
+        again = ab.simulate(ab.load_diagram(tmp_path / "saved.json"), stop_time=stop_time, **options)
+        for name in result.names:
+            assert np.array_equal(result[name], again[name]), name
+        return result
+
+    return by_solver
+
+
+Run = Callable[..., ab.SimulationResult]
+
+
+def integrating(builder: ab.DiagramBuilder, name: str, rate: object, **parameters: object) -> ab.BlockHandle:
+    """An integrator behind its rate."""
+    return builder.add(name, bl.Integrator(**parameters), rate)
+
+
+def test_a_ball_rolls_down_a_slope_and_bounces_at_its_end(run: Run) -> None:
+    """Along a slope of 30 degrees a = -g/2; e = 0.6; the bounces are at t1, t1 + 2 e v1/a, ..."""
+    a, e, s0 = 9.81 / 2, 0.6, 2.0
+    builder = ab.DiagramBuilder("slope")
+    pull = builder.add("pull", bl.Constant(value=-a))
+    ball = builder.add(
+        "ball",
+        bl.SecondOrderIntegratorLimited(initial=s0, lower=0.0, reinitialize=True),
+        pull,
+    )
+    bounce = builder.add("bounce", bl.Gain(gain=-e), ball["dx"])
+    builder.connect(bounce, ball["dx0"])
+    first = math.sqrt(2 * s0 / a)
+    v1 = a * first
+    stop = first + 2 * v1 / a * (e + e * e) + 0.9 * v1 * e**3 / a
+    found = run(builder.build(), stop)
+    assert found.run.events >= 3
+    t = found.time
+    expected = np.where(t <= first, s0 - a * t**2 / 2, np.nan)
+    start = first
+    for k in (1, 2, 3):
+        speed, length = v1 * e**k, 2 * v1 * e**k / a
+        inside = (t > start) & (t <= start + length)
+        expected[inside] = (speed * (t - start) - a * (t - start) ** 2 / 2)[inside]
+        start += length
+    np.testing.assert_allclose(found["ball/x"], expected, atol=3e-9)
+
+
+def test_a_mass_on_a_belt_sticks_and_slips_periodically(run: Run) -> None:
+    """m v' = -k x - friction(v - V): it sticks until k x = Fs, then slips about Fc."""
+    k, m, V, Fs, Fc = 4.0, 1.0, 0.5, 1.0, 0.6
+    builder = ab.DiagramBuilder("belt")
+    # In belt coordinates: y = x - V t, so the friction block sees the relative speed.
+    mass = builder.add("mass", bl.StickSlipFriction(mass=m, coulomb=Fc, static=Fs))
+    belt = builder.add("belt", bl.Ramp(slope=V))
+    place = builder.add("place", bl.Sum(signs="++"), mass["x"], belt)
+    builder.connect(builder.add("spring", bl.Gain(gain=-k), place), mass["F"])
+    t1 = Fs / (k * V)  # sticks from x = 0 until then
+    w = math.sqrt(k / m)
+    # slip: x'' = -w^2 x + Fc/m, from x = Fs/k, x' = V
+    A, B = Fs / k - Fc / k, V / w
+
+    def x(time: Array) -> Array:
+        s = time - t1
+        return Fc / k + A * np.cos(w * s) + B * np.sin(w * s)
+
+    # it sticks again where x' = V for the first time after
+    s2 = (2 * math.pi - 2 * math.atan2(A, B)) / w
+    found = run(builder.build(), t1 + s2 + 0.3)
+    t = found.time
+    slip = (t > t1) & (t <= t1 + s2)
+    expected = np.where(t <= t1, V * t, x(t))
+    end = float(x(np.array([t1 + s2]))[0])
+    expected = np.where(t > t1 + s2, end + V * (t - t1 - s2), expected)
+    np.testing.assert_allclose(found["place/y"], expected, atol=1e-8)
+    stuck = ~slip & (np.abs(t - t1) > 1e-9)
+    assert (found["mass/v"][stuck] == 0.0).all()
+
+
+def test_a_thermostat_with_exponential_branches(run: Run) -> None:
+    """T' = -(T - 10 - 20 on): from 15 it heats to 22, cools to 18, ...: the period is closed."""
+    builder = ab.DiagramBuilder("thermostat")
+    room = builder.add("room", bl.Integrator(initial=15.0))
+    relay = builder.add("relay", bl.Relay(on_point=22.0, off_point=18.0, on_value=10.0, off_value=30.0), room)
+    builder.connect(builder.add("rate", bl.Sum(signs="+-"), relay, room), room["u"])
+    found = run(builder.build(), 4.0)
+    t, expected = found.time, np.empty_like(found.time)
+    begin, value, target = 0.0, 15.0, 30.0
+    while begin < 4.0:
+        edge = 22.0 if target == 30.0 else 18.0
+        length = math.log((target - value) / (target - edge))
+        inside = (t >= begin) & (t <= begin + length)
+        expected[inside] = target + (value - target) * np.exp(-(t[inside] - begin))
+        begin, value, target = begin + length, edge, 40.0 - target
+    np.testing.assert_allclose(found["room"], expected, atol=3e-8)
+
+
+def test_two_rates_with_offsets_around_a_plant(run: Run) -> None:
+    """x' = u held at 0.02 + 0.1 j, u = -K w, w = x held at 0.07 + 0.25 j: exact piecewise lines."""
+    builder = ab.DiagramBuilder("rates")
+    x = builder.add("x", bl.Integrator(initial=1.0))
+    sensor = builder.add("sensor", bl.ZeroOrderHold(sample_time=(0.25, 0.07)), x)
+    control = builder.add("control", bl.ZeroOrderHold(sample_time=(0.1, 0.02)), sensor)
+    builder.connect(builder.add("gain", bl.Gain(gain=-1.5), control), x["u"])
+    found = run(builder.build(), 3.0)
+    ticks = sorted([(0.07 + 0.25 * j, 0) for j in range(12)] + [(0.02 + 0.1 * j, 1) for j in range(30)])
+    value, seen, held, begin = 1.0, 0.0, 0.0, 0.0
+    expected = np.empty_like(found.time)
+    pieces = [(0.0, 1.0, 0.0)]
+    for time, which in ticks:
+        value += -1.5 * held * (time - begin)
+        begin = time
+        if which == 0:
+            seen = value
+        # both tick together at 0.32 + 0.5 j: the sensor first, as it feeds the control
+        else:
+            held = seen
+        pieces.append((time, value, held))
+    for start, level, hold in pieces:
+        after = found.time >= start - 1e-12
+        expected[after] = level - 1.5 * hold * (found.time[after] - start)
+    np.testing.assert_allclose(found["x"], expected, atol=1e-12)
+
+
+def test_a_relay_in_a_double_integrator_loop_with_dead_zone_of_time(run: Run) -> None:
+    """x'' = -sign-relay(x) with hysteresis h: parabolas, amplitudes that grow as v^2 + 4 h per half turn."""
+    h = 0.1
+    builder = ab.DiagramBuilder("relay")
+    v = builder.add("v", bl.Integrator(initial=1.0))
+    x = integrating(builder, "x", v)
+    relay = builder.add("relay", bl.Relay(on_point=h, off_point=-h, on_value=-1.0, off_value=1.0), x)
+    builder.connect(relay, v["u"])
+    found = run(builder.build(), 6.0)
+    t, expected = found.time, np.empty_like(found.time)
+    begin, place, speed, push = 0.0, 0.0, 1.0, 1.0
+    while begin < 6.0:
+        edge = h if push > 0 else -h
+        # place + speed s + push s^2/2 = edge, the last crossing in the direction of the switch
+        s = (-speed + push * math.sqrt(speed**2 + 2 * push * (edge - place))) / push
+        inside = (t >= begin) & (t <= begin + s)
+        expected[inside] = place + speed * (t[inside] - begin) + push * (t[inside] - begin) ** 2 / 2
+        begin, place, speed, push = begin + s, edge, speed + push * s, -push
+    np.testing.assert_allclose(found["x"], expected, atol=2e-8)
+
+
+def test_dead_time_in_a_loop(run: Run) -> None:
+    """x'(t) = -x(t - 1), x = 1 before: the method of steps gives a polynomial for every second."""
+    builder = ab.DiagramBuilder("dead time")
+    x = builder.add("x", bl.Integrator(initial=1.0))
+    late = builder.add("late", bl.TransportDelay(delay=1.0, initial=1.0), x)
+    builder.connect(builder.add("minus", bl.Gain(gain=-1.0), late), x["u"])
+    found = run(builder.build(), 5.0)
+    t = found.time
+    expected = sum(
+        np.where(t > k - 1, (-1.0) ** k * np.maximum(t - (k - 1), 0.0) ** k / math.factorial(k), 0.0)
+        for k in range(1, 7)
+    )
+    np.testing.assert_allclose(found["x"], 1.0 + expected, atol=2e-8)
+
+
+def test_a_sampled_pi_with_a_delay_of_one_tick(run: Run) -> None:
+    """The recurrence of plant, integrator and delay, exactly: e^-T for the plant between two ticks."""
+    T, kp, ki = 0.2, 0.8, 0.5
+    builder = ab.DiagramBuilder("pi")
+    plant = builder.add("plant", bl.TransferFunction(numerator=[2.0], denominator=[1.0, 1.0]))
+    error = builder.add("error", bl.Sum(signs="+-"), builder.add("wanted", bl.Constant(value=1.0)), plant)
+    control = builder.add("control", bl.DiscretePID(P=kp, I=ki, sample_time=T), error)
+    builder.connect(builder.add("late", bl.UnitDelay(sample_time=T), control), plant["u"])
+    found = run(builder.build(), 6.0, sample_time=T)
+    x, total, waiting, expected = 0.0, 0.0, 0.0, []
+    for _ in range(31):
+        e = 1.0 - x
+        expected.append(x)
+        u, waiting = waiting, kp * e + total
+        total += ki * T * e
+        x = x * math.exp(-T) + 2.0 * u * (1.0 - math.exp(-T))
+    np.testing.assert_allclose(found["plant/y"], expected, atol=2e-9)
+
+
+def test_an_event_at_the_very_instant_of_a_tick(run: Run) -> None:
+    """A ramp crosses 0.5 exactly at the tick 0.5: the hold sees the value after it, once, and stays."""
+    builder = ab.DiagramBuilder("instant")
+    ramp = builder.add("ramp", bl.Ramp(slope=1.0))
+    above = builder.add("above", bl.CompareToConstant(relation=">=", constant=0.5), ramp)
+    builder.add("hold", bl.ZeroOrderHold(sample_time=0.25), above)
+    integrating(builder, "count", above)
+    found = run(builder.build(), 1.0, sample_time=0.0625)
+    t = found.time
+    assert found["hold/y"].tolist() == (t >= 0.5).astype(float).tolist()
+    np.testing.assert_allclose(found["count"], np.maximum(t - 0.5, 0.0), atol=1e-12)
+
+
+def test_backlash_in_an_integrating_loop(run: Run) -> None:
+    """x' = -b(x): the play is taken up, then x follows an exponential to the edge of the play and rests."""
+    builder = ab.DiagramBuilder("play")
+    x = builder.add("x", bl.Integrator(initial=2.0))
+    play = builder.add("play", bl.Backlash(width=1.0, initial=1.5), x)
+    builder.connect(builder.add("minus", bl.Gain(gain=-1.0), play), x["u"])
+    found = run(builder.build(), 6.0)
+    t = found.time
+    # b rests at 1.5 while x falls from 2 to 1 (2/3 s); then b = x + 0.5: x' = -(x + 0.5)
+    t1 = 1.0 / 1.5
+    expected = np.where(t < t1, 2.0 - 1.5 * t, -0.5 + 1.5 * np.exp(-(t - t1)))
+    np.testing.assert_allclose(found["x"], expected, atol=2e-8)
+
+
+def test_an_enabled_counter_against_a_state_machine(run: Run) -> None:
+    """Ticks of 0.1 s are counted while a square wave of period 0.7 s is high."""
+    inner = ab.DiagramBuilder("count")
+    one = inner.add("one", bl.Constant(value=1.0))
+    total = inner.add("total", bl.Sum(signs="++"), one)
+    before = inner.add("before", bl.UnitDelay(sample_time=0.1), total)
+    inner.connect(before, total["u2"])
+    inner.output("n", before)
+    builder = ab.DiagramBuilder("enabled")
+    wave = builder.add("wave", bl.PulseGenerator(amplitude=1.0, period=0.7, width=50.0))
+    builder.add("counter", bl.EnabledSubsystem(diagram=inner.build()), enable=wave)
+    found = run(builder.build(), 2.0, sample_time=0.02)
+    count, expected, k = 0, [], 0
+    for row in range(found.time.size):
+        if row % 5 == 0:
+            # the state before this tick is the output at it
+            if (0.1 * k + 1e-9) % 0.7 < 0.35:
+                shown, count = count, count + 1
+            k += 1
+        expected.append(shown)
+    assert found["counter/n"].tolist() == expected
+
+
+def test_a_switch_that_fights_itself_is_reported(tmp_path: Path) -> None:
+    """x' = -1 for x >= 0, else 1: after 1 s the switch is thrown without end; the good second is kept."""
+    builder = ab.DiagramBuilder("chattering")
+    x = builder.add("x", bl.Integrator(initial=1.0))
+    down, up = builder.add("down", bl.Constant(value=-1.0)), builder.add("up", bl.Constant(value=1.0))
+    switch = builder.add("switch", bl.Switch(criterion=">=", threshold=0.0), down, x, up)
+    builder.connect(switch, x["u"])
+    with pytest.raises(ab.errors.SimulationError, match="block 'switch' causes events without end") as error:
+        ab.simulate(builder.build(), stop_time=3.0)
+    assert len(str(error.value)) < 400
+    partial = error.value.partial
+    assert isinstance(partial, ab.SimulationResult)
+    assert partial.time[-1] == pytest.approx(1.0, abs=4e-3)
