@@ -32,6 +32,7 @@ from armblocks.blocks import (
     matrices,
     noise,
     orientations,
+    periodic,
     pid,
     poses,
     python_function,
@@ -69,7 +70,7 @@ from armblocks.blocks.arm_plant import ArmPlant
 from armblocks.blocks.branching import If, SwitchCase
 from armblocks.blocks.constraints import AlgebraicConstraint
 from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
-from armblocks.blocks.delays import Delay, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
+from armblocks.blocks.delays import Delay, Memory, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
 from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
 from armblocks.blocks.discrete import (
     CounterLimited,
@@ -190,6 +191,7 @@ from armblocks.blocks.orientations import (
     T2Quaternion,
     T2rpy,
 )
+from armblocks.blocks.periodic import PWM, FirstOrderHold
 from armblocks.blocks.pid import PID, PID2DOF, DiscretePID, DiscretePID2DOF
 from armblocks.blocks.poses import (
     Delta2Tr,
@@ -313,6 +315,7 @@ BLOCKS = BlockLibrary(
         python_function,
         second_order,
         transport,
+        periodic,
         dynamic_limits,
         edges,
     )
@@ -324,6 +327,7 @@ __all__ = [
     "BLOCKS",
     "PID",
     "PID2DOF",
+    "PWM",
     "Abs",
     "ActionSubsystem",
     "AlgebraicConstraint",
@@ -393,6 +397,7 @@ __all__ = [
     "ExtractDiagonal",
     "Extremum",
     "FeedForward",
+    "FirstOrderHold",
     "FirstOrderLag",
     "Fkine",
     "ForwardDynamics",
@@ -440,6 +445,7 @@ __all__ = [
     "MatrixInverse",
     "MatrixPower",
     "MatrixProduct",
+    "Memory",
     "Merge",
     "MinMax",
     "MinMaxRunningResettable",

@@ -75,6 +75,55 @@ class UnitDelay(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Memory(Block):
+    """The input at the tick before, as Simulink's Memory with a sample time: y(k) = u(k-1), y(0) = initial.
+
+    Simulink's Memory in a continuous part gives the input one solver step before. What that is depends on
+    the solver, so it has no place here: with the sample time -1 behind continuous signals it is refused.
+    There a Transport Delay says how long ago; a Unit Delay or this block, with a period, says when to look.
+    """
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Memory"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sampled sine one tick late: the sample time is that of what feeds it.",
+        parameters={"sample_time": -1.0},
+        inputs={"u": made("ZeroOrderHold", sample_time=0.5).by(u=made("SineWave"))},
+    )
+    sampled: ClassVar[bool] = True
+
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (OUTPUT,)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
 class Delay(Block):
     """The input some ticks before: y(k) = u(k - length), y = initial for k < length."""
 

@@ -183,7 +183,7 @@ def _fastest(name: str, block: Block, reaching: Collection[tuple[str, Source]]) 
             f"the sample time -1 is that of the inputs, but '{moving[0]}' changes all the time",
             where=where,
             allowed="-1 behind sampled blocks only",
-            fix=fix,
+            fix=fix + "; what a continuous signal was some time ago, a Transport Delay says",
         )
     clocks = sorted(((clock, entry) for entry, clock in reaching if clock), key=lambda pair: pair[0].period)
     if not clocks:

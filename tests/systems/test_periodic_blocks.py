@@ -1,0 +1,166 @@
+"""First Order Hold, PWM and Memory against closed forms, by fixed and adaptive steps alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from armblocks.blocks import (
+    PWM,
+    Clock,
+    Constant,
+    FirstOrderHold,
+    Integrator,
+    Memory,
+    PulseGenerator,
+    Ramp,
+    SineWave,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.compiler.system import compile_system
+from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
+from armblocks.equations import SimulationOptions
+from armblocks.errors import DiagramError
+from armblocks.simulation import simulate
+
+Run = Callable[[Diagram, float], dict[str, np.ndarray]]
+SAMPLES = 200
+
+
+def native(solver: str, step: float | None = None) -> Run:
+    def run(diagram: Diagram, stop: float) -> dict[str, np.ndarray]:
+        options = SimulationOptions(
+            stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
+        )
+        result = simulate(compile_system(trace_diagram(diagram)), options)
+        return {name: result[name] for name in result.names} | {"t": result.time}
+
+    return run
+
+
+RUNS = {"adaptive": native("rk45"), "fixed": native("rk4", 0.013), "stiff": native("rodas5p")}
+
+
+@pytest.fixture(params=RUNS.values(), ids=RUNS)
+def run(request: pytest.FixtureRequest) -> Run:
+    return request.param
+
+
+def fed(block: Block, source: Block) -> Diagram:
+    """A block behind a source, and the integral of its output, which tells when it switched."""
+    builder = DiagramBuilder("d")
+    out = builder.add("block", block, builder.add("source", source))
+    builder.add("integral", Integrator(), out)
+    return builder.build()
+
+
+def sample_index(t: np.ndarray, period: float, offset: float = 0.0) -> np.ndarray:
+    return np.floor((t - offset) / period + 1e-9)
+
+
+@pytest.mark.parametrize("method", ["extrapolation", "interpolation"])
+def test_a_first_order_hold_draws_the_lines_through_the_samples_of_a_sine(run: Run, method: str) -> None:
+    period, offset, first = 0.3, 0.2, 0.7
+    block = FirstOrderHold(method=method, period=period, offset=offset, initial=first)
+    found = run(fed(block, SineWave(frequency=1.3)), 4.0)
+    t = found["t"]
+    k = sample_index(t, period, offset)
+    last = np.where(k < 0, first, np.sin(1.3 * (offset + k * period)))
+    before = np.where(k < 1, first, np.sin(1.3 * (offset + (k - 1) * period)))
+    start = last if method == "extrapolation" else before
+    expected = start + (last - before) * np.where(k < 0, 0.0, (t - offset - k * period) / period)
+    # The source is looked at at located instants, exact to rounding.
+    assert found["block/y"] == pytest.approx(expected, abs=1e-12)
+    # Its integral piece by piece: trapezia, exact for straight lines.
+    knots = np.unique(np.concatenate([t, offset + period * np.arange(14)]))
+    knots = knots[knots <= t[-1]]
+    j = sample_index(knots[:-1], period, offset)
+    a = np.where(j < 0, first, np.sin(1.3 * (offset + j * period)))
+    b = np.where(j < 1, first, np.sin(1.3 * (offset + (j - 1) * period)))
+    middle = (knots[:-1] + knots[1:]) / 2
+    height = (a if method == "extrapolation" else b) + (a - b) * np.where(
+        j < 0, 0.0, (middle - offset - j * period) / period
+    )
+    assert found["integral/y"][-1] == pytest.approx(float(np.sum(height * np.diff(knots))), abs=1e-10)
+
+
+def test_an_extrapolating_hold_is_exact_for_a_straight_line(run: Run) -> None:
+    found = run(fed(FirstOrderHold(period=0.25, initial=-0.25), Clock()), 3.0)
+    assert found["block/y"] == pytest.approx(found["t"], abs=1e-12)
+
+
+def test_a_first_order_hold_takes_what_a_sampled_block_gives_at_the_same_instant(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    held = builder.add("held", ZeroOrderHold(sample_time=0.1), builder.add("t", Clock()))
+    builder.add("block", FirstOrderHold(period=0.1, method="interpolation"), held)
+    found = run(builder.build(), 2.0)
+    assert found["block/y"] == pytest.approx(np.maximum(found["t"] - 0.1, 0.0), abs=1e-12)
+
+
+def test_a_first_order_hold_draws_vectors(run: Run) -> None:
+    found = run(fed(FirstOrderHold(period=0.5, initial=(1.0, 2.0)), Constant(value=(3.0, -4.0))), 2.0)
+    assert found["block/y"][-1] == pytest.approx([3.0, -4.0])
+    # 3 + (3 - 1) t / T within the first period
+    early = found["t"] < 0.5 - 1e-9
+    assert found["block/y"][early, 0] == pytest.approx(3.0 + 2.0 * found["t"][early] / 0.5, abs=1e-12)
+
+
+def test_the_input_is_looked_at_after_the_events_of_the_instant(run: Run) -> None:
+    """Pulses whose edges are at the instants of the hold and of the modulation, the start included."""
+    builder = DiagramBuilder("d")
+    pulses = builder.add("pulses", PulseGenerator(period=0.5))
+    builder.add("hold", FirstOrderHold(period=0.25, method="interpolation"), pulses)
+    builder.add("pwm", PWM(period=0.25), pulses)
+    found = run(builder.build(), 3.125)
+    t = found["t"]
+    k = sample_index(t, 0.25)
+    now, before = 1.0 - k % 2, np.where(k < 1, 0.0, k % 2)
+    assert found["hold/y"] == pytest.approx(before + (now - before) * (t / 0.25 - k), abs=1e-12)
+    assert found["pwm/y"] == pytest.approx(now)
+
+
+@pytest.mark.parametrize("duty", [-0.5, 0.0, 0.3, 1.0, 1.5])
+def test_pulses_are_as_wide_as_the_duty_cycle_says(run: Run, duty: float) -> None:
+    found = run(fed(PWM(period=0.4, offset=0.1, amplitude=2.0), Constant(value=duty)), 3.99)
+    t, width = found["t"], 0.4 * min(max(duty, 0.0), 1.0)
+    k = sample_index(t, 0.4, 0.1)
+    into = t - 0.1 - 0.4 * k
+    expected = np.where(k < 0, 0.0, 2.0 * (np.maximum(k, 0) * width + np.minimum(into, width)))
+    # Only exactly located edges give the integral to rounding.
+    assert found["integral/y"] == pytest.approx(expected, abs=1e-11)
+    assert found["block/y"] == pytest.approx(np.where((k >= 0) & (into < width - 1e-9), 2.0, 0.0))
+
+
+def test_the_duty_cycle_is_looked_at_where_a_pulse_may_begin(run: Run) -> None:
+    found = run(fed(PWM(period=0.5), Ramp(slope=0.25)), 4.0)
+    t = found["t"]
+    widths = 0.5 * np.minimum(0.25 * 0.5 * np.arange(9), 1.0)
+    k = sample_index(t, 0.5).astype(int)
+    expected = np.concatenate([[0.0], np.cumsum(widths)])[k] + np.minimum(t - 0.5 * k, widths[k])
+    assert found["integral/y"] == pytest.approx(expected, abs=1e-11)
+
+
+def test_a_memory_is_a_unit_delay_at_its_ticks(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    wave = builder.add("wave", SineWave())
+    held = builder.add("held", ZeroOrderHold(sample_time=0.25), wave)
+    builder.add("inherits", Memory(sample_time=-1.0, initial=0.5), held)
+    builder.add("samples", Memory(sample_time=0.25, initial=0.5), wave)
+    builder.add("delay", UnitDelay(sample_time=0.25, initial=0.5), wave)
+    found = run(builder.build(), 3.0)
+    k = sample_index(found["t"], 0.25)
+    expected = np.where(k < 1, 0.5, np.sin(0.25 * (k - 1)))
+    for name in ("inherits", "samples", "delay"):
+        assert found[f"{name}/y"] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_memory_of_a_continuous_signal_is_refused_with_the_way_out() -> None:
+    builder = DiagramBuilder("d")
+    builder.add("memory", Memory(sample_time=-1.0), builder.add("wave", SineWave()))
+    with pytest.raises(
+        DiagramError, match=r"'wave.*' changes all the time.*sample_time of its own.*Transport"
+    ):
+        builder.build()
