@@ -228,7 +228,7 @@ function Sheet() {
   const empty = Object.keys(blocks).length === 0
   return (
     <div className="canvas" ref={sheet} onFocus={selectFocused} onDragOver={(event) => event.preventDefault()} onDrop={drop}>
-      <svg width="0" height="0" aria-hidden>
+      <svg className="defs" width="0" height="0" aria-hidden>
         <marker id="wire-head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" markerUnits="userSpaceOnUse" orient="auto">
           <path d="M0 0.300L8 4L0 7.700Z" className="f-wire" />
         </marker>
