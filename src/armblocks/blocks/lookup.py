@@ -22,10 +22,12 @@ from armblocks.blocks.interpolation import (
     linear_weights,
     weights,
 )
+from armblocks.blocks.long_tables import Borders, is_long, line, with_positions
 from armblocks.blocks.switching import JUST, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
     Guard,
+    Parameter,
     Port,
     Shapes,
     Signals,
@@ -36,7 +38,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-from armblocks.equations import Shape
+from armblocks.equations import Shape, read_entry
 from armblocks.errors import InputError
 
 
@@ -102,8 +104,12 @@ class LookupTable1D(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": inputs["u"]}
 
+    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
+        return with_positions(self, self._is_long(), "positions")
+
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("cell", inputs["u"], "how many borders are at or below u"),) if self._borders() else ()
+        located = bool(self._borders())
+        return (State("cell", inputs["u"], "how many borders are at or below u"),) if located else ()
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         if not self._borders():
@@ -113,6 +119,9 @@ class LookupTable1D(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         points, located = self._points(), bool(self._borders())
+        if self._is_long():
+            cell = x["cell"] if located else self._cell(u["u"], p)
+            return {"y": by_element([u["u"], cell], self._reader(p))}
 
         def value(position: SX, *cell: SX) -> SX:
             found = weights(position, points, self.method, self.extrapolation, *cell)
@@ -124,6 +133,11 @@ class LookupTable1D(Block):
         borders = self._borders()
         if not borders:
             return {}
+        if self._is_long():
+            long = Borders(p["positions"], self.method, self.extrapolation)
+            ends = [u["u"], x["cell"]]
+            up, down = by_element(ends, long.to_next), by_element(ends, long.to_last)
+            return {"up": up + JUST, "down": down + JUST}
 
         def distance(ends: list[float]) -> Callable[..., SX]:
             def beyond(cell: SX, position: SX) -> SX:
@@ -138,10 +152,12 @@ class LookupTable1D(Block):
         return {"up": by_element(place, up), "down": by_element(place, down)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"cell": self._cell(u["u"])} if self._borders() else {}
+        return {"cell": self._cell(u["u"], p)} if self._borders() else {}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        cell = self._cell(u["u"])
+        if not self._borders():
+            return {}
+        cell = self._cell(u["u"], p)
         down = if_else(e["down"] < 0.0, fmin(cell, x["cell"] - 1.0), x["cell"])
         return {"cell": if_else(e["up"] > 0.0, fmax(cell, x["cell"] + 1.0), down)}
 
@@ -152,7 +168,29 @@ class LookupTable1D(Block):
         """Where an event happens."""
         return borders(self._points(), self.method, self.extrapolation) if self.zero_crossing else []
 
-    def _cell(self, u: SX) -> SX:
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.table)[0], self.method)
+
+    def _reader(self, p: Signals) -> Callable[[SX, SX], SX]:
+        """The value at a position in a cell of a long table."""
+        positions, table = p["positions"], p["table"]
+        n = positions.numel()
+
+        def value(u: SX, cell: SX) -> SX:
+            if self.method == "flat":
+                return read_entry(table, cell)
+            if self.extrapolation == "linear":
+                return line(u, positions, cell, lambda k: read_entry(table, k))
+            inside = if_else(cell == 0.0, positions[0], if_else(cell == float(n), positions[n - 1], u))
+            interval = fmin(fmax(cell, 1.0), n - 1.0) - 1.0
+            return line(inside, positions, interval, lambda k: read_entry(table, k))
+
+        return value
+
+    def _cell(self, u: SX, p: Signals) -> SX:
+        if self._is_long():
+            long = Borders(p["positions"], self.method, self.extrapolation)
+            return by_element([u], long.at_or_below)
         return sum((u >= border for border in self._borders()), SX.zeros(*u.shape))
 
 

@@ -7,13 +7,25 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from casadi import SX, if_else, logic_and, logic_not, mtimes, sin, vertcat
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_not, mtimes, sin, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.interpolation import weights
+from armblocks.blocks.long_tables import interval_of, is_long, line, with_positions
 from armblocks.blocks.lookup import rising
-from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, WorkedExample, parameter, shape_of
+from armblocks.diagram import (
+    Block,
+    Parameter,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    parameter,
+    shape_of,
+)
+from armblocks.equations import last_at_or_below, read_entry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +137,12 @@ class FromTable(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": shape_of(self.values)[1:]}
 
+    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
+        return with_positions(self, self._is_long(), "times")
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self._is_long():
+            return {"y": self._read(t, p)}
         times = self._times()
         by_time = vertcat(*weights(t, times, self.method, "linear" if self.outside == "linear" else "clip"))
         course = mtimes(p["values"].T, by_time)
@@ -134,7 +151,28 @@ class FromTable(Block):
         return {"y": course}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        if self._is_long():
+            return (p["times"],)
         return tuple(SX(time) for time in self._times())
+
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.times)[0], self.method)
+
+    def _read(self, t: SX, p: Signals) -> SX:
+        """The course, from the two rows around t."""
+        times, values = p["times"], p["values"].T  # row by row, as the vector of parameters has them
+        first, last = times[0], times[times.numel() - 1]
+        width = values.shape[0] if len(shape_of(self.values)) == 2 else 1
+
+        def row(k: SX) -> SX:
+            return vertcat(*(read_entry(values, width * k + float(column)) for column in range(width)))
+
+        if self.method == "flat":
+            course = row(fmax(last_at_or_below(times, t), 0.0))
+        else:
+            inside = t if self.outside == "linear" else fmin(fmax(t, first), last)
+            course = line(inside, times, interval_of(t, times), row)
+        return if_else(logic_and(t >= first, t <= last), course, 0.0) if self.outside == "zero" else course
 
     def _times(self) -> list[float]:
         return [float(time) for time in np.ravel(cast("Any", self.times))]

@@ -90,6 +90,11 @@ class Block(ABC):
         """The parameters, in the order of declaration."""
         return _parameters_of(cls)
 
+    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
+        """The parameters that stay inputs of the compiled system: all tunable ones, and those that this block
+        reads by index."""
+        return tuple(rule for rule in self.parameters() if rule.tunable)
+
     @classmethod
     def type_name(cls) -> str:
         """The name of this kind of block in files: the class's own."""

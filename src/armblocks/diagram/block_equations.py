@@ -149,14 +149,14 @@ def block_equations(
     instead of events. ``hidden``: the hidden inputs of a block in a conditional subsystem.
     """
     clocked = block.sampled and FIRE not in hidden
-    rules = block.parameters()
+    inputs = block.inputs_of_the_run()
     return _trace(
         _Structure(
             kind=type(block),
-            fixed=tuple(block.parameter_value(rule.name) for rule in rules if not rule.tunable),
-            tunable_shapes=tuple(
-                shape_of(block.parameter_value(rule.name)) for rule in rules if rule.tunable
+            fixed=tuple(
+                block.parameter_value(rule.name) for rule in block.parameters() if rule not in inputs
             ),
+            tunable_shapes=tuple(shape_of(block.parameter_value(rule.name)) for rule in inputs),
             input_shapes=tuple(input_shapes.items()),
             period=period if clocked else 0.0,
             settled=settled and bool(block.modes(input_shapes) or block.conditions(input_shapes) or hidden),
@@ -171,8 +171,7 @@ def tunable_slots(block: Block) -> tuple[Slot, ...]:
     """The tunable parameters of a block, in order."""
     return tuple(
         Slot(rule.name, shape_of(block.parameter_value(rule.name)), rule.unit)
-        for rule in block.parameters()
-        if rule.tunable
+        for rule in block.inputs_of_the_run()
     )
 
 

@@ -618,8 +618,7 @@ def _parameter_values(diagram: Diagram) -> dict[str, Any]:
     return {
         f"{name}.{rule.name}": block.parameter_value(rule.name)
         for name, block in diagram.blocks.items()
-        for rule in block.parameters()
-        if rule.tunable
+        for rule in block.inputs_of_the_run()
     }
 
 

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from casadi import SX, Function, jacobian, jacobian_sparsity, vertcat
+from casadi import SX, Function, densify, jacobian, jacobian_sparsity, vec, vertcat
 from numpy.typing import NDArray
 
 from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
 from armblocks.equations.traced_function import TracedFunction
 
 Array = NDArray[np.float64]
@@ -73,8 +74,7 @@ class EvaluatedSystem:
             self._functions[traced.name] = Function(
                 "f", list(traced.arguments), [self._rows(traced)], {"cse": True}
             )
-        (value,) = self._functions[traced.name].call(list(arguments))
-        return np.asarray(value.full(), dtype=np.float64).reshape(-1)
+        return _numbers(self._functions[traced.name], arguments).reshape(-1)
 
     def _differentiate(self, traced: TracedFunction, arguments: Sequence[Array]) -> Slopes:
         t, x, z, w, p = traced.arguments[:5]
@@ -82,9 +82,14 @@ class EvaluatedSystem:
             chosen = p[self._parameters] if self._parameters else SX(0, 1)
             by = vertcat(t, x, z, w, chosen)
             slopes = jacobian(self._rows(traced), by)
-            self._slopes[traced.name] = Function("j", list(traced.arguments), [slopes], {"cse": True})
-        (value,) = self._slopes[traced.name].call(list(arguments))
-        whole = np.asarray(value.full(), dtype=np.float64)
+            function = Function("j", list(traced.arguments), [slopes], {"cse": True})
+            if reads_tables(function):  # whose numbers are worked out column by column
+                function = Function("j", list(traced.arguments), [vec(densify(slopes))], {"cse": True})
+            self._slopes[traced.name] = function
+        count = self._rows(traced).numel()
+        whole = _numbers(self._slopes[traced.name], arguments).reshape(
+            (count, 1 + x.numel() + z.numel() + w.numel() + len(self._parameters)), order="F"
+        )
         ends = np.cumsum([1, x.numel(), z.numel(), w.numel()]).tolist()
         by_t, by_x, by_z, by_w, by_p = np.split(whole, ends, axis=1)
         return Slopes(t=by_t, x=by_x, z=by_z, w=by_w, p=by_p)
@@ -152,3 +157,12 @@ class EvaluatedSystem:
         if self.system.clocks:
             moved[jacobian_sparsity(update.results[0], update.arguments[5]).row()] = True
         return moved
+
+
+def _numbers(function: Function, arguments: Sequence[Array]) -> Array:
+    """The one result of a function at a point, with tables that it reads by index."""
+    if reads_tables(function):
+        flat = [np.asarray(argument, dtype=np.float64).reshape(-1) for argument in arguments]
+        return np.asarray(evaluate_with_reads(function, flat)[0], dtype=np.float64)
+    (value,) = function.call(list(arguments))
+    return np.asarray(value.full(), dtype=np.float64)

@@ -122,9 +122,10 @@ def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None
             continue
         if type(other) is not type(block):
             return None
+        inputs = block.inputs_of_the_run()
         for rule in block.parameters():
             old, new = block.parameter_value(rule.name), other.parameter_value(rule.name)
-            if not rule.tunable:
+            if rule not in inputs:
                 if old != new:
                     return None
                 continue
