@@ -196,6 +196,19 @@ def test_a_loop_that_loses_its_solution_is_named_when_it_does() -> None:
     assert error.value.partial.time[-1] == pytest.approx(1.0625, abs=0.01)
 
 
+@RUNS
+def test_a_loop_whose_first_guess_is_singular(settings: Mapping[str, object]) -> None:
+    """w^2 = 1 + t: the slope is 0 at the guess w = 0, and the positive root is found beside it."""
+    builder = ab.DiagramBuilder("root")
+    time = builder.add("time", bl.Clock())
+    loop = builder.add("loop", bl.Expression(formula="u1 - u1^2 + 1 + u2", inputs=2), u2=time)
+    builder.connect(loop, loop["u1"])
+    builder.add("area", bl.Integrator(), loop)
+    found = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.1, **settings)
+    np.testing.assert_allclose(found["loop"], np.sqrt(1 + found.time), atol=1e-12)
+    np.testing.assert_allclose(found["area"], ((1 + found.time) ** 1.5 - 1) * 2 / 3, atol=3e-9)
+
+
 # -- analysis ----------------------------------------------------------------------------------------------
 
 

@@ -23,6 +23,7 @@ from armblocks.simulation.diagnosis import (
     integration_failure,
     stiffness_hint,
 )
+from armblocks.simulation.first_guess import first_guess
 from armblocks.simulation.plan import LogRequest, changed_parameters, make_plan, parameter_vector
 from armblocks.simulation.result import LoggedFile, ParameterChange, RunReport, SimulationResult, signal_path
 from armblocks.simulation.run_state import RunState, check_state, settings_text, slot_names
@@ -523,4 +524,4 @@ def _starting_point(compiled: CompiledSystem, p: Array) -> RunPoint:
                     allowed="finite numbers",
                     fix="change the block's initial value",
                 )
-    return start
+    return dataclasses.replace(start, w=first_guess(compiled, start, p))

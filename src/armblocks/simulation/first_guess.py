@@ -1,0 +1,64 @@
+"""Where Newton's method can begin: another guess for implicit equations where the given one is singular."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.compiler.native_integrator import RunPoint
+from armblocks.compiler.system import CompiledSystem
+
+Array = NDArray[np.float64]
+
+SHIFTS = (0.1, -0.1, 1.0, -1.0, 10.0, -10.0, 100.0, -100.0)
+"""What is added to the guess, one after the other."""
+TURNS = 50
+SINGULAR, FARTHEST = 1e12, 1e6
+"""Condition of the Jacobian, and length of a step over ``1 + |w|``, from which it counts as singular."""
+MOST_UNKNOWNS = 50
+"""Differences of more would cost more than a run."""
+
+
+def first_guess(compiled: CompiledSystem, start: RunPoint, p: Array) -> Array:
+    """The guess ``start.w`` itself where the Jacobian there is regular; else a solution near it, if found.
+
+    ``w^2 = 1`` from 0: the slope is 0 there, and 1 is found from 0.1. Where nothing is found the guess stays,
+    and the run says what is wrong.
+    """
+    guess = start.w
+    if not 0 < guess.size <= MOST_UNKNOWNS or _step(compiled, start, guess, p) is not None:
+        return guess
+    for shift in SHIFTS:
+        found = _solution(compiled, start, guess + shift, p)
+        if found is not None:
+            return found
+    return guess
+
+
+def _solution(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Array | None:
+    for _ in range(TURNS):
+        step = _step(compiled, start, w, p)
+        if step is None:
+            return None
+        w = w - step
+        if (np.abs(step) <= 1e-12 * (1.0 + np.abs(w))).all():
+            return w
+    return None
+
+
+def _step(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Array | None:
+    """Newton's step with differences for slopes; None where the Jacobian is singular."""
+
+    def residual(at: Array) -> Array:
+        return compiled.residual(start.time, start.x, start.z, at, p)
+
+    here = residual(w)
+    size = 1e-7 * (1.0 + np.abs(w))
+    columns = [(residual(w + d) - residual(w - d)) / (2.0 * d.sum()) for d in np.diag(size)]
+    jacobian = np.array(columns).T
+    if not (np.isfinite(jacobian).all() and np.isfinite(here).all()):
+        return None
+    if np.linalg.cond(jacobian) > SINGULAR:
+        return None
+    step: Array = np.asarray(np.linalg.solve(jacobian, here), dtype=np.float64)
+    return step if (np.abs(step) < FARTHEST * (1.0 + np.abs(w))).all() else None
