@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armblocks import blocks, errors
     from armblocks.analysis.linear_system import LinearSystem
     from armblocks.analysis.operating_point import OperatingPoint
-    from armblocks.diagram import Diagram, DiagramBuilder
+    from armblocks.diagram import Diagram, DiagramBuilder, DiagramDifference, diagram_difference
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
     from armblocks.face.block_examples import block_example
@@ -52,6 +52,7 @@ else:
             "DhRow": "armblocks.robot",
             "Diagram": "armblocks.diagram",
             "DiagramBuilder": "armblocks.diagram",
+            "DiagramDifference": "armblocks.diagram",
             "DiagramRun": "armblocks.face.diagram_run",
             "Fixed": "armblocks.robot",
             "FrictionModel": "armblocks.robot",
@@ -73,6 +74,7 @@ else:
             "block_example": "armblocks.face.block_examples",
             "blocks": "armblocks.blocks",
             "compile_diagram": "armblocks.face.model",
+            "diagram_difference": "armblocks.diagram",
             "errors": "armblocks.errors",
             "jtraj": "armblocks.face.trajectory",
             "linearize": "armblocks.face.linearizing",
@@ -100,6 +102,7 @@ __all__ = [
     "DhRow",
     "Diagram",
     "DiagramBuilder",
+    "DiagramDifference",
     "DiagramRun",
     "Fixed",
     "FrictionModel",
@@ -121,6 +124,7 @@ __all__ = [
     "block_example",
     "blocks",
     "compile_diagram",
+    "diagram_difference",
     "errors",
     "jtraj",
     "linearize",

@@ -1,7 +1,7 @@
 """The entry point of the command line: commands, and what becomes of errors, warnings and Ctrl-C.
 
 Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 the input was refused (a message, no
-traceback), 130 interrupted with Ctrl-C.
+traceback), 130 interrupted with Ctrl-C. ``diff`` alone ends with 1 also where its diagrams differ.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from armblocks.cli import bench, blocks, linearize, listing, run, show, studio, trim
+from armblocks.cli import bench, blocks, diff, linearize, listing, run, show, studio, trim
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
@@ -49,6 +49,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("linearize")(linearize.linearize)
 app.command("trim")(trim.trim)
+app.command("diff")(diff.diff)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)

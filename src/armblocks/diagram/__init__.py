@@ -13,6 +13,7 @@ from armblocks.diagram.conditional import (
     TriggeredSubsystem,
 )
 from armblocks.diagram.diagram import Connection, Diagram, Placement
+from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.hierarchy import (
     Bus,
     Carried,
@@ -65,6 +66,7 @@ __all__ = [
     "DelayLine",
     "Diagram",
     "DiagramBuilder",
+    "DiagramDifference",
     "DiagramShapes",
     "EnabledSubsystem",
     "EnabledTriggeredSubsystem",
@@ -100,6 +102,7 @@ __all__ = [
     "broadcast",
     "check_block_name",
     "check_diagram",
+    "diagram_difference",
     "diagram_views",
     "flat_diagram",
     "flatten_hierarchy",

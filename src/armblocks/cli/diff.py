@@ -1,0 +1,206 @@
+"""``armblocks diff``: what is different between two diagrams, whatever their layout."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.text import Text
+
+from armblocks.cli.terminal import ACCENT, ERROR, GOOD, STRONG, results_console
+
+if TYPE_CHECKING:
+    from armblocks.diagram import Block, Diagram
+    from armblocks.diagram.difference import DiagramDifference, PlacedWire, ValueChange
+
+DIFFERENT = 1
+_LONGEST = 160
+"""Longest text of a value that is shown whole."""
+
+
+def diff(
+    before: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    after: Annotated[str, typer.Argument(help="The diagram to compare it with.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of lines.")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagrams name.")] = False,
+) -> None:
+    """Say what differs between two diagrams, ignoring their layout. Exit code 0: nothing, 1: something."""
+    import armblocks as ab
+
+    old, new = ab.load_diagram(before, trust=trust), ab.load_diagram(after, trust=trust)
+    found = ab.diagram_difference(old, new)
+    if as_json:
+        typer.echo(json.dumps(difference_document(found), indent=2, ensure_ascii=False))
+    else:
+        print_difference(found, before, after, results_console())
+    if found:
+        raise typer.Exit(DIFFERENT)
+
+
+# -- for people ----------------------------------------------------------------------------------------------
+
+
+def print_difference(found: DiagramDifference, before: str, after: str, console: Console) -> None:
+    """A heading, then a line for each difference in groups; the sign in front says what the colour does."""
+    if not found:
+        console.print(f"{before} and {after} are the same, layout aside", style=STRONG, soft_wrap=True)
+        return
+    noun = "difference" if found.count == 1 else "differences"
+    console.print(f"{before} -> {after}: {found.count} {noun}", style=STRONG, soft_wrap=True)
+    added = [f"{entry.path}: {_block_text(entry.block)}" for entry in found.added]
+    removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in found.removed]
+    renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in found.renamed]
+    types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in found.types]
+    settings = [_change_text(entry, "." if entry.path else "") for entry in found.settings]
+    about = [_change_text(entry, "." if entry.path else "") for entry in found.descriptions]
+    parameters = [_change_text(entry, ".") for entry in found.parameters]
+    _print_group("Blocks", (("-", removed), ("+", added), ("~", [*renamed, *types])), console)
+    _print_group("Parameters", (("~", parameters),), console)
+    wires = (("-", _wires(found.wires_removed)), ("+", _wires(found.wires_added)))
+    _print_group("Wires", wires, console)
+    _print_group("Settings", (("~", settings),), console)
+    _print_group("Description", (("~", about),), console)
+
+
+def _print_group(title: str, entries: Sequence[tuple[str, Sequence[str]]], console: Console) -> None:
+    if not any(lines for _, lines in entries):
+        return
+    console.print()
+    console.print(title, style=STRONG)
+    styles = {"-": ERROR, "+": GOOD, "~": ACCENT}
+    for sign, lines in entries:
+        for line in lines:
+            wrapped = Text(line).wrap(console, max(20, console.width - 4))
+            for index, part in enumerate(wrapped):
+                lead = Text(f"  {sign} ", styles[sign]) if index == 0 else Text("      ")
+                part.rstrip()
+                console.print(Text.assemble(lead, part), soft_wrap=True)
+
+
+def _wires(wires: Sequence[PlacedWire]) -> list[str]:
+    return [f"{f'in {entry.path}: ' if entry.path else ''}{entry.wire}" for entry in wires]
+
+
+def _block_text(block: Block) -> str:
+    """The type and what is not as the type has it by itself."""
+    words = [f"{name}={value_text(value)}" for name, value in _own_values(block).items()]
+    return " ".join([block.type_name(), *words])
+
+
+def _own_values(block: Block) -> dict[str, object]:
+    values = {rule.name: block.parameter_value(rule.name) for rule in block.parameters()}
+    return {
+        rule.name: values[rule.name]
+        for rule in block.parameters()
+        if rule.required or rule.check(rule.default, rule.name) != values[rule.name]
+    }
+
+
+def _change_text(entry: ValueChange, joint: str) -> str:
+    before, after = value_text(entry.before), value_text(entry.after)
+    note = ""
+    if before == after:
+        note = f" (differs in {_where_different(entry.before, entry.after)})"
+    return f"{entry.path}{joint}{entry.name}: {before} -> {after}{note}"
+
+
+def _where_different(before: object, after: object) -> str:
+    """Of two values whose short texts agree: which entries of arrays or fields of descriptions do not."""
+    if isinstance(before, tuple) and isinstance(after, tuple):
+        old, new = _as_array(cast("Any", before)), _as_array(cast("Any", after))
+        if old.shape == new.shape:
+            return f"{np.count_nonzero(old != new)} of {old.size} entries"
+        return "its content"
+    return ", ".join(_different_fields(cast("Any", before), cast("Any", after))) or "its content"
+
+
+def _different_fields(before: object, after: object) -> list[str]:
+    if dataclasses.is_dataclass(before) and type(before) is type(after):
+        fields = [entry.name for entry in dataclasses.fields(before) if entry.compare and entry.init]
+        return [name for name in fields if np.any(getattr(before, name) != getattr(after, name))]
+    return []
+
+
+def _as_array(value: Any) -> NDArray[np.float64]:
+    return np.asarray(value, dtype=np.float64)
+
+
+def value_text(value: object) -> str:
+    """A value in few words: arrays as ``--set`` takes them, robots and functions by name."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, tuple):
+        rows = cast("tuple[object, ...]", value)
+        text = _array_text(rows)
+        return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}… of shape {np.shape(cast('Any', rows))}"
+    return _object_text(value)
+
+
+def _array_text(rows: tuple[object, ...]) -> str:
+    if rows and all(isinstance(row, tuple) for row in rows):
+        inner = (_array_text(cast("tuple[object, ...]", row))[1:-1] for row in rows)
+        return "[" + "; ".join(inner) + "]"
+    return "[" + " ".join(value_text(entry) for entry in rows) + "]"
+
+
+def _object_text(value: object) -> str:
+    blocks = getattr(value, "blocks", None)
+    if isinstance(blocks, Mapping):
+        return f"({len(cast('Diagram', value).blocks)} blocks inside)"
+    kind = type(value).__name__
+    name = getattr(value, "name", None) or getattr(value, "source", None)
+    return f"{kind} {name}" if name else kind
+
+
+# -- for programs --------------------------------------------------------------------------------------------
+
+
+def difference_document(found: DiagramDifference) -> dict[str, object]:
+    """The difference as JSON has it: every list there, empty where nothing of the kind differs."""
+    return {
+        "same": not found,
+        "added": [_placed(entry.path, entry.block) for entry in found.added],
+        "removed": [_placed(entry.path, entry.block) for entry in found.removed],
+        "renamed": [
+            {"before": entry.before, "after": entry.after, "type": entry.block.type_name()}
+            for entry in found.renamed
+        ],
+        "types": [_change(entry) for entry in found.types],
+        "parameters": [_change(entry) for entry in found.parameters],
+        "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_added],
+        "wires_removed": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_removed],
+        "settings": [_change(entry) for entry in found.settings],
+        "descriptions": [_change(entry) for entry in found.descriptions],
+    }
+
+
+def _placed(path: str, block: Block) -> dict[str, object]:
+    values = {name: _plain(value) for name, value in _own_values(block).items()}
+    return {"path": path, "type": block.type_name(), "parameters": values}
+
+
+def _change(entry: ValueChange) -> dict[str, object]:
+    before, after = _plain(entry.before), _plain(entry.after)
+    return {"path": entry.path, "name": entry.name, "before": before, "after": after}
+
+
+def _plain(value: object) -> object:
+    """The value where JSON has such values, else its text (an infinity is the text ``inf``)."""
+    if isinstance(value, tuple):
+        return [_plain(entry) for entry in cast("tuple[object, ...]", value)]
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, bool | int | float | str) else value_text(value)

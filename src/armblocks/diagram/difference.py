@@ -1,0 +1,261 @@
+"""What is different between two diagrams, as far as it can change what they do: layout is no difference."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import cast
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.diagram import Connection, Diagram
+from armblocks.diagram.parameter import Parameter, ParameterKind
+from armblocks.diagram.port import PortRef
+from armblocks.equations import SimulationOptions
+
+_SETTINGS = tuple(entry.name for entry in dataclasses.fields(SimulationOptions))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedBlock:
+    """A block that only one of two diagrams has, by its path, such as ``controller/pid``."""
+
+    path: str
+    block: Block
+
+
+@dataclass(frozen=True, kw_only=True)
+class Renaming:
+    """An identical block with the same wires under another name; both are paths."""
+
+    before: str
+    after: str
+    block: Block
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValueChange:
+    """Another value under a name.
+
+    ``path`` is that of the block, for settings and descriptions that of the subsystem (``""`` outside), by
+    the later diagram's names. ``None`` stands where one side has no such value.
+    """
+
+    path: str
+    name: str
+    before: object
+    after: object
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedWire:
+    """A wire that only one of two diagrams has, within the subsystem at ``path`` (``""`` outside).
+
+    Its ends have the names of the later diagram where the blocks are still there.
+    """
+
+    path: str
+    wire: Connection
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagramDifference:
+    """All that is different between two diagrams and inside their subsystems; false where there is nothing.
+
+    ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
+    where one type has no such parameter.
+    """
+
+    added: tuple[PlacedBlock, ...] = ()
+    removed: tuple[PlacedBlock, ...] = ()
+    renamed: tuple[Renaming, ...] = ()
+    types: tuple[ValueChange, ...] = ()
+    parameters: tuple[ValueChange, ...] = ()
+    wires_added: tuple[PlacedWire, ...] = ()
+    wires_removed: tuple[PlacedWire, ...] = ()
+    settings: tuple[ValueChange, ...] = ()
+    descriptions: tuple[ValueChange, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many single differences there are."""
+        return sum(len(getattr(self, entry.name)) for entry in dataclasses.fields(self))
+
+    def __bool__(self) -> bool:
+        return self.count > 0
+
+
+def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
+    """What one has to change in ``before`` to get ``after``.
+
+    Compared are blocks with their types and parameters, wires, settings and descriptions, inside subsystems
+    too. Not compared are the layout, the diagram's own name (a file without one is called after the file) and
+    unknown keys of a file. A block that is gone and a new one are the same one renamed where type, parameters
+    and all wires agree, also when blocks at the other ends are renamed with it.
+    """
+    found = _Findings()
+    _compare_levels(before, after, "", found)
+    return DiagramDifference(**{name: tuple(entries) for name, entries in vars(found).items()})
+
+
+@dataclass
+class _Findings:
+    added: list[PlacedBlock] = field(default_factory=list[PlacedBlock])
+    removed: list[PlacedBlock] = field(default_factory=list[PlacedBlock])
+    renamed: list[Renaming] = field(default_factory=list[Renaming])
+    types: list[ValueChange] = field(default_factory=list[ValueChange])
+    parameters: list[ValueChange] = field(default_factory=list[ValueChange])
+    wires_added: list[PlacedWire] = field(default_factory=list[PlacedWire])
+    wires_removed: list[PlacedWire] = field(default_factory=list[PlacedWire])
+    settings: list[ValueChange] = field(default_factory=list[ValueChange])
+    descriptions: list[ValueChange] = field(default_factory=list[ValueChange])
+
+
+def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings) -> None:
+    names = _renamings(before, after)
+
+    def at(name: str) -> str:
+        return f"{path}/{name}" if path else name
+
+    for old, new in names.items():
+        found.renamed.append(Renaming(before=at(old), after=at(new), block=after.blocks[new]))
+    for name, block in before.blocks.items():
+        if name in after.blocks:
+            _compare_blocks(block, after.blocks[name], at(name), found)
+        elif name not in names:
+            found.removed.append(PlacedBlock(path=at(name), block=block))
+    for name, block in after.blocks.items():
+        if name not in before.blocks and name not in names.values():
+            found.added.append(PlacedBlock(path=at(name), block=block))
+    wires_before = {_renamed_wire(wire, names) for wire in before.connections}
+    wires_after = set(after.connections)
+    found.wires_added += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_after - wires_before))
+    found.wires_removed += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_before - wires_after))
+    for name in _SETTINGS:
+        old_value, new_value = getattr(before.settings, name), getattr(after.settings, name)
+        if old_value != new_value:
+            found.settings.append(ValueChange(path=path, name=name, before=old_value, after=new_value))
+    if before.description != after.description:
+        found.descriptions.append(
+            ValueChange(path=path, name="description", before=before.description, after=after.description)
+        )
+
+
+def _compare_blocks(before: Block, after: Block, path: str, found: _Findings) -> None:
+    if before.type_name() != after.type_name():
+        found.types.append(
+            ValueChange(path=path, name="type", before=before.type_name(), after=after.type_name())
+        )
+    old_rules, new_rules = _rules(before), _rules(after)
+    for name in {**old_rules, **new_rules}:
+        old = before.parameter_value(name) if name in old_rules else None
+        new = after.parameter_value(name) if name in new_rules else None
+        if isinstance(old, Diagram) and isinstance(new, Diagram):
+            _compare_levels(old, new, path, found)
+        elif old != new:
+            found.parameters.append(ValueChange(path=path, name=name, before=old, after=new))
+
+
+def _rules(block: Block) -> Mapping[str, Parameter]:
+    return {rule.name: rule for rule in block.parameters()}
+
+
+# -- blocks under other names --------------------------------------------------------------------------------
+
+
+_Colours = dict[str, int]
+"""By block name, a number that depends on what a block is and on its surroundings, not on its name."""
+_Ends = list[tuple[str, str, PortRef]]
+"""The wires at a block: own port, which way the wire goes, port at the other end."""
+
+
+def _renamings(before: Diagram, after: Diagram) -> dict[str, str]:
+    """Later names of blocks by earlier ones.
+
+    Blocks that only one side has are coloured by what they are and, round by round, by the colours that their
+    wires lead to; a block that both sides have is a colour of its own. Equal colours on both sides are the
+    same block. Where several cannot be told apart, one pair is taken and the rounds go on: any choice fits.
+    """
+    gone = {name: hash(_content(block)) for name, block in before.blocks.items() if name not in after.blocks}
+    new = {name: hash(_content(block)) for name, block in after.blocks.items() if name not in before.blocks}
+    gone_ends, new_ends = _ends_of(before, gone), _ends_of(after, new)
+    pairs: dict[str, str] = {}
+    while gone and new:
+        paired = {later: hash(("paired", later)) for later in pairs.values()}
+        gone_paired = {old: paired[later] for old, later in pairs.items()}
+        old_colours, new_colours = _refined(gone, new, (gone_ends, gone_paired), (new_ends, paired))
+        olds, laters = _by_colour(old_colours), _by_colour(new_colours)
+        shared = [colour for colour in olds if colour in laters]
+        certain = [colour for colour in shared if len(olds[colour]) == len(laters[colour]) == 1]
+        for colour in certain or shared[:1]:
+            old, later = olds[colour][0], laters[colour][0]
+            pairs[old] = later
+            del gone[old], new[later]
+        if not shared:
+            break
+    return pairs
+
+
+def _ends_of(diagram: Diagram, names: Mapping[str, object]) -> dict[str, _Ends]:
+    ends: dict[str, _Ends] = {name: [] for name in names}
+    for wire in diagram.connections:
+        if wire.source.block in ends:
+            ends[wire.source.block].append((wire.source.port, "out", wire.target))
+        if wire.target.block in ends:
+            ends[wire.target.block].append((wire.target.port, "in", wire.source))
+    return ends
+
+
+def _by_colour(colours: _Colours) -> dict[int, list[str]]:
+    names: dict[int, list[str]] = {}
+    for name in sorted(colours):
+        names.setdefault(colours[name], []).append(name)
+    return names
+
+
+_Surroundings = tuple[dict[str, _Ends], _Colours]
+
+
+def _refined(
+    olds: _Colours, laters: _Colours, around_olds: _Surroundings, around_laters: _Surroundings
+) -> tuple[_Colours, _Colours]:
+    """Both sides' colours after as many rounds as tell more blocks apart, equally many on both sides."""
+    count = 0
+    while (reached := len({*olds.values(), *laters.values()})) > count:
+        count = reached
+        olds, laters = _one_round(olds, *around_olds), _one_round(laters, *around_laters)
+    return olds, laters
+
+
+def _one_round(colours: _Colours, ends: Mapping[str, _Ends], paired: _Colours) -> _Colours:
+    known = {**paired, **colours}
+
+    def seen(port: PortRef) -> object:
+        return (known.get(port.block, port.block), port.port)
+
+    return {
+        name: hash((own, frozenset((mine, way, seen(other)) for mine, way, other in ends[name])))
+        for name, own in colours.items()
+    }
+
+
+def _content(block: Block) -> tuple[object, ...]:
+    """What a block is without its name and layout, as a value that compares and hashes."""
+    values = ((rule.name, _value_content(block, rule)) for rule in block.parameters())
+    return (block.type_name(), *values)
+
+
+def _value_content(block: Block, rule: Parameter) -> object:
+    value = block.parameter_value(rule.name)
+    if rule.kind is not ParameterKind.DIAGRAM:
+        return value
+    inside = cast("Diagram", value)
+    blocks = frozenset((name, _content(inner)) for name, inner in inside.blocks.items())
+    return (blocks, inside.connections, inside.settings, inside.description)
+
+
+def _renamed_wire(wire: Connection, names: Mapping[str, str]) -> Connection:
+    def end(port: PortRef) -> PortRef:
+        return PortRef(names.get(port.block, port.block), port.port)
+
+    return Connection(end(wire.source), end(wire.target))

@@ -1,0 +1,238 @@
+"""The difference of two diagrams: every change is reported once and exactly, and nothing else is."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    Constant,
+    Gain,
+    Inport,
+    Integrator,
+    Outport,
+    Scope,
+    SineWave,
+    Step,
+    Subsystem,
+    Sum,
+)
+from armblocks.diagram import (
+    Block,
+    Connection,
+    Diagram,
+    DiagramBuilder,
+    DiagramDifference,
+    Placement,
+    PortRef,
+    diagram_difference,
+    with_parameters,
+)
+
+
+def loop(names: Mapping[str, str] | None = None, *, inner: str = "law", **blocks: Block) -> Diagram:
+    """A controlled integrator with the controller in a subsystem; ``names`` and ``blocks`` vary it."""
+    called = {name: name for name in ("wanted", "error", "controller", "plant", "scope")} | dict(names or {})
+    builder = DiagramBuilder("loop")
+    wanted = builder.add(called["wanted"], blocks.get("wanted", Step(time=0.5)))
+    error = builder.add(called["error"], Sum(signs="+-"), wanted)
+    with builder.subsystem(called["controller"], error) as controller:
+        e = controller.input("e")
+        controller.output("u", controller.add(inner, blocks.get("law", Gain(gain=3.0)), e))
+    plant = builder.add(called["plant"], Integrator(), builder[called["controller"]]["u"])
+    builder.connect(plant, error["u2"])
+    builder.add(called["scope"], Scope(), plant)
+    return builder.build()
+
+
+def only(found: DiagramDifference, *kinds: str) -> None:
+    """Nothing but entries of these kinds was found."""
+    given = {entry.name for entry in dataclasses.fields(found) if getattr(found, entry.name)}
+    assert given == set(kinds)
+
+
+def swapped(found: DiagramDifference) -> DiagramDifference:
+    """The same difference seen from the other diagram, for one without renamings inside changed wires."""
+
+    def turned(changes: tuple[object, ...]) -> tuple[object, ...]:
+        return tuple(
+            dataclasses.replace(change, before=change.after, after=change.before)  # type: ignore[attr-defined]
+            for change in changes
+        )
+
+    return DiagramDifference(
+        added=found.removed,
+        removed=found.added,
+        renamed=turned(found.renamed),  # pyright: ignore[reportArgumentType]
+        types=turned(found.types),  # pyright: ignore[reportArgumentType]
+        parameters=turned(found.parameters),  # pyright: ignore[reportArgumentType]
+        wires_added=found.wires_removed,
+        wires_removed=found.wires_added,
+        settings=turned(found.settings),  # pyright: ignore[reportArgumentType]
+        descriptions=turned(found.descriptions),  # pyright: ignore[reportArgumentType]
+    )
+
+
+@pytest.mark.parametrize("name", ["kr180model", "van_der_pol_pid", "bouncing_ball", "robertson_kinetics"])
+def test_a_diagram_does_not_differ_from_itself_or_from_another_layout(name: str) -> None:
+    diagram = ab.load_diagram(name)
+    moved = dataclasses.replace(
+        diagram,
+        name="elsewhere",
+        layout={block: Placement(x=7.0 * k, y=3.0) for k, block in enumerate(diagram.blocks)},
+    )
+    assert not diagram_difference(diagram, ab.load_diagram(name))
+    assert diagram_difference(diagram, moved) == DiagramDifference()
+
+
+def test_layout_inside_a_subsystem_is_no_difference() -> None:
+    before = loop()
+    controller = before.blocks["controller"]
+    assert isinstance(controller, Subsystem)
+    inside = dataclasses.replace(controller.diagram, layout={"law": Placement(x=1.0, y=2.0)})
+    after = dataclasses.replace(
+        before, blocks={**before.blocks, "controller": dataclasses.replace(controller, diagram=inside)}
+    )
+    assert not diagram_difference(before, after)
+    assert before != after
+
+
+def test_every_changed_parameter_is_reported_with_both_values() -> None:
+    before = loop()
+    found = diagram_difference(
+        before, with_parameters(before, {"wanted.time": 0.75, "controller/law.gain": 4})
+    )
+    only(found, "parameters")
+    assert [(c.path, c.name, c.before, c.after) for c in found.parameters] == [
+        ("controller/law", "gain", 3.0, 4.0),
+        ("wanted", "time", 0.5, 0.75),
+    ]
+
+
+def test_another_type_is_reported_with_the_parameters_of_both() -> None:
+    found = diagram_difference(loop(), loop(wanted=Constant(value=2.0)))
+    only(found, "types", "parameters")
+    assert [(c.path, c.before, c.after) for c in found.types] == [("wanted", "Step", "Constant")]
+    assert ("value", None, 2.0) in [(c.name, c.before, c.after) for c in found.parameters]
+    assert ("time", 0.5, None) in [(c.name, c.before, c.after) for c in found.parameters]
+
+
+@pytest.mark.parametrize("gone", ["wanted", "error", "controller", "plant", "scope"])
+def test_any_block_is_recognised_under_another_name(gone: str) -> None:
+    found = diagram_difference(loop(), loop({gone: "another"}))
+    only(found, "renamed")
+    assert [(entry.before, entry.after) for entry in found.renamed] == [(gone, "another")]
+
+
+def test_neighbours_renamed_together_are_recognised() -> None:
+    names = {"wanted": "a", "error": "b", "controller": "c", "plant": "d", "scope": "e"}
+    found = diagram_difference(loop(), loop(names))
+    only(found, "renamed")
+    assert {entry.before: entry.after for entry in found.renamed} == names
+
+
+def test_a_block_renamed_inside_a_subsystem_is_named_by_its_paths() -> None:
+    found = diagram_difference(loop(), loop(inner="gain"))
+    only(found, "renamed")
+    assert [(e.before, e.after) for e in found.renamed] == [("controller/law", "controller/gain")]
+
+
+def chains(*names: str) -> Diagram:
+    """Equal sources into equal gains: blocks that only their wires tell apart."""
+    builder = DiagramBuilder("chains")
+    for k, name in enumerate(names):
+        gain = builder.add(f"{name}_gain", Gain(gain=2.0), builder.add(name, SineWave()))
+        builder.add(f"scope{k}", Scope(), gain)
+    return builder.build()
+
+
+def test_equal_blocks_are_told_apart_by_their_wires() -> None:
+    found = diagram_difference(chains("a", "b", "c"), chains("z", "y", "x"))
+    only(found, "renamed")
+    assert {entry.before: entry.after for entry in found.renamed} == {
+        "a": "z", "a_gain": "z_gain", "b": "y", "b_gain": "y_gain", "c": "x", "c_gain": "x_gain",
+    }  # fmt: skip
+
+
+def test_blocks_that_nothing_tells_apart_are_paired_once_each() -> None:
+    def sources(*names: str) -> Diagram:
+        builder = DiagramBuilder("sources")
+        for name in names:
+            builder.add(name, Constant(value=1.0))
+        return builder.build()
+
+    found = diagram_difference(sources("a", "b", "c"), sources("x", "y"))
+    only(found, "renamed", "removed")
+    assert len({entry.after for entry in found.renamed}) == 2
+
+
+def test_another_name_with_another_parameter_is_another_block() -> None:
+    found = diagram_difference(loop(), loop({"wanted": "target"}, wanted=Step(time=9.0)))
+    only(found, "added", "removed", "wires_added", "wires_removed")
+    assert [entry.path for entry in found.removed] == ["wanted"]
+    assert [(entry.path, entry.block) for entry in found.added] == [("target", Step(time=9.0))]
+    assert [str(entry.wire) for entry in found.wires_added] == ["target/y -> error/u1"]
+    assert [str(entry.wire) for entry in found.wires_removed] == ["wanted/y -> error/u1"]
+
+
+def test_a_wire_is_reported_where_it_lies() -> None:
+    def inner(twice: bool) -> Diagram:
+        builder = DiagramBuilder("inner")
+        entry = builder.add("in", Inport())
+        gain = builder.add("gain", Gain(gain=2.0), entry)
+        builder.add("scope", Scope(), gain)
+        builder.add("out", Outport(), gain if twice else entry)
+        return builder.build()
+
+    def outer(twice: bool) -> Diagram:
+        builder = DiagramBuilder("outer")
+        builder.add("sub", Subsystem(diagram=inner(twice)), builder.add("u", Constant()))
+        return builder.build()
+
+    found = diagram_difference(outer(False), outer(True))
+    only(found, "wires_added", "wires_removed")
+    (new,), (old,) = found.wires_added, found.wires_removed
+    assert new.path == old.path == "sub"
+    assert new.wire.source == PortRef("gain", new.wire.source.port)
+    assert isinstance(old.wire, Connection)
+    assert old.wire.source.block == "in"
+
+
+def test_settings_and_description_are_reported() -> None:
+    before = loop()
+    after = dataclasses.replace(
+        before,
+        description="a loop",
+        settings=dataclasses.replace(before.settings, stop_time=3.0, solver="rk4"),
+    )
+    found = diagram_difference(before, after)
+    only(found, "settings", "descriptions")
+    assert [(c.name, c.before, c.after) for c in found.settings] == [
+        ("stop_time", 10.0, 3.0),
+        ("solver", "auto", "rk4"),
+    ]
+    assert [(c.before, c.after) for c in found.descriptions] == [("", "a loop")]
+
+
+@pytest.mark.parametrize(
+    "after",
+    [
+        loop({"plant": "tank"}),
+        loop(law=Gain(gain=8.0)),
+        loop({"wanted": "target"}, wanted=Step(time=9.0)),
+        chains("a", "b"),
+        ab.load_diagram("van_der_pol_pid"),
+    ],
+    ids=["renamed", "retuned", "replaced", "unlike", "example"],
+)
+def test_the_way_back_is_the_way_there_reversed(after: Diagram) -> None:
+    before = loop()
+    there, back = diagram_difference(before, after), diagram_difference(after, before)
+    assert swapped(there).added == back.added
+    for kind in ("removed", "types", "settings", "descriptions", "wires_added", "wires_removed"):
+        assert getattr(swapped(there), kind) == getattr(back, kind)
+    assert set(swapped(there).parameters) == set(back.parameters)
+    assert there.count == back.count
