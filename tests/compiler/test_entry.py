@@ -171,12 +171,15 @@ def test_no_reference_is_lost_or_kept(kernel: Kernel, several: Kernel) -> None:
     exercise()
     gc.collect()
     before = [sys.getrefcount(thing) for thing in watched]
-    blocks = sys.getallocatedblocks()
-    exercise()
-    gc.collect()
+    grown: list[int] = []
+    for _ in range(3):  # others in this process allocate too, now and then; a leak would show every time
+        blocks = sys.getallocatedblocks()
+        exercise()
+        gc.collect()
+        grown.append(abs(sys.getallocatedblocks() - blocks))
     after = [sys.getrefcount(thing) for thing in watched]
     assert [abs(x - y) < 20 for x, y in zip(before, after)] == [True] * len(watched)
-    assert abs(sys.getallocatedblocks() - blocks) < 400  # 500 turns would show ten times that
+    assert min(grown) < 400  # 500 turns would show ten times that
 
 
 def test_the_builtin_keeps_its_code_alive_and_lets_it_go() -> None:

@@ -364,12 +364,11 @@ class Implicit:
             for value, cut in tracing.unknowns.items()
             for k in range(cut.numel())
         ]
-        self.guesses = vertcat(*[_guess(network, symbols, *entry) for entry in tracing.unknowns.items()])[
-            remaining
-        ]
         self.slots = Signature(tuple(Slot(names[k]) for k in remaining))
         self.w = SX.sym("w", len(remaining))
         if remaining:
+            guesses = [_guess(network, symbols, *entry) for entry in tracing.unknowns.items()]
+            self.guesses = vertcat(*guesses)[remaining]
             self.residual = substitute(
                 substitute(residual[remaining], cuts, solution), cuts[remaining], self.w
             )
