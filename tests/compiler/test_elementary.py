@@ -177,7 +177,7 @@ NUMBERS = st.floats(width=64)
 
 
 @given(st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=20))
-@settings(max_examples=150)
+@settings(max_examples=150, derandomize=True)
 def test_remainders_of_division_are_exact(pairs: list[tuple[float, float]]) -> None:
     x, y = (np.array(column) for column in zip(*pairs))
     with np.errstate(all="ignore"):
