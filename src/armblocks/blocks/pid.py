@@ -102,7 +102,7 @@ class PID(Block):
         _check(self, limited=self.limit_output)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (*(Port("u", "the error"),), *_further_ports(self.external_reset, self.tracking))
+        return (Port("u", "the error"), *_further_ports(self.external_reset, self.tracking))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the control action"),)
@@ -185,7 +185,8 @@ class PID2DOF(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            *(Port("r", "the reference"), Port("u", "the measured output of the plant")),
+            Port("r", "the reference"),
+            Port("u", "the measured output of the plant"),
             *_further_ports(self.external_reset, self.tracking),
         )
 
@@ -273,7 +274,7 @@ class DiscretePID(Block):
         _check(self, limited=True)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (*(Port("u", "the error"),), *_further_ports(self.external_reset, self.tracking))
+        return (Port("u", "the error"), *_further_ports(self.external_reset, self.tracking))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the control action"),)
@@ -345,7 +346,8 @@ class DiscretePID2DOF(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            *(Port("r", "the reference"), Port("u", "the measured output of the plant")),
+            Port("r", "the reference"),
+            Port("u", "the measured output of the plant"),
             *_further_ports(self.external_reset, self.tracking),
         )
 
