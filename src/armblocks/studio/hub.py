@@ -8,6 +8,7 @@ import dataclasses
 import secrets
 from collections import deque
 from collections.abc import Awaitable, Callable
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -350,5 +351,7 @@ def _solvers() -> list[str]:
     return ["auto", *(tableau.name for tableau in TABLEAUX)]
 
 
+@lru_cache(maxsize=1)
 def _examples() -> dict[str, str]:
+    """What the examples show, by name; they are read once, and not for each page that comes."""
     return {name: formats.load_diagram(name, BLOCKS).description for name in formats.list_examples()}
