@@ -15,7 +15,7 @@ from armblocks.blocks import (
     TransferFunction,
 )
 from armblocks.diagram import DiagramBuilder, trace_diagram
-from armblocks.diagram.trace import diagram_model
+from armblocks.diagram.model import diagram_model
 from armblocks.errors import AlgebraicLoopError
 
 

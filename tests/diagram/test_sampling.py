@@ -17,7 +17,7 @@ from armblocks.blocks import (
     ZeroOrderHold,
 )
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
-from armblocks.diagram.trace import diagram_model
+from armblocks.diagram.model import diagram_model
 from armblocks.equations import SampleClock
 from armblocks.errors import DiagramError, InputError
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import dataclasses
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from casadi import (
     SX,
     densify,
@@ -17,103 +15,29 @@ from casadi import (
     fabs,
     if_else,
     jacobian,
-    logic_and,
     logic_or,
-    repmat,
     substitute,
     vertcat,
-    vertsplit,
 )
-from numpy.typing import NDArray
 
-from armblocks.diagram.block import Signals
 from armblocks.diagram.block_equations import (
-    BlockEquations,
     BlockSlot,
     SlotKind,
-    block_equations,
-    natural,
     spread,
-    tunable_slots,
 )
 from armblocks.diagram.conditional_equations import ON
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
-from armblocks.diagram.implicit import check_solvable, solve_affine
-from armblocks.diagram.ordering import HELD, Evaluation, Network, Node, Value, evaluation_order
+from armblocks.diagram.implicit import solve_affine
+from armblocks.diagram.model import Model, diagram_model
+from armblocks.diagram.ordering import HELD, Network, Node, Value
 from armblocks.diagram.port import Guard, PortRef
-from armblocks.diagram.sampling import Sampling, check_triggered, moving_blocks, resolve_sampling
-from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
+from armblocks.diagram.shapes import DiagramShapes
 from armblocks.diagram.structure import Outport
+from armblocks.diagram.tracing import Implicit, Symbols, Tracing
 from armblocks.diagram.units import infer_units
 from armblocks.equations import Delays, HybridSystem, Signature, Slot, TracedFunction, flatten, signature
-from armblocks.errors import ArmblocksError, DiagramError
-
-
-@dataclass(frozen=True)
-class Model:
-    """Everything about a diagram that does not need symbols: shapes, clocks, and in which order it is worked
-    out while the time flows and at a tick."""
-
-    shapes: DiagramShapes
-    sampling: Sampling
-    flow: Network
-    flow_order: Evaluation
-    tick: Network
-    tick_order: Evaluation
-
-
-def diagram_model(diagram: Diagram) -> Model:
-    """Look at the flat form of a diagram.
-
-    Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
-    blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops that
-    no order can solve.
-    """
-    form = flatten_hierarchy(diagram)
-    diagram = form.diagram
-    shapes = infer_shapes(diagram)
-    check_stated(form, shapes)
-    free = [name for name in diagram.blocks if not diagram.clocked(name)]
-    equations = {name: _equations(diagram, name, shapes) for name in free}
-    check_triggered(diagram, equations)
-    sampling = resolve_sampling(diagram, equations)
-    moving = moving_blocks(diagram, equations)
-    for name in free:
-        block, inputs = diagram.blocks[name], shapes.inputs[name]
-        # Nothing to locate where the answers change at instants only.
-        still = name not in moving and name not in diagram.gates
-        if still and block.conditions(inputs) and not equations[name].states:
-            equations[name] = _equations(diagram, name, shapes, settled=not block.modes(inputs))
-    for name, clock in sampling.clock_of.items():
-        period = sampling.clocks[clock].period
-        equations[name] = _equations(diagram, name, shapes, period=period)
-    equations = {name: equations[name] for name in diagram.blocks}
-    flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
-    if sampling.clocks:
-        settled = {name: _equations(diagram, name, shapes, settled=True) for name in free}
-        tick = Network(diagram, equations | settled, ticking=True)
-    return Model(
-        shapes=shapes,
-        sampling=sampling,
-        flow=flow,
-        flow_order=evaluation_order(flow),
-        tick=tick,
-        tick_order=evaluation_order(tick),
-    )
-
-
-def _equations(
-    diagram: Diagram, name: str, shapes: DiagramShapes, *, period: float = 1.0, settled: bool = False
-) -> BlockEquations:
-    block, hidden = diagram.blocks[name], diagram.gates.get(name, {})
-    try:
-        return block_equations(block, shapes.inputs[name], period=period, settled=settled, hidden=hidden)
-    except DiagramError:
-        raise
-    except ArmblocksError as error:
-        where = ", ".join(filter(None, (f"block '{name}' ({block.title})", error.where)))
-        raise DiagramError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
+from armblocks.errors import DiagramError
 
 
 def trace_diagram(diagram: Diagram) -> HybridSystem:
@@ -130,8 +54,8 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     """
     model = diagram_model(diagram)
     diagram = (form := flatten_hierarchy(diagram)).diagram
-    symbols = _Symbols(model)
-    flow = _Tracing(model.flow, symbols)
+    symbols = Symbols(model)
+    flow = Tracing(model.flow, symbols)
     for node in model.flow_order.order:
         flow.work_out(node)
     signals = _signal_values(model.flow, model.flow_order.order, model.shapes)
@@ -198,209 +122,12 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     )
 
 
-class _Symbols:
-    """The symbols of a diagram: time, states, discrete variables, parameters, ticks and events."""
-
-    def __init__(self, model: Model) -> None:
-        equations, blocks = model.flow.equations, model.flow.diagram.blocks
-        self.tunables = {name: tunable_slots(block) for name, block in blocks.items()}
-        self.parameter_slots = [
-            Slot(f"{name}.{slot.name}", slot.shape, slot.unit)
-            for name, slots in self.tunables.items()
-            for slot in slots
-        ]
-        self.state_slots = [
-            Slot(f"{name}/{state.name}", state.shape, state.unit)
-            for name, found in equations.items()
-            for state in found.states
-        ]
-        self.discrete_slots: list[Slot] = []
-        for name in blocks:
-            for state in equations[name].discrete:
-                self.discrete_slots.append(Slot(f"{name}/{state.name}", state.shape, state.unit))
-            if name in model.sampling.clock_of:
-                shapes = model.shapes.outputs[name]
-                self.discrete_slots += [Slot(f"{name}/{port}", shape) for port, shape in shapes.items()]
-        guard_slots = [
-            Slot(f"{name}/{guard.name}", guard.shape)
-            for name, found in equations.items()
-            for guard in found.guards
-        ]
-        self.t = SX.sym("t")
-        self.x, self.states = _named_symbols("x", self.state_slots)
-        self.z, self.discrete = _named_symbols("z", self.discrete_slots)
-        self.e, self.events = _named_symbols("e", guard_slots)
-        self.m = SX.sym("m", len(model.sampling.clocks))
-        sizes = [sum(slot.size for slot in slots) for slots in self.tunables.values()]
-        self.p, parts = _symbols("p", sizes)
-        self.parameters = dict(zip(self.tunables, parts))
-
-    def parameters_of(self, block: str) -> Signals:
-        """The symbols of a block's tunable parameters, in their natural shapes."""
-        return natural(self.tunables[block], self.parameters[block])
-
-
-class _Tracing:
-    """The values of one network worked out so far; lives only while it is traced."""
-
-    def __init__(
-        self, network: Network, symbols: _Symbols, clock_of: Mapping[str, int] | None = None
-    ) -> None:
-        self.network = network
-        self.symbols = symbols
-        self._clock_of = clock_of or {}
-        self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
-        self._left_over: dict[Value, SX] = {}
-        self.unknowns: dict[Value, SX] = {}
-        """What stands for values that were needed before they were worked out, the cuts of the loops, and for
-        outputs that are implicit."""
-
-    def work_out(self, node: Node) -> None:
-        """Put the equations of one node over the values of the nodes that it needs."""
-        if node.group == HELD:
-            return
-        group = self.network.equations[node.block].groups[node.group]
-        symbols = self.symbols
-        columns: list[SX] = []
-        for order in range(node.order + 1):
-            states = [
-                self.value(self.network.state_rate(node.block, state, order))
-                if order
-                else symbols.states[f"{node.block}/{state}"]
-                for state in group.states
-            ]
-            # Discrete variables and events stand still while the time flows.
-            still = [symbols.discrete[f"{node.block}/{name}"] for name in group.discrete]
-            events = [symbols.events[f"{node.block}/{name}"] for name in group.events]
-            if order:
-                still, events = ([SX.zeros(part.numel()) for part in parts] for parts in (still, events))
-                for place, name in enumerate(group.discrete):
-                    if name in {line.name for line in self.network.equations[node.block].delays}:
-                        still[place] = self._slope(node.block, name, order)
-            inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
-            columns.append(vertcat(*states, *still, *inputs, *events, SX(0, 1)))
-        arguments = [symbols.t, symbols.parameters[node.block], *columns]
-        (flat,) = group.rate(node.order).call(arguments, True, False)
-        parts = _split(flat, [slot.size for slot in group.slots])
-        self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
-        for name in self.network.diagram.blocks[node.block].implicit_outputs:
-            if (SlotKind.OUTPUT, name) in self._values[node]:
-                self._left_over[Value(node, SlotKind.OUTPUT, name)] = self._values[node].pop(
-                    (SlotKind.OUTPUT, name)
-                )
-        if node.block in self._clock_of:
-            ticks = symbols.m[self._clock_of[node.block]]
-            if ON in self.network.diagram.gates.get(node.block, {}):
-                ticks = logic_and(ticks, self.value(self.network.input(node.block, ON)))
-            for slot in group.slots:
-                if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
-                    fresh = self._values[node][slot.kind, slot.name]
-                    held = symbols.discrete[f"{node.block}/{slot.name}"]
-                    self._values[node][slot.kind, slot.name] = if_else(ticks, fresh, held)
-
-    def _slope(self, block: str, name: str, order: int) -> SX:
-        """The time derivative of a delayed value. Raises ``DiagramError`` where it is not kept."""
-        if order > 1 or name not in self.network.equations[block].fixed_delays:
-            what = "the second derivative" if order > 1 else "the derivative"
-            raise DiagramError(
-                f"{what} of a delayed signal is asked for" + ("" if order > 1 else ", whose delay changes"),
-                where=f"block '{block}' ({self.network.diagram.blocks[block].title})",
-                allowed="the first derivative behind a constant delay",
-                fix="differentiate before the delay, or filter instead of differentiating",
-            )
-        return self.symbols.discrete[f"{block}/{name}'"]
-
-    def value(self, value: Value) -> SX:
-        """The flat column of a value: worked out, held, or unknown until its loop is closed."""
-        if value.node.group == HELD:
-            held = self.symbols.discrete[f"{value.node.block}/{value.name}"]
-            return SX.zeros(held.numel()) if value.node.order else held
-        known = self._values.get(value.node, {}).get((value.kind, value.name))
-        if known is not None:
-            return known
-        if value not in self.unknowns:
-            slots = self.network.equations[value.node.block].groups[value.node.group].slots
-            size = next(slot.size for slot in slots if (slot.kind, slot.name) == (value.kind, value.name))
-            self.unknowns[value] = SX.sym("w", size)
-        return self.unknowns[value]
-
-    def residuals(self) -> SX:
-        """What has to be 0, for each unknown in turn."""
-        return vertcat(
-            *[
-                self._left_over[value] if value in self._left_over else self.value(value) - unknown
-                for value, unknown in self.unknowns.items()
-            ]
-        )
-
-
-class Implicit:
-    """The unknowns of the loops of a traced network: solved, or left as ``w`` with their residual."""
-
-    def __init__(
-        self, model: Model, symbols: _Symbols, tracing: _Tracing, values: NDArray[np.float64]
-    ) -> None:
-        self.slots = Signature()
-        self.w = SX.sym("w", 0)
-        self.residual = SX(0, 1)
-        self.guesses = SX(0, 1)
-        self._cuts, self._solution = SX(0, 1), SX(0, 1)
-        if not tracing.unknowns:
-            return
-        network, loops = model.flow, model.flow_order.loops
-        where = f"diagram '{network.diagram.name}'"
-        cuts = vertcat(*tracing.unknowns.values())
-        residual = tracing.residuals()
-        own = {value: (f"{value.node.block}/{value.name}",) for value in tracing.unknowns}
-        around = [
-            loops.get(value.node, own[value])
-            for value, cut in tracing.unknowns.items()
-            for _ in range(cut.numel())
-        ]
-        check_solvable(cuts, residual, symbols.p, values, around, where)
-        solution, remaining = solve_affine(cuts, residual)
-        names = [
-            _unknown_name(value) + (f"[{k}]" if cut.numel() > 1 else "")
-            for value, cut in tracing.unknowns.items()
-            for k in range(cut.numel())
-        ]
-        self.slots = Signature(tuple(Slot(names[k]) for k in remaining))
-        self.w = SX.sym("w", len(remaining))
-        if remaining:
-            guesses = [_guess(network, symbols, *entry) for entry in tracing.unknowns.items()]
-            self.guesses = vertcat(*guesses)[remaining]
-            self.residual = substitute(
-                substitute(residual[remaining], cuts, solution), cuts[remaining], self.w
-            )
-            solution = substitute(solution, cuts[remaining], self.w)
-        self._cuts, self._solution = cuts, solution
-
-    def solved(self, parts: Sequence[SX]) -> SX:
-        """One column with the solutions in place of the cuts."""
-        column = vertcat(*parts, SX(0, 1))
-        return substitute(column, self._cuts, self._solution) if self._cuts.numel() else column
-
-
-def _guess(network: Network, symbols: _Symbols, value: Value, unknown: SX) -> SX:
-    """Where the search for an unknown begins: where its block says, else at 0."""
-    block = network.diagram.blocks[value.node.block]
-    if value.node.order or value.kind is not SlotKind.OUTPUT or value.name not in block.implicit_outputs:
-        return SX.zeros(unknown.numel())
-    guess = block.initial_guesses(symbols.parameters_of(value.node.block))[value.name]
-    return repmat(guess, unknown.numel(), 1) if guess.numel() == 1 else flatten(guess, guess.shape)
-
-
-def _unknown_name(value: Value) -> str:
-    primes = value.node.order + (value.kind is SlotKind.DERIVATIVE)
-    return f"{value.node.block}/{value.name}" + "'" * primes
-
-
-def _updated(model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit) -> list[SX]:
+def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> list[SX]:
     """All discrete variables after a tick.
 
     Raises ``DiagramError`` where a loop that is not linear hangs on what is sampled at the same instant.
     """
-    tick = _Tracing(model.tick, symbols, model.sampling.clock_of)
+    tick = Tracing(model.tick, symbols, model.sampling.clock_of)
     for node in model.tick_order.order:
         tick.work_out(node)
     equations, discrete = model.tick.equations, dict(symbols.discrete)
@@ -438,7 +165,7 @@ def _keeps_left_limits(model: Model) -> bool:
     return any(kind is SlotKind.CAPTURE for equations in found for kind, _ in equations.group_of)
 
 
-def _captured(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, SX]:
+def _captured(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, SX]:
     """What keeps how things were just before an instant: taken when the update is asked for with no tick."""
     ticking = dot(symbols.m, symbols.m) if symbols.m.numel() else SX(0.0)
     return {
@@ -453,7 +180,7 @@ def _captured(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, SX]:
     }
 
 
-def _recorded(diagram: Diagram, flow: _Tracing, value: Value) -> SX:
+def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
     """A signal as it is recorded: what is not finite in a subsystem that is off disturbs nobody, and is 0."""
     worked_out = flow.value(value)
     if ON not in diagram.gates.get(value.node.block, {}):
@@ -468,7 +195,7 @@ def _same(network: Network, value: Value) -> Value:
     return value._replace(node=value.node._replace(group=group))
 
 
-def _guards(model: Model, flow: _Tracing) -> list[tuple[str, Guard, SX]]:
+def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
     return [
         (name, guard, flow.value(_value(model.flow, name, SlotKind.GUARD, guard.name)))
         for name, equations in model.flow.equations.items()
@@ -481,7 +208,7 @@ def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
 
 
 def _delays(
-    model: Model, symbols: _Symbols, flow: _Tracing, loops: Implicit, ends: Mapping[str, SX]
+    model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, ends: Mapping[str, SX]
 ) -> Delays | None:
     """What is delayed, and how long. Raises ``DiagramError`` where a delay hangs on what it decides."""
     places = signature(*symbols.discrete_slots).ranges
@@ -533,7 +260,7 @@ def _delays(
     )
 
 
-def _reset(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, list[SX]]:
+def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]:
     """States and discrete variables after events; without any event the modes settle."""
     states, discrete = dict(symbols.states), dict(symbols.discrete)
     quiet = dot(symbols.e, symbols.e) == 0.0 if symbols.e.numel() else SX(1.0)
@@ -548,23 +275,6 @@ def _reset(model: Model, symbols: _Symbols, flow: _Tracing) -> dict[str, list[SX
             settled = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
             discrete[path] = if_else(quiet, settled, discrete[path])
     return {"x": list(states.values()), "z": list(discrete.values())}
-
-
-def _symbols(letter: str, sizes: Sequence[int]) -> tuple[SX, list[SX]]:
-    """One flat symbol and its consecutive parts."""
-    whole = SX.sym(letter, sum(sizes))
-    return whole, _split(whole, sizes)
-
-
-def _split(column: SX, sizes: Sequence[int]) -> list[SX]:
-    if len(sizes) == 1:
-        return [column]
-    return vertsplit(column, [0, *np.cumsum(sizes).tolist()]) if sizes else []
-
-
-def _named_symbols(letter: str, slots: Sequence[Slot]) -> tuple[SX, dict[str, SX]]:
-    whole, parts = _symbols(letter, [slot.size for slot in slots])
-    return whole, {slot.name: part for slot, part in zip(slots, parts)}
 
 
 def _flat_function(name: str, inputs: Mapping[str, SX], outputs: Mapping[str, SX]) -> TracedFunction:
@@ -621,7 +331,7 @@ def _parameter_values(diagram: Diagram) -> dict[str, Any]:
     }
 
 
-def _initial_values(model: Model, symbols: _Symbols) -> list[SX]:
+def _initial_values(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
         given = model.flow.diagram.blocks[name].initial_states(symbols.parameters_of(name))
@@ -629,7 +339,7 @@ def _initial_values(model: Model, symbols: _Symbols) -> list[SX]:
     return values
 
 
-def _initial_discrete(model: Model, symbols: _Symbols) -> list[SX]:
+def _initial_discrete(model: Model, symbols: Symbols) -> list[SX]:
     values: list[SX] = []
     for name, equations in model.flow.equations.items():
         block, p = model.flow.diagram.blocks[name], symbols.parameters_of(name)

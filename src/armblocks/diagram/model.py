@@ -1,0 +1,82 @@
+"""What is known of a diagram before anything is traced: shapes, clocks, and the order of evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armblocks.diagram.block_equations import (
+    BlockEquations,
+    block_equations,
+)
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.hierarchy import flatten_hierarchy
+from armblocks.diagram.ordering import Evaluation, Network, evaluation_order
+from armblocks.diagram.sampling import Sampling, check_triggered, moving_blocks, resolve_sampling
+from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
+from armblocks.errors import ArmblocksError, DiagramError
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything about a diagram that does not need symbols: shapes, clocks, and in which order it is worked
+    out while the time flows and at a tick."""
+
+    shapes: DiagramShapes
+    sampling: Sampling
+    flow: Network
+    flow_order: Evaluation
+    tick: Network
+    tick_order: Evaluation
+
+
+def diagram_model(diagram: Diagram) -> Model:
+    """Look at the flat form of a diagram.
+
+    Raises ``DiagramError`` for unconnected inputs, for shapes and sample times that do not fit, and for
+    blocks whose parameters allow no equations (a robot without mass), ``AlgebraicLoopError`` for loops that
+    no order can solve.
+    """
+    form = flatten_hierarchy(diagram)
+    diagram = form.diagram
+    shapes = infer_shapes(diagram)
+    check_stated(form, shapes)
+    free = [name for name in diagram.blocks if not diagram.clocked(name)]
+    equations = {name: _equations(diagram, name, shapes) for name in free}
+    check_triggered(diagram, equations)
+    sampling = resolve_sampling(diagram, equations)
+    moving = moving_blocks(diagram, equations)
+    for name in free:
+        block, inputs = diagram.blocks[name], shapes.inputs[name]
+        # Nothing to locate where the answers change at instants only.
+        still = name not in moving and name not in diagram.gates
+        if still and block.conditions(inputs) and not equations[name].states:
+            equations[name] = _equations(diagram, name, shapes, settled=not block.modes(inputs))
+    for name, clock in sampling.clock_of.items():
+        period = sampling.clocks[clock].period
+        equations[name] = _equations(diagram, name, shapes, period=period)
+    equations = {name: equations[name] for name in diagram.blocks}
+    flow, tick = Network(diagram, equations), Network(diagram, equations, ticking=True)
+    if sampling.clocks:
+        settled = {name: _equations(diagram, name, shapes, settled=True) for name in free}
+        tick = Network(diagram, equations | settled, ticking=True)
+    return Model(
+        shapes=shapes,
+        sampling=sampling,
+        flow=flow,
+        flow_order=evaluation_order(flow),
+        tick=tick,
+        tick_order=evaluation_order(tick),
+    )
+
+
+def _equations(
+    diagram: Diagram, name: str, shapes: DiagramShapes, *, period: float = 1.0, settled: bool = False
+) -> BlockEquations:
+    block, hidden = diagram.blocks[name], diagram.gates.get(name, {})
+    try:
+        return block_equations(block, shapes.inputs[name], period=period, settled=settled, hidden=hidden)
+    except DiagramError:
+        raise
+    except ArmblocksError as error:
+        where = ", ".join(filter(None, (f"block '{name}' ({block.title})", error.where)))
+        raise DiagramError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
