@@ -1,0 +1,94 @@
+"""The past and the future of something that is edited by replacing it: undo and redo for frozen values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from armblocks.errors import InputError
+
+MOST_UNDO = 10_000
+"""Edits that can be undone; older ones are forgotten."""
+
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Step(Generic[Value]):
+    """One edit that was carried out: its name, the value before it, and the gesture that it was a part of."""
+
+    title: str
+    before: Value
+    gesture: str = ""
+
+
+class History(Generic[Value]):
+    """The present form of a frozen value, what it was before, and what was undone.
+
+    Forms share their parts, so the past costs next to nothing.
+
+    ``version`` grows with every change, undo and redo included, and never returns: two pages that show the
+    same version show the same value. ``saved`` is the form that the file holds.
+    """
+
+    def __init__(self, value: Value) -> None:
+        self.value = value
+        self.saved = value
+        self.version = 0
+        self._past: list[Step[Value]] = []
+        self._future: list[Step[Value]] = []
+
+    @property
+    def dirty(self) -> bool:
+        """Whether the file holds another form than this one."""
+        return self.value is not self.saved
+
+    @property
+    def undo_title(self) -> str:
+        """What ``undo`` would take back; ``""`` if nothing."""
+        return self._past[-1].title if self._past else ""
+
+    @property
+    def redo_title(self) -> str:
+        """What ``redo`` would do again; ``""`` if nothing."""
+        return self._future[-1].title if self._future else ""
+
+    def replace(self, title: str, value: Value, gesture: str = "") -> None:
+        """Put another form in the place of this one, as one step that can be undone.
+
+        Changes in a row that name the same ``gesture`` are one step: the letters typed into one field.
+        """
+        if not (gesture and self._past and self._past[-1].gesture == gesture and not self._future):
+            self._past.append(Step(title, self.value, gesture))
+            del self._past[:-MOST_UNDO]
+        self._future.clear()
+        self._become(value)
+
+    def rewrite(self, change: Callable[[Value], Value]) -> None:
+        """Change the value and all that it was and could become again: what no undo should take back."""
+        self._past = [replace(step, before=change(step.before)) for step in self._past]
+        self._future = [replace(step, before=change(step.before)) for step in self._future]
+        self._become(change(self.value))
+
+    def undo(self) -> None:
+        """Take the last edit back; raises ``InputError`` if there is none."""
+        step = self._pop(self._past, "undo")
+        self._future.append(Step(step.title, self.value))
+        self._become(step.before)
+
+    def redo(self) -> None:
+        """Do again what was undone last; raises ``InputError`` if there is nothing."""
+        step = self._pop(self._future, "redo")
+        self._past.append(Step(step.title, self.value))
+        self._become(step.before)
+
+    def _become(self, value: Value) -> None:
+        self.value = value
+        self.version += 1
+
+    @staticmethod
+    def _pop(steps: list[Step[Value]], verb: str) -> Step[Value]:
+        if not steps:
+            raise InputError(f"there is nothing to {verb}", where="the drawing", fix="edit it first")
+        return steps.pop()
