@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armblocks.face.linearizing import linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
-    from armblocks.face.reporting import write_files, write_report
+    from armblocks.face.reporting import draw_diagram, write_files, write_report
     from armblocks.face.robots import list_robots, load_robot, save_robot
     from armblocks.face.sensitivity import SensitivityResult, sensitivity
     from armblocks.face.trajectory import JointTrajectory, jtraj
@@ -75,6 +75,7 @@ else:
             "blocks": "armblocks.blocks",
             "compile_diagram": "armblocks.face.model",
             "diagram_difference": "armblocks.diagram",
+            "draw_diagram": "armblocks.face.reporting",
             "errors": "armblocks.errors",
             "jtraj": "armblocks.face.trajectory",
             "linearize": "armblocks.face.linearizing",
@@ -125,6 +126,7 @@ __all__ = [
     "blocks",
     "compile_diagram",
     "diagram_difference",
+    "draw_diagram",
     "errors",
     "jtraj",
     "linearize",

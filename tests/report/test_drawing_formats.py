@@ -7,8 +7,9 @@ import zlib
 import numpy as np
 import pytest
 
+from armblocks.report.painter import resampled
 from armblocks.report.picture import Curve, Disc, Group, Picture, Polyline, Raster, Rectangle, Text, moved
-from armblocks.report.png import picture_png, resampled
+from armblocks.report.png import picture_png
 from armblocks.report.png_file import png_bytes
 from armblocks.report.style import PALETTE, Tone
 from armblocks.report.svg import escape, number, page_rules, svg_file, svg_inline

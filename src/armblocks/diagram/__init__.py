@@ -21,6 +21,7 @@ from armblocks.diagram.hierarchy import (
     diagram_views,
     flat_diagram,
     flatten_hierarchy,
+    levels_of,
 )
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.names import check_block_name
@@ -109,6 +110,7 @@ __all__ = [
     "infer_shapes",
     "infer_units",
     "integral_unit",
+    "levels_of",
     "made",
     "parameter",
     "rate_unit",

@@ -1,11 +1,11 @@
-"""Reports from Python: the same folder as ``armblocks run`` writes."""
+"""Reports and drawings from Python: the same files as the command line writes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from armblocks.diagram import Diagram
 from armblocks.simulation import SimulationResult
@@ -43,3 +43,22 @@ def write_files(folder: str | PathLike[str], diagram: Diagram, result: Simulatio
     from armblocks.report.sink_files import write_files
 
     return write_files(folder, diagram, result)
+
+
+def draw_diagram(
+    diagram: Diagram,
+    path: str | PathLike[str],
+    *,
+    sheet: str = "",
+    theme: Literal["light", "dark"] | None = None,
+    result: SimulationResult | None = None,
+) -> Path:
+    """Draw a diagram into a ``.svg``, ``.png`` or ``.pdf`` file; returns the path.
+
+    ``sheet``: the path of a subsystem, such as ``"controller/filter"``; ``""`` is the top. ``theme``
+    ``None``: SVG follows the reader's preference, the others are light. With a ``result``, scopes and
+    displays show what it holds. Raises UnknownNameError for another suffix or sheet.
+    """
+    from armblocks import report
+
+    return report.draw_diagram(path, diagram, result, sheet=sheet, theme=theme)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import IntEnum
 
 from armblocks.diagram import (
@@ -10,7 +11,6 @@ from armblocks.diagram import (
     Bus,
     Connection,
     Diagram,
-    FlatForm,
     PortRef,
     Shapes,
     View,
@@ -18,7 +18,9 @@ from armblocks.diagram import (
     diagram_views,
     flatten_hierarchy,
     infer_shapes,
+    levels_of,
 )
+from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.report import block_faces
 from armblocks.report.block_faces import FaceShape, Room, Trend
 from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes, sized_box
@@ -36,35 +38,37 @@ _STUB = 16.0
 """px of wire at the ports of a block that is drawn alone."""
 
 
-def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *, inside: str = "") -> Picture:
-    """The diagram, its sinks showing what the run gave them if a result is given.
+def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *, sheet: str = "") -> Picture:
+    """A sheet of the diagram, its sinks showing what the run gave them if a result is given.
 
-    ``inside``: the path of the subsystem that is drawn instead of the top.
+    ``sheet``: the path of the subsystem that is drawn instead of the top. A drawing in progress, which cannot
+    be traced yet, has thin wires only. Raises UnknownNameError for a sheet that is not there.
     """
-    form = flatten_hierarchy(diagram)
-    outputs = infer_shapes(form.diagram).outputs
-    views = {name: view for name, view in diagram_views(diagram) if view.kind in _TRENDS}
-    diagram = form.levels[inside]
-    path = f"{inside}/" if inside else ""
-    placed = boxes(diagram)
-    nets, wires = _nets(diagram, placed)
+    carried = _Carried.of(diagram)
+    if sheet not in carried.levels:
+        known = [path for path in carried.levels if path]
+        raise UnknownNameError("sheet", sheet, known, where=f"diagram '{diagram.name}'")
+    level = carried.levels[sheet]
+    path = f"{sheet}/" if sheet else ""
+    placed = boxes(level)
+    nets, wires = _nets(level, placed)
     routed = route([_obstacle(box) for box in placed.values()], nets)
     marks: list[Mark] = []
     for (source, _), net in zip(wires.items(), routed):
-        kind = _wire_kind(form, outputs, PortRef(path + source.block, source.port))
+        kind = carried.kind(PortRef(path + source.block, source.port))
         marks += _wire(net, kind, _wire_title(source, wires[source]))
     for name, box in placed.items():
-        trend = _trend(path + name, views.get(path + name), result)
+        trend = _trend(path + name, carried.views.get(path + name), result)
         marks.append(Group(tuple(_block(box, trend)), title=_block_title(name, box)))
     left, top, right, bottom = _extent(placed, routed)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
         height=bottom - top + 2 * _MARGIN,
-        title=f"Diagram {diagram.name}",
-        description=_in_words(diagram),
+        title=f"Diagram {diagram.name}" + (f", sheet {sheet}" if sheet else ""),
+        description=_in_words(level),
     )
-    sheet = Picture(width=0, height=0, title="", marks=marks)
-    picture.place(sheet, _MARGIN - left, _MARGIN - top)
+    drawn = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(drawn, _MARGIN - left, _MARGIN - top)
     return picture
 
 
@@ -206,11 +210,31 @@ class WireKind(IntEnum):
     BUS = 3
 
 
-def _wire_kind(form: FlatForm, outputs: Mapping[str, Shapes], source: PortRef) -> WireKind:
-    carried = form.carried.get(source, source)
-    if isinstance(carried, Bus):
-        return WireKind.BUS
-    return WireKind(min(len(outputs[carried.block][carried.port]), 2))
+@dataclass(frozen=True, eq=False)
+class _Carried:
+    """The sheets of a diagram, and what their wires carry as far as it is known."""
+
+    levels: Mapping[str, Diagram]
+    views: Mapping[str, View]
+    carried: Mapping[PortRef, PortRef | Bus]
+    outputs: Mapping[str, Shapes]
+
+    @classmethod
+    def of(cls, diagram: Diagram) -> _Carried:
+        try:
+            form = flatten_hierarchy(diagram)
+            outputs = infer_shapes(form.diagram).outputs
+        except DiagramError:
+            return cls(levels_of(diagram), {}, {}, {})
+        views = {name: view for name, view in diagram_views(diagram) if view.kind in _TRENDS}
+        return cls(form.levels, views, form.carried, outputs)
+
+    def kind(self, source: PortRef) -> WireKind:
+        """What leaves an output port of the hierarchy."""
+        carried = self.carried.get(source, source)
+        if isinstance(carried, Bus):
+            return WireKind.BUS
+        return WireKind(min(len(self.outputs.get(carried.block, {}).get(carried.port, ())), 2))
 
 
 def _wire(net: RoutedNet, kind: WireKind, title: str) -> list[Mark]:

@@ -1,0 +1,35 @@
+"""``armblocks diagram``: a sheet of a diagram as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armblocks.cli.terminal import results_console
+
+
+def diagram(
+    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="A .svg, .png or .pdf file.", show_default="MODEL.svg"),
+    ] = None,
+    sheet: Annotated[
+        str, typer.Option(metavar="PATH", help="The subsystem to draw, such as controller/filter.")
+    ] = "",
+    dark: Annotated[
+        bool | None,
+        typer.Option("--dark/--light", help="The colours.", show_default="light; SVG as its reader prefers"),
+    ] = None,
+    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagram names.")] = False,
+) -> None:
+    """Draw a diagram, or one of its subsystems, into a file."""
+    import armblocks as ab
+
+    drawn = ab.load_diagram(model, trust=trust)
+    name = "-".join((drawn.name, *sheet.split("/"))) if sheet else drawn.name
+    theme = None if dark is None else "dark" if dark else "light"
+    path = ab.draw_diagram(drawn, out or Path(f"{name}.svg"), sheet=sheet, theme=theme)
+    results_console().print(f"wrote {path}", soft_wrap=True)
