@@ -57,7 +57,7 @@ def test_the_second_time_nothing_is_traced(folder: Path) -> None:
 def test_code_from_disk_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = compile_function(function())(A)
 
-    def refuse(*_: object) -> bytes:
+    def refuse(*_: object, **__: object) -> bytes:
         raise AssertionError("compiled again")
 
     monkeypatch.setattr("armblocks.compiler.native.compile_object", refuse)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,7 +12,10 @@ from casadi import SX
 from armblocks.compiler import compile_function, native, pieces
 from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.interpret import interpret
-from armblocks.compiler.pieces import LENGTH, cut, is_long
+from armblocks.compiler.ir_text import Module
+from armblocks.compiler.llvm_ir import emit_function
+from armblocks.compiler.native import Effort, load_code
+from armblocks.compiler.pieces import ACCESS_WEIGHT, LENGTH, cut, is_long
 from armblocks.equations import TracedFunction, signature
 
 
@@ -71,7 +76,8 @@ def test_every_operation_and_store_is_in_one_piece_and_no_piece_is_long() -> Non
     operations = [k for piece in done.pieces for k in range(piece.first, piece.last)]
     assert operations == list(range(len(tape.operations)))
     assert sorted(k for piece in done.pieces for k in piece.stores) == sorted(stores)
-    assert all(piece.last - piece.first + len(piece.stores) <= 2 * LENGTH for piece in done.pieces)
+    for piece in done.pieces:
+        assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * LENGTH
     # Places are used again: 900 values back are in use, not all 5000.
     assert done.room < 2 * 900 + LENGTH
 
@@ -88,6 +94,29 @@ def test_less_optimisation_changes_no_bit(effort: str, monkeypatch: pytest.Monke
     quick = compile_function(traced)(x[:, :2], u)
     for one, other in zip(expected, quick):
         np.testing.assert_array_equal(one, other)
+
+
+def test_code_for_a_few_calls_gives_the_bits_of_code_for_many() -> None:
+    tape = tape_from(long_function(300))
+    vectors = [np.random.default_rng(2).normal(size=size) for size in (*tape.input_sizes, *tape.output_sizes)]
+
+    def write() -> str:
+        module = Module()
+        emit_function(module, tape, "f", linkage="")
+        return module.text
+
+    found: list[list[bytes]] = []
+    for effort in Effort:
+        code = load_code(("effort", tape.digest), write, effort)
+        function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * len(vectors))(code.address("f"))
+        function(*(vector.ctypes.data for vector in vectors))
+        found.append([vector.tobytes() for vector in vectors])
+        for vector in vectors[len(tape.input_sizes) :]:
+            vector[:] = np.nan
+    assert len(found) == 2 and found[0] == found[1]
+    told = interpret(tape, vectors[: len(tape.input_sizes)])
+    for given, expected in zip(found[0][len(tape.input_sizes) :], told):
+        np.testing.assert_allclose(np.frombuffer(given), expected, rtol=1e-12, atol=1e-13)
 
 
 def test_length_of_the_longest_uncut_function_is_above_that_of_a_piece() -> None:

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from armblocks.compiler import cache
+from armblocks.compiler import cache, pieces
 from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
 from armblocks.equations import HybridSystem, TracedFunction, continuous_system, signature
 from armblocks.errors import CompileError
@@ -70,6 +70,19 @@ def test_one_instant_and_many_give_the_same_bits() -> None:
             compiled.evaluate_signals(t[k : k + 1], x[k : k + 1], no[:1], no[:1], p)[:, 0].tobytes()
             == whole[:, k].tobytes()
         )
+
+
+def test_signals_of_a_long_tape_are_made_for_one_lane_and_have_the_same_bits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    random = np.random.default_rng(6)
+    no = np.empty((37, 0))
+    t, x, p = random.uniform(0, 1, 37), random.normal(size=(37, 2)), np.array([9.81, 0.3])
+    x[5] = 1e300
+    in_lanes = compile_system(pendulum()).evaluate_signals(t, x, no, no, p)
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
+    monkeypatch.setattr(pieces, "LONGEST", 0)
+    assert compile_system(pendulum()).evaluate_signals(t, x, no, no, p).tobytes() == in_lanes.tobytes()
 
 
 def test_derivative_start_and_breakpoints_follow_the_parameters() -> None:

@@ -7,6 +7,7 @@ import ctypes
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from enum import Enum
 from functools import cache as once
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from armblocks.compiler.target import Target, host_target
 if TYPE_CHECKING:
     from llvmlite import binding as llvm
 
-LONG, VERY_LONG = 20_000, 200_000
+LONG, VERY_LONG = 8_000, 100_000
 """Lines of IR from which on the time to optimise is out of proportion: the code is so long that it waits for
 memory, not for arithmetic."""
 
@@ -39,39 +40,50 @@ class NativeCode:
         return address
 
 
-def load_code(key: Sequence[str], write: Callable[[], str]) -> NativeCode:
+class Effort(Enum):
+    """How much work of LLVM goes into a module."""
+
+    LITTLE = 0
+    """For code that runs a few times: no passes, and registers given out as they come."""
+    FULL = 1
+    """For code that runs often: all that pays for itself, by the length of the module."""
+
+
+def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Effort.FULL) -> NativeCode:
     """Machine code of the module whose IR text ``write()`` gives.
 
     ``key`` says which module it is (a variant's name, tape digests, options: all that the text depends on);
-    target and versions are added here. If the disk cache knows the key, ``write`` is not called.
+    target and versions are added here. If the disk cache knows the key, ``write`` is not called. The
+    ``effort`` changes no bit of what the code works out.
     """
     target = host_target()
-    name = cache.object_name((*key, target.key))
+    name = cache.object_name((*key, effort.name, target.key))
     code = cache.load(name)
     if code is not None:
         try:
             return _link(code, target)
         except RuntimeError:
             pass  # an object that LLVM cannot read is made anew
-    code = compile_object(write(), target)
+    code = compile_object(write(), target, effort=effort)
     cache.store(name, code)
     return _link(code, target)
 
 
-def compile_object(text: str, target: Target, *, jit: bool = True) -> bytes:
+def compile_object(text: str, target: Target, *, jit: bool = True, effort: Effort = Effort.FULL) -> bytes:
     """Optimise IR text and give an object file for the target."""
     from llvmlite import binding as llvm
 
     with _LOCK:
         lines = text.count("\n")
-        machine = target.machine(jit=jit, opt=2 if lines < LONG else 1 if lines < VERY_LONG else 0)
+        level = 0 if effort is Effort.LITTLE or lines >= VERY_LONG else 1 if lines >= LONG else 2
+        machine = target.machine(jit=jit, opt=level)
         module = llvm.parse_assembly(text)
         module.triple = target.triple
         module.data_layout = str(machine.target_data)
-        if lines < LONG:
+        if level == 2:
             module.verify()
             _optimise(module, machine)
-        else:
+        elif effort is Effort.FULL:
             _tidy(module, machine)
         return machine.emit_object(module)
 

@@ -1,9 +1,10 @@
 """Long tapes cut into pieces, each a function of its own.
 
-The work of LLVM's register allocation and scheduling grows faster than a function does: ten thousand
-operations in one function take minutes, in pieces of some hundred they take seconds. What one piece works
-out and a later one needs goes through memory, as it would anyway, because no processor has that many
-registers. The operations are the same in the same order, and so are the bits.
+The work of LLVM grows faster than a function does, above all with what the function reads and writes, which
+LLVM compares pair by pair: ten thousand operations in one function take minutes, in pieces they take seconds.
+What one piece works out and a later one needs goes through memory, which costs time where much is used again,
+as in an arm's dynamics, and next to none in a chain of blocks. So reads and writes count for more than
+arithmetic here. The operations are the same in the same order, and so are the bits.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from armblocks.compiler.llvm_ir import Inputs, Registers, emit_operations
 from armblocks.compiler.opcodes import ELEMENTARY
 from armblocks.compiler.tape import Tape
 
-LONGEST = 1200
-"""Operations and stores of a function that is left in one piece."""
-LENGTH = 400
-"""Operations and stores of a piece."""
-FUNCTION_WEIGHT = 8
-"""An elementary function counts as so many operations."""
+LONGEST = 2600
+"""Weight of a function that is left in one piece."""
+LENGTH = 600
+"""Weight of a piece, about."""
+ACCESS_WEIGHT, FUNCTION_WEIGHT = 4, 8
+"""A read of an input, or a write, and an elementary function count as so many operations."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +45,9 @@ class Cut:
 
 def is_long(tape: Tape) -> bool:
     """Whether a tape is better cut."""
-    stores = sum(len(members) for members in tape.outputs)
-    return len(tape.operations) + stores > LONGEST
+    read = {register for _, operands in tape.operations for register in operands}
+    accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
+    return len(tape.operations) + ACCESS_WEIGHT * accesses > LONGEST
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,17 +73,22 @@ def cut(tape: Tape, stores: Stores) -> Cut:
     pieces: list[Piece] = []
     begin, weight = 0, 0
     waiting: list[int] = []
-    for k, (opcode, _) in enumerate(tape.operations):
+    read: set[int] = set()
+    for k, (opcode, operands) in enumerate(tape.operations):
         done = ready.pop(first + k, [])
         waiting += done
-        weight += (FUNCTION_WEIGHT if opcode in ELEMENTARY else 1) + len(done)
+        new = {register for register in operands if register < tape.first_constant} - read
+        read |= new
+        weight += FUNCTION_WEIGHT if opcode in ELEMENTARY else 1
+        weight += ACCESS_WEIGHT * (len(done) + len(new))
         if weight >= LENGTH:
             pieces.append(Piece(first=begin, last=k + 1, stores=tuple(waiting)))
             begin, weight, waiting = k + 1, 0, []
+            read.clear()
     waiting += [number for numbers in ready.values() for number in numbers]  # of inputs and constants alone
-    end = len(tape.operations)
-    for start in range(0, max(1, len(waiting)), LENGTH):
-        pieces.append(Piece(first=begin, last=end, stores=tuple(waiting[start : start + LENGTH])))
+    end, most = len(tape.operations), LENGTH // ACCESS_WEIGHT
+    for start in range(0, max(1, len(waiting)), most):
+        pieces.append(Piece(first=begin, last=end, stores=tuple(waiting[start : start + most])))
         begin = end
     return _with_places(tape, stores, pieces)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,9 @@ from armblocks.compiler.ir_text import Module
 from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
 from armblocks.compiler.kept_jacobian import KeptJacobian, kept_jacobian
 from armblocks.compiler.llvm_ir import emit_function
-from armblocks.compiler.native import NativeCode, load_code
+from armblocks.compiler.native import Effort, NativeCode, load_code
 from armblocks.compiler.native_integrator import NativeIntegrator
+from armblocks.compiler.pieces import is_long
 from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
@@ -32,9 +33,11 @@ Vector = NDArray[np.float64]
 
 ENDING = ("stop", "fail")
 """What guards do that end a run where they are positive."""
-_STARTS = ("initial_states", "initial_discrete", "initial_algebraic")
-_POINTWISE = ("derivative", *_STARTS, "breakpoints")
-_FUNCTIONS = (*_POINTWISE, "signals", "residual", "residual_jacobian", "update", "guards", "reset")
+_OF_PARAMETERS = ("initial_states", "initial_discrete", "initial_algebraic", "breakpoints")
+_FUNCTIONS = (
+    *("derivative", *_OF_PARAMETERS, "signals", "residual", "residual_jacobian"),
+    *("update", "guards", "reset"),
+)
 _SIGNALS_LAYOUT = BatchLayout(
     inputs=(Layout.COLUMNS, Layout.ROWS, Layout.ROWS, Layout.ROWS, Layout.SHARED), outputs=(Layout.COLUMNS,)
 )
@@ -117,49 +120,58 @@ class CompiledSystem:
         self._make_tape = tape
         self._trace = trace
         self._integrators: dict[int, NativeIntegrator] = {}
+        self._loaded: list[NativeCode] = []
 
     def tape(self, function: str) -> Tape:
         """One of the system's functions, ``derivative``, ``signals`` …, as a flat program."""
         return self._make_tape(function)
 
-    @cached_property
-    def _code(self) -> NativeCode:
+    def _functions_of(self, names: Sequence[str], pointers: int) -> Mapping[str, Callable[..., None]]:
+        """Some of the system's functions, for single points: they are called too seldom for much effort."""
+
         def write() -> str:
             module = Module()
-            for name in (*_POINTWISE, *(("residual",) if self.sizes.algebraic else ())):
+            for name in names:
                 emit_function(module, self.tape(name), name, linkage="")
-            emit_batch(module, self.tape("signals"), _SIGNALS_LAYOUT, host_target().lanes, "signals")
             return module.text
 
-        return load_code(
-            ("system", *(self._digests[name] for name in (*_POINTWISE, "signals", "residual"))), write
-        )
+        code = load_code(("points", *(self._digests[name] for name in names)), write, Effort.LITTLE)
+        return {name: self._entry(code, name, 0, pointers) for name in names}
 
-    def _entry(self, name: str, integers: int, pointers: int) -> Callable[..., None]:
+    def _entry(self, code: NativeCode, name: str, integers: int, pointers: int) -> Callable[..., None]:
+        self._loaded.append(code)  # it has to outlive every call
         kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * integers, *[ctypes.c_void_p] * pointers)
-        return kind(self._code.address(name))
+        return kind(code.address(name))
+
+    @cached_property
+    def _start_functions(self) -> Mapping[str, Callable[..., None]]:
+        return self._functions_of(_OF_PARAMETERS, 2)
 
     @cached_property
     def _point_functions(self) -> Mapping[str, Callable[..., None]]:
-        functions = {name: self._entry(name, 0, 2) for name in (*_STARTS, "breakpoints")}
-        functions["derivative"] = self._entry("derivative", 0, 6)
-        if self.sizes.algebraic:
-            functions["residual"] = self._entry("residual", 0, 6)
-        return functions
+        return self._functions_of(("derivative", *(("residual",) if self.sizes.algebraic else ())), 6)
 
     @cached_property
     def _signals(self) -> Callable[..., None]:
-        return self._entry("signals", 3, 6)
+        def write() -> str:
+            module, tape = Module(), self.tape("signals")
+            # Code for several lanes comes on top of that for one, and a run that is so long to compile is
+            # seldom long enough to win the time back.
+            lanes = 1 if is_long(tape) else host_target().lanes
+            emit_batch(module, tape, _SIGNALS_LAYOUT, lanes, "signals")
+            return module.text
+
+        return self._entry(load_code(("signals", self._digests["signals"]), write), "signals", 3, 6)
 
     def _of_parameters(self, name: str, size: int, p: Vector) -> Vector:
         result = np.empty(size)
         if size:
-            self._point_functions[name](p.ctypes.data, result.ctypes.data)
+            self._start_functions[name](p.ctypes.data, result.ctypes.data)
         return result
 
     def prepare(self, tableau: Tableau | None) -> None:
         """Compile, or load from disk, all that a run by this method needs (``None``: no integration)."""
-        _ = self._signals
+        _ = self._signals, self._start_functions
         if tableau is not None:
             self.integrator(tableau)
 
