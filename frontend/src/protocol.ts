@@ -22,6 +22,7 @@ export interface Envelope {
     | Run
     | Control
     | SetSpeed
+    | Rewind
     | Tune
     | TypedValue
     | Scene
@@ -64,7 +65,17 @@ export interface Change {
   document: string;
   key: string;
   inside?: string[];
-  edit: AddBlocks | RemoveBlocks | Connect | MoveBlocks | Rename | SetParameters | GroupBlocks | SetSettings | Describe;
+  edit:
+    | AddBlocks
+    | RemoveBlocks
+    | Connect
+    | MoveBlocks
+    | Rename
+    | SetParameters
+    | KeepTuned
+    | GroupBlocks
+    | SetSettings
+    | Describe;
 }
 /**
  * Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
@@ -146,6 +157,15 @@ export interface SetParameters {
   };
 }
 /**
+ * Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them.
+ */
+export interface KeepTuned {
+  kind: "keep_tuned";
+  values: {
+    [k: string]: unknown;
+  };
+}
+/**
  * Put blocks into a subsystem of their own; its ports are the wires that are cut thereby.
  */
 export interface GroupBlocks {
@@ -202,19 +222,24 @@ export interface ArrangeBlocks {
 }
 /**
  * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
+ *
+ * ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
  */
 export interface Run {
   kind: "run";
   document: string;
   speed?: number | null;
+  tuned?: {
+    [k: string]: unknown;
+  };
 }
 /**
- * Say how a run goes on.
+ * Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant.
  */
 export interface Control {
   kind: "control";
   run: string;
-  action: "pause" | "resume" | "step" | "stop";
+  action: "pause" | "resume" | "step" | "back" | "stop";
 }
 /**
  * Change the speed of a run; ``None``: as fast as possible.
@@ -223,6 +248,14 @@ export interface SetSpeed {
   kind: "speed";
   run: string;
   speed?: number | null;
+}
+/**
+ * Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay.
+ */
+export interface Rewind {
+  kind: "rewind";
+  run: string;
+  time: number;
 }
 /**
  * Change a tunable parameter of a run that is under way.
@@ -263,7 +296,7 @@ export interface Pose {
  * Only for the page's types: everything that the server sends as text.
  */
 export interface ServerMessage {
-  event: Reply | Welcome | Opened | Changed | Checked | RunStarted | RunProgress;
+  event: Reply | Welcome | Opened | Changed | Checked | RunStarted | RunTuned | RunRewound | RunProgress;
 }
 /**
  * The answer to a request: ``fault`` where it was refused.
@@ -458,7 +491,7 @@ export interface RunStarted {
   aliases: {
     [k: string]: string;
   };
-  tunables: string[];
+  tunables: Tunable[];
 }
 /**
  * One recorded signal of a run and where its numbers lie in the columns of a frame.
@@ -479,7 +512,39 @@ export interface ViewOf {
   title: string;
 }
 /**
- * Where a run stands.
+ * A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
+ *
+ * ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
+ */
+export interface Tunable {
+  path: string;
+  value: unknown;
+  unit: string;
+  doc: string;
+  low: number | null;
+  high: number | null;
+}
+/**
+ * From this instant (s) on a parameter of a run has this value.
+ */
+export interface RunTuned {
+  kind: "run_tuned";
+  run: string;
+  time: number;
+  parameter: string;
+  value: unknown;
+}
+/**
+ * A run stands at an earlier instant (s) again: only the first ``count`` samples are still true.
+ */
+export interface RunRewound {
+  kind: "run_rewound";
+  run: string;
+  time: number;
+  count: number;
+}
+/**
+ * Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that.
  */
 export interface RunProgress {
   kind: "run_progress";
@@ -489,4 +554,6 @@ export interface RunProgress {
   real_time_factor: number;
   message: string;
   fault?: Fault | null;
+  solver?: string;
+  reason?: string;
 }

@@ -56,7 +56,13 @@ class Samples {
       at += 8 * count
       column.set(new Float64Array(frame, at, count), first)
     }
-    this.count = Math.max(this.count, first + count)
+    this.count = first + count
+    this.version++
+  }
+
+  /** Only the first samples are still true: the run has gone back. */
+  truncate(count: number): void {
+    this.count = Math.min(this.count, count)
     this.version++
   }
 

@@ -10,6 +10,7 @@ import type {
   Finding,
   Sheet,
   SheetBlock,
+  Tunable,
   ViewOf,
   Wire,
   WireKind,
@@ -43,7 +44,7 @@ export interface RunView {
   channels: Channel[]
   views: ViewOf[]
   aliases: Record<string, string>
-  tunables: string[]
+  tunables: Tunable[]
 }
 
 export interface Notice {
@@ -164,6 +165,9 @@ function receive(event: ServerEvent): void {
           tunables: event.tunables,
         },
       })
+      break
+    case 'run_rewound':
+      if (run?.run === event.run) samples.truncate(event.count)
       break
     case 'run_progress':
       if (run?.run === event.run)

@@ -209,3 +209,12 @@ def test_a_failed_run_says_so_each_time() -> None:
         run.result()
     assert second.value is first.value
     assert isinstance(first.value.partial, SimulationResult)
+
+
+def test_many_single_steps_do_not_make_the_next_piece_of_the_run_long() -> None:
+    run = Simulation(SYSTEMS["van_der_pol"], options(1e4, "rk4", 1e-3))
+    for _ in range(1100):
+        run.advance(steps=1)
+    run.advance(wall_time=0.0)
+    assert not run.finished
+    assert run.time < 10.0

@@ -16,6 +16,7 @@ from armblocks.studio.edits import (
     Connect,
     Describe,
     Edit,
+    KeepTuned,
     MoveBlocks,
     NewBlock,
     Place,
@@ -53,6 +54,7 @@ edits: st.SearchStrategy[Edit] = st.one_of(
     st.builds(
         SetSettings, values=st.dictionaries(st.sampled_from(["stop_time", "step", "x"]), numbers, max_size=1)
     ),
+    st.builds(KeepTuned, values=st.dictionaries(st.sampled_from(["gain.gain", "x.y"]), values, max_size=2)),
     st.builds(Describe, text=st.text(max_size=5)),
 )
 
@@ -158,3 +160,14 @@ def test_numbers_may_be_typed_as_formulas(typed: str, value: float) -> None:
     new = NewBlock(name="gain", type="Gain", parameters={"gain": typed}, place=Place(x=0, y=0))
     document.edit(AddBlocks(blocks=[new]))
     assert document.diagram.blocks["gain"].parameter_value("gain") == value
+
+
+def test_tuned_values_of_several_blocks_are_kept_in_one_step() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    before = content(document)
+    document.edit(KeepTuned(values={"PID.P": "2*3", "PID.I": 0.25}))
+    assert document.undo_title == "keep 2 tuned values"
+    assert document.diagram.block("PID").parameter_value("P") == 6.0
+    assert document.diagram.block("PID").parameter_value("I") == 0.25
+    document.undo()
+    assert content(document) == before

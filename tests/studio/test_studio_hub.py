@@ -179,7 +179,7 @@ def test_a_run_without_memory_fails_in_words(monkeypatch: pytest.MonkeyPatch) ->
     def exhausted(_: object) -> None:
         raise MemoryError
 
-    job = {"run": "r", "document": "d", "speed": None, "folder": ".", "diagram": ""}
+    job = {"run": "r", "document": "d", "speed": None, "folder": ".", "diagram": "", "tuned": {}}
     run = run_worker._Run(Pipe(), job)  # pyright: ignore
     monkeypatch.setattr(run, "_go", lambda: exhausted(None))
     run.run()

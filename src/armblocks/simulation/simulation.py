@@ -201,7 +201,7 @@ class Simulation:
                     break  # at the pause, or at the end
                 # Twice as many steps at most: a chunk never outgrows what the last one took by much.
                 growth = min(2.0, min(CHUNK_SECONDS, budget) / max(now - started, 1e-6))
-                self._chunk = max(100, int(self._chunk * growth))
+                self._chunk = max(100, int(taken * growth))
                 if now - began >= budget:
                     break
         finally:

@@ -17,12 +17,20 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Block, Connection, Diagram, ParameterKind, Placement, PortRef
+from armblocks.diagram import (
+    Block,
+    Connection,
+    Diagram,
+    ParameterKind,
+    Placement,
+    PortRef,
+    with_parameters,
+)
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.studio.nesting import grouped, with_block
-from armblocks.studio.parameter_values import ResolveRobot, parameter_value
+from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
 
 DEFAULT_ROBOT = "puma560"
 """The arm that a robot block starts with when it is dropped on the sheet."""
@@ -109,6 +117,13 @@ class SetParameters(Message):
     values: dict[str, Any]
 
 
+class KeepTuned(Message):
+    """Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them."""
+
+    kind: Literal["keep_tuned"] = "keep_tuned"
+    values: dict[str, Any]
+
+
 class GroupBlocks(Message):
     """Put blocks into a subsystem of their own; its ports are the wires that are cut thereby."""
 
@@ -138,6 +153,7 @@ Edit = Annotated[
     | MoveBlocks
     | Rename
     | SetParameters
+    | KeepTuned
     | GroupBlocks
     | SetSettings
     | Describe,
@@ -164,6 +180,10 @@ def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagra
             return _rename(edit, diagram)
         case SetParameters():
             return _set_parameters(edit, diagram, resolve_robot)
+        case KeepTuned():
+            return with_parameters(
+                diagram, {path: tuned_value(value, path) for path, value in edit.values.items()}
+            )
         case GroupBlocks():
             return grouped(edit.blocks, edit.name, diagram)
         case SetSettings():
@@ -187,6 +207,8 @@ def summary(edit: Edit) -> str:
             return f"rename {edit.block}"
         case SetParameters():
             return f"change {edit.block}"
+        case KeepTuned():
+            return f"keep {_counted(len(edit.values), 'tuned value')}"
         case GroupBlocks():
             return f"group {_counted(len(edit.blocks), 'block')}"
         case SetSettings():

@@ -149,7 +149,7 @@ class Hub:
                 return link_frames_of(self._robot(request.document, request.block), request.q)
             case say.Run():
                 return await self._run(request)
-            case say.Control() | say.SetSpeed() | say.Tune():
+            case say.Control() | say.SetSpeed() | say.Rewind() | say.Tune():
                 return self._known_run(request.run).obey(request)
 
     async def tell_all(self, document: str, event: say.Message) -> None:
@@ -330,6 +330,7 @@ class Hub:
             ).decode(),
             "folder": str(self.folder.root),
             "speed": request.speed,
+            "tuned": request.tuned,
         }
         run = RunProcess(secrets.token_hex(8), found.key, self._spare or Worker(), tell)
         self.runs[run.key] = run

@@ -130,6 +130,20 @@ class Channel(Message):
     unit: str
 
 
+class Tunable(Message):
+    """A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
+
+    ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
+    """
+
+    path: str
+    value: Any
+    unit: str
+    doc: str
+    low: float | None
+    high: float | None
+
+
 class DocumentState(Message):
     """Where a document stands."""
 
@@ -217,19 +231,31 @@ class ArrangeBlocks(Message):
 
 
 class Run(Message):
-    """Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible."""
+    """Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
+
+    ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
+    """
 
     kind: Literal["run"] = "run"
     document: str
     speed: float | None = Field(default=None, gt=0, le=1000)
+    tuned: dict[str, Any] = Field(default_factory=dict[str, Any])
 
 
 class Control(Message):
-    """Say how a run goes on."""
+    """Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant."""
 
     kind: Literal["control"] = "control"
     run: str
-    action: Literal["pause", "resume", "step", "stop"]
+    action: Literal["pause", "resume", "step", "back", "stop"]
+
+
+class Rewind(Message):
+    """Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay."""
+
+    kind: Literal["rewind"] = "rewind"
+    run: str
+    time: float
 
 
 class SetSpeed(Message):
@@ -288,6 +314,7 @@ Request = Annotated[
     | Run
     | Control
     | SetSpeed
+    | Rewind
     | Tune
     | TypedValue
     | Scene
@@ -375,11 +402,30 @@ class RunStarted(Message):
     channels: list[Channel]
     views: list[ViewOf]
     aliases: dict[str, str]
-    tunables: list[str]
+    tunables: list[Tunable]
+
+
+class RunTuned(Message):
+    """From this instant (s) on a parameter of a run has this value."""
+
+    kind: Literal["run_tuned"] = "run_tuned"
+    run: str
+    time: float
+    parameter: str
+    value: Any
+
+
+class RunRewound(Message):
+    """A run stands at an earlier instant (s) again: only the first ``count`` samples are still true."""
+
+    kind: Literal["run_rewound"] = "run_rewound"
+    run: str
+    time: float
+    count: int
 
 
 class RunProgress(Message):
-    """Where a run stands."""
+    """Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that."""
 
     kind: Literal["run_progress"] = "run_progress"
     run: str
@@ -388,11 +434,13 @@ class RunProgress(Message):
     real_time_factor: float
     message: str
     fault: Fault | None = None
+    solver: str = ""
+    reason: str = ""
 
 
-Event = Annotated[
-    Reply | Welcome | Opened | Changed | Checked | RunStarted | RunProgress, Field(discriminator="kind")
-]
+RunEvent = Annotated[RunStarted | RunTuned | RunRewound | RunProgress, Field(discriminator="kind")]
+"""What the process of a run has to say, besides its samples."""
+Event = Annotated[Reply | Welcome | Opened | Changed | Checked | RunEvent, Field(discriminator="kind")]
 
 
 class ServerMessage(Message):

@@ -66,6 +66,11 @@ def number_value(text: str, where: str) -> float | list[Any]:
     return array.reshape(-1).tolist() if 1 in array.shape else array.tolist()
 
 
+def tuned_value(typed: Any, where: str) -> Any:
+    """The number or array that a page tries for a parameter: typed as text, or numbers already."""
+    return number_value(typed, where) if isinstance(typed, str) else _with_infinities(typed)
+
+
 def parameter_json(value: Any) -> Any:
     """A checked value as the page gets it: infinities as text, robots, tables and functions by name."""
     if isinstance(value, Robot):

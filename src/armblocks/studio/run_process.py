@@ -21,7 +21,7 @@ from armblocks.studio import messages as say
 from armblocks.studio.run_worker import work
 
 TellRun = Callable[[say.Message | bytes], Awaitable[None]]
-_EVENTS: TypeAdapter[say.RunStarted | say.RunProgress] = TypeAdapter(say.RunStarted | say.RunProgress)
+_EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(say.RunEvent)
 STOP_SECONDS = 1.0
 """A worker that has not stopped by itself after this long is ended."""
 ENDED = ("done", "stopped", "failed")
@@ -62,7 +62,7 @@ class RunProcess:
         Thread(target=self._read, args=(self._worker.pipe,), daemon=True).start()
         self._passing = self._loop.create_task(self._pass_on())
 
-    def obey(self, request: say.Control | say.SetSpeed | say.Tune) -> None:
+    def obey(self, request: say.Control | say.SetSpeed | say.Rewind | say.Tune) -> None:
         """Pass a command on to the worker; raises ``InputError`` where the run has ended."""
         if self.state in ENDED:
             raise InputError("the run has ended", where="run", fix="start the model again")

@@ -1,8 +1,9 @@
 """The process that runs one model: started ahead of time, given one job, gone when the run has ended.
 
 A job is JSON: ``diagram`` (a canonical document), ``folder`` (for the robot files that it names), ``run``
-and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fast as possible). Commands
-arrive as the requests of :mod:`armblocks.studio.messages`; between two pieces of the run they are obeyed.
+and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fast as possible), ``tuned``
+(values of tunable parameters that are tried). Commands arrive as the requests of
+:mod:`armblocks.studio.messages`; between two pieces of the run they are obeyed.
 """
 
 from __future__ import annotations
@@ -18,18 +19,22 @@ from time import perf_counter, sleep
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram, diagram_views
+from armblocks.diagram import diagram_views
 from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.face.diagram_run import DiagramRun
 from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
 from armblocks.studio import messages as say
 from armblocks.studio.frames import sample_frame
-from armblocks.studio.parameter_values import number_value
+from armblocks.studio.parameter_values import tuned_value
+from armblocks.studio.run_history import RunHistory
+from armblocks.studio.tunables import tunables
 
+Array = NDArray[np.float64]
 FRAME_SECONDS = 1 / 60
 MOST_MEMORY = 8 * 2**30
 """Bytes of address space of a worker."""
@@ -63,9 +68,11 @@ class _Run:
         self.speed: float | None = job["speed"]
         self.folder = Path(job["folder"])
         self.source: str = job["diagram"]
+        self.tuned: dict[str, Any] = job["tuned"]
         self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
         self.time = 0.0
         self.count = 0
+        self.times: Array = np.empty(0)
         self.began = perf_counter()
         self.paced_from = (0.0, self.began)
 
@@ -86,33 +93,37 @@ class _Run:
         diagram = formats.diagram_from_bytes(
             self.source.encode(), "model", BLOCKS, formats.load_robot, folder=self.folder
         )
-        run = CompiledDiagram(diagram).begin()
-        self._tell_start(diagram, run)
+        history = RunHistory(CompiledDiagram(diagram))
+        for path, value in self.tuned.items():
+            history.tune(path, tuned_value(value, path))
+        self._tell_start(history.run)
         while True:
-            self._advance(run)
-            self._send_samples(run)
-            if run.finished:
-                self._end("done", run.result().run.message)
+            self._advance(history)
+            self._send_samples(history)
+            if history.run.finished:
+                report = history.run.result().run
+                self._end("done", report.message, report.solver, report.reason)
                 return
             self._progress()
-            if not self._listen(run):
+            if not self._listen(history):
                 self._end("stopped", f"stopped at {self.time:g} s")
                 return
 
-    def _advance(self, run: DiagramRun) -> None:
+    def _advance(self, history: RunHistory) -> None:
         """Go on for one frame: one instant while paused, as far as the clock says, or as far as it gets."""
+        run = history.run
         if self.state == "paused":
-            recorded = run.recorded
-            while run.recorded == recorded and not run.finished:
-                run.advance(steps=1)
-        elif self.speed is None:
+            history.step()
+            return
+        history.mark()
+        if self.speed is None:
             run.advance(wall_time=FRAME_SECONDS)
         else:
             from_time, from_clock = self.paced_from
             due = from_time + self.speed * (perf_counter() - from_clock)
             run.advance(max(due, np.nextafter(run.time, np.inf)), wall_time=FRAME_SECONDS)
 
-    def _listen(self, run: DiagramRun) -> bool:
+    def _listen(self, history: RunHistory) -> bool:
         """Obey what has been said, wait while paused or ahead of the clock; ``False`` to stop."""
         while True:
             wait = 0.0
@@ -129,34 +140,51 @@ class _Run:
                 case "control", "stop":
                     return False
                 case "control", "pause":
-                    self.state = "paused"
-                    self._progress()
+                    self._become("paused")
                 case "control", "resume":
-                    self.state = "running"
-                    self.paced_from = (self.time, perf_counter())
-                    self._progress()
+                    self._become("running")
                 case "control", "step":
                     return True
+                case "control", "back":
+                    self._go_back(history, history.recorded - 1)
+                case "rewind", _:
+                    self._go_back(history, int(np.searchsorted(self.times, float(command["time"]), "right")))
                 case "speed", _:
                     self.speed = command["speed"]
                     self.paced_from = (self.time, perf_counter())
                 case _:
-                    self._tune(run, command["parameter"], command["value"])
+                    self._tune(history, command["parameter"], command["value"])
 
-    def _tune(self, run: DiagramRun, parameter: str, value: Any) -> None:
+    def _become(self, state: Literal["running", "paused"]) -> None:
+        self.state = state
+        self.paced_from = (self.time, perf_counter())
+        self._progress()
+
+    def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
         """Change a parameter from here on; a refusal is told and the run goes on."""
         try:
-            run.set(parameter, number_value(value, parameter) if isinstance(value, str) else value)
+            history.tune(parameter, tuned_value(value, parameter))
         except ArmblocksError as error:
             self._progress(error.what, _fault(error))
+        else:
+            self.tuned[parameter] = value
+            self._tell(say.RunTuned(run=self.key, time=self.time, parameter=parameter, value=value))
+
+    def _go_back(self, history: RunHistory, recorded: int) -> None:
+        """Stand where at most so many instants are recorded; what is tuned holds from there on."""
+        history.back_to(max(recorded, 1))
+        self.count, self.time = history.recorded, history.run.time
+        self.times = self.times[: self.count]
+        self._tell(say.RunRewound(run=self.key, time=self.time, count=self.count))
+        self._become("paused")
 
     # -- what the hub is told --------------------------------------------------------------------------------
 
     def _tell(self, event: say.Message) -> None:
         self.pipe.send_bytes(b"J" + event.model_dump_json().encode())
 
-    def _tell_start(self, diagram: Diagram, run: DiagramRun) -> None:
-        compiled = run.simulation.compiled
+    def _tell_start(self, run: DiagramRun) -> None:
+        compiled, diagram = run.simulation.compiled, run.diagram
         self._tell(
             say.RunStarted(
                 document=self.document,
@@ -177,16 +205,17 @@ class _Run:
                     for name, view in diagram_views(diagram)
                 ],
                 aliases=dict(compiled.aliases),
-                tunables=list(compiled.parameters.names),
+                tunables=tunables(diagram),
             )
         )
 
-    def _send_samples(self, run: DiagramRun) -> None:
-        fresh = run.simulation.samples(self.count)
+    def _send_samples(self, history: RunHistory) -> None:
+        fresh = history.samples(self.count)
         if fresh.time.size:
             self.pipe.send_bytes(b"S" + sample_frame(self.key, fresh.begin, fresh.time, fresh.signals))
             self.count = fresh.end
-        self.time = run.time
+            self.times = np.concatenate([self.times, fresh.time])
+        self.time = history.run.time
 
     def _send_rest(self, partial: object) -> None:
         """What is good of a run that failed."""
@@ -195,7 +224,9 @@ class _Run:
             self.pipe.send_bytes(b"S" + sample_frame(self.key, self.count, time, signals))
             self.time = float(partial.time[-1])
 
-    def _progress(self, message: str = "", fault: say.Fault | None = None) -> None:
+    def _progress(
+        self, message: str = "", fault: say.Fault | None = None, solver: str = "", reason: str = ""
+    ) -> None:
         factor = self.time / max(perf_counter() - self.began, 1e-9)
         self._tell(
             say.RunProgress(
@@ -205,12 +236,16 @@ class _Run:
                 real_time_factor=factor,
                 message=message,
                 fault=fault,
+                solver=solver,
+                reason=reason,
             )
         )
 
-    def _end(self, state: Literal["done", "stopped"], message: str) -> None:
+    def _end(
+        self, state: Literal["done", "stopped"], message: str, solver: str = "", reason: str = ""
+    ) -> None:
         self.state = state
-        self._progress(message)
+        self._progress(message, solver=solver, reason=reason)
         # The pipe's end must not overtake what is in it.
         sleep(0.05)
 

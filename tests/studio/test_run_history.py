@@ -1,0 +1,160 @@
+"""A run that goes back and on again is the run that never went back, bit for bit."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armblocks.blocks import BLOCKS
+from armblocks.errors import ArmblocksError
+from armblocks.face.model import CompiledDiagram
+from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
+from armblocks.studio import messages as say
+from armblocks.studio.run_history import RunHistory
+from armblocks.studio.run_process import RunProcess, Worker
+from armblocks.studio.tunables import tunables
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["bouncing_ball", "dc_motor_sampled_pid", "falling_pendulum", "kr180model", "puma560_payload_drop"],
+)
+def test_going_back_changes_nothing_of_what_follows(name: str) -> None:
+    model = CompiledDiagram(load_diagram(name, BLOCKS))
+    whole = model.simulate()
+    history = RunHistory(model)
+    history.run.advance(0.3 * history.run.stop_time)
+    history.mark()
+    for _ in range(5):
+        history.step()
+    before = history.recorded
+    history.back_to(before - 1)
+    assert before - 20 < history.recorded < before, "one step back is one step of the solver at most"
+    history.back_to(before // 2)
+    kept = history.recorded
+    assert 0.8 * before // 2 < kept <= before // 2
+    history.run.advance()
+    rest = history.samples(kept)
+    assert rest.begin == kept
+    np.testing.assert_array_equal(rest.time, whole.time[kept:])
+    np.testing.assert_array_equal(rest.signals, whole.signals[:, kept:])
+
+
+def test_marks_stay_few_and_every_instant_can_still_be_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armblocks.studio.run_history.MOST_BYTES", 20_000)
+    history = RunHistory(CompiledDiagram(load_diagram("falling_pendulum", BLOCKS)))
+    for _ in range(200):
+        history.step()
+    marks = history._marks  # pyright: ignore[reportPrivateUsage]
+    assert len(marks) < 100
+    for wanted in (150, 77, 3):
+        history.back_to(wanted)
+        assert wanted - 5 < history.recorded <= wanted
+
+
+def test_tuned_values_hold_from_where_the_run_returns_to() -> None:
+    model = CompiledDiagram(load_diagram("van_der_pol_pid", BLOCKS))
+    history = RunHistory(model)
+    history.run.advance(2.0)
+    history.mark()
+    count, state = history.recorded, history.run.state()
+    history.run.advance(4.0)
+    history.tune("PID.P", 7.0)
+    history.run.advance(5.0)
+    history.back_to(count)
+    assert history.recorded == count
+    assert history.run.parameters["PID.P"] == 7.0
+    history.run.advance()
+    other = model.simulate(parameters={"PID.P": 7.0}, initial_state=state)
+    np.testing.assert_array_equal(history.samples(count).time, other.time[1:])
+    np.testing.assert_allclose(history.samples(count).signals, other.signals[:, 1:], rtol=1e-9, atol=1e-12)
+
+
+def test_what_can_be_tuned_is_listed_with_its_bounds() -> None:
+    found = {tunable.path: tunable for tunable in tunables(load_diagram("van_der_pol_pid", BLOCKS))}
+    assert "PID.P" in found
+    block = load_diagram("van_der_pol_pid", BLOCKS).block("PID")
+    assert found["PID.P"].value == block.parameter_value("P")
+    assert all(tunable.doc for tunable in found.values())
+
+
+class Listener:
+    """Everything that a run tells, with the samples of its frames put where they belong."""
+
+    def __init__(self) -> None:
+        self.events: list[Any] = []
+        self.times: list[float] = []
+        self.news = asyncio.Event()
+
+    async def tell(self, event: say.Message | bytes) -> None:
+        if isinstance(event, bytes):
+            length = struct.unpack("<I", event[:4])[0]
+            header = json.loads(event[4 : 4 + length])
+            numbers = np.frombuffer(event, "<f8", offset=4 + length)
+            assert header["first"] == len(self.times), "no sample is lost and none comes twice"
+            self.times += numbers[: header["count"]].tolist()
+        else:
+            self.events.append(event)
+            if isinstance(event, say.RunRewound):
+                del self.times[event.count :]
+        self.news.set()
+
+    async def until(self, kind: type, fits: Callable[[Any], bool] = lambda _: True) -> Any:
+        async def waiting() -> Any:
+            while True:
+                for event in self.events:
+                    if isinstance(event, kind) and fits(event):
+                        return event
+                self.news.clear()
+                await self.news.wait()
+
+        try:
+            return await asyncio.wait_for(waiting(), 20)
+        except TimeoutError:
+            raise AssertionError(f"no such {kind} among {self.events}") from None
+
+
+def test_a_run_is_tuned_taken_back_and_finished_in_its_own_process() -> None:
+    async def going() -> None:
+        heard = Listener()
+        run = RunProcess("r", "d", Worker(), heard.tell)
+        source = diagram_to_bytes(load_diagram("van_der_pol_pid", BLOCKS), load_robot).decode()
+        run.start({"diagram": source, "folder": ".", "speed": 5.0, "tuned": {"PID.I": "1/2"}})
+        begun = await heard.until(say.RunStarted)
+        assert {t.path: t.value for t in begun.tunables}["PID.I"] == 0.5, (
+            "what is tried counts from the start"
+        )
+        while len(heard.times) < 100:
+            await asyncio.sleep(0.02)
+        run.obey(say.Control(run="r", action="pause"))
+        await heard.until(say.RunProgress, lambda event: event.state == "paused")
+        await asyncio.sleep(0.1)
+        reached = len(heard.times)
+        run.obey(say.Tune(run="r", parameter="PID.P", value="2*3"))
+        assert (await heard.until(say.RunTuned)).parameter == "PID.P"
+        run.obey(say.Tune(run="r", parameter="PID.P", value="six"))
+        assert "six" in (await heard.until(say.RunProgress, lambda event: event.fault)).message
+        run.obey(say.Control(run="r", action="back"))
+        assert (await heard.until(say.RunRewound)).count < reached
+        heard.events.clear()
+        run.obey(say.Rewind(run="r", time=0.5))
+        rewound = await heard.until(say.RunRewound)
+        assert heard.times[-1] <= 0.5
+        assert rewound.count == len(heard.times)
+        run.obey(say.SetSpeed(run="r", speed=None))
+        run.obey(say.Control(run="r", action="resume"))
+        end = await heard.until(say.RunProgress, lambda event: event.state == "done")
+        assert end.solver
+        assert "auto" in end.reason
+        assert np.all(np.diff(heard.times) > 0)
+        with pytest.raises(ArmblocksError, match="the run has ended"):
+            run.obey(say.Control(run="r", action="back"))
+        run.end()
+
+    asyncio.run(going())
