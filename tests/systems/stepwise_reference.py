@@ -129,7 +129,7 @@ class Reference:
                 (self.z,) = self.call("update", t, self.x, ticks[instant])
             if instant == 0:
                 for _ in range(self.directions.size + 1):  # a mode may depend on another one
-                    _, self.z = self.call("reset", t, self.x, np.zeros(self.directions.size))
+                    self.x, self.z = self.call("reset", t, self.x, np.zeros(self.directions.size))
                 self.note_signs(t)
             else:
                 self.handle_events(t)

@@ -259,7 +259,8 @@ def ball(builder: DiagramBuilder, restitution: float, height: float) -> BlockHan
     """A falling ball that keeps ``restitution`` of its speed at each impact."""
     g = builder.add("g", Constant(value=-9.81))
     speed = builder.add(
-        "speed", ResettableIntegrator(external_reset="falling", initial_condition_source="external")
+        "speed",
+        ResettableIntegrator(external_reset="falling", initial_condition_source="external at resets"),
     )
     builder.connect(g, speed["u"])
     builder.connect(builder.add("bounce", Gain(gain=-restitution), speed), speed["initial"])

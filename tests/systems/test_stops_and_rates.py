@@ -24,6 +24,7 @@ from armblocks.blocks import (
     JKFlipFlop,
     MinMaxRunningResettable,
     RateLimiterContinuous,
+    RateLimiterDynamic,
     SaturationDynamic,
     SecondOrderIntegrator,
     SecondOrderIntegratorLimited,
@@ -214,6 +215,40 @@ def test_a_jump_becomes_a_ramp(run: Run) -> None:
     builder.add("limited", RateLimiterContinuous(rising=2.0), builder.add("u", Step(time=1.0, final=3.0)))
     found = run(builder.build(), 4.0)
     close(found["limited/y"], np.clip(2.0 * (found["t"] - 1.0), 0.0, 3.0), 1e-9)
+
+
+def test_limits_that_stand_still_limit_as_the_parameters_do(run: Run) -> None:
+    builder = DiagramBuilder("d")
+    u = builder.add("u", SineWave())
+    builder.add("fixed", RateLimiterContinuous(rising=0.5, falling=-0.3), u)
+    rising, falling = builder.add("r", Constant(value=0.5)), builder.add("f", Constant(value=-0.3))
+    builder.add("moving", RateLimiterDynamic(), rising, u, falling)
+    found = run(builder.build(), 6.0)
+    close(found["moving/y"], found["fixed/y"], 1e-9)
+
+
+def test_a_limit_that_falls_below_the_rate_takes_hold(run: Run) -> None:
+    """u = t, limit 2 - t: followed until t = 1, then y' = 2 - t."""
+    builder = DiagramBuilder("d")
+    rising = builder.add(
+        "rising", Sum(signs="+-"), builder.add("two", Constant(value=2.0)), builder.add("t", Clock())
+    )
+    builder.add(
+        "y", RateLimiterDynamic(), rising, builder.add("u", Clock()), builder.add("f", Constant(value=-1.0))
+    )
+    found = run(builder.build(), 2.5)
+    t = found["t"]
+    close(found["y/y"], np.where(t < 1.0, t, 1.0 + (0.5 - (2.0 - t) ** 2 / 2)), 1e-8)
+
+
+def test_a_jump_follows_a_limit_that_grows(run: Run) -> None:
+    """After a jump by 2 at 1 s with the limit t: t^2/2 - 1/2 = 2, met at sqrt(5) s."""
+    builder = DiagramBuilder("d")
+    jump, clock = builder.add("u", Step(time=1.0, final=2.0)), builder.add("t", Clock())
+    builder.add("y", RateLimiterDynamic(), clock, jump, builder.add("f", Constant(value=-1.0)))
+    found = run(builder.build(), 4.0)
+    t = found["t"]
+    close(found["y/y"], np.select([t < 1.0, t < math.sqrt(5.0)], [0.0 * t, (t**2 - 1.0) / 2], 2.0), 1e-8)
 
 
 # -- sampled logic -----------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from armblocks.blocks import (
     constraints,
     continuous,
     delays,
+    descriptor,
     discontinuities,
     discrete,
     discrete_filters,
@@ -36,6 +37,7 @@ from armblocks.blocks import (
     pid,
     poses,
     python_function,
+    rate_limits,
     reductions,
     repeating,
     robots,
@@ -70,7 +72,16 @@ from armblocks.blocks.arm_plant import ArmPlant
 from armblocks.blocks.branching import If, SwitchCase
 from armblocks.blocks.constraints import AlgebraicConstraint
 from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
-from armblocks.blocks.delays import Delay, Memory, RateTransition, TappedDelay, UnitDelay, ZeroOrderHold
+from armblocks.blocks.delays import (
+    Delay,
+    Memory,
+    RateTransition,
+    ResettableDelay,
+    TappedDelay,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.blocks.descriptor import DescriptorStateSpace
 from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
 from armblocks.blocks.discrete import (
     CounterLimited,
@@ -91,7 +102,6 @@ from armblocks.blocks.dry_friction import Backlash, CoulombFriction, StickSlipFr
 from armblocks.blocks.dynamic_limits import (
     DeadZoneDynamic,
     HitCrossing,
-    RateLimiterContinuous,
     SaturationDynamic,
     WrapToZero,
 )
@@ -206,6 +216,7 @@ from armblocks.blocks.poses import (
     TransformTwist,
 )
 from armblocks.blocks.python_function import PythonFunction
+from armblocks.blocks.rate_limits import RateLimiterContinuous, RateLimiterDynamic
 from armblocks.blocks.reductions import (
     CumulativeSum,
     DotProduct,
@@ -273,6 +284,7 @@ BLOCKS = BlockLibrary(
         sources,
         maths,
         continuous,
+        descriptor,
         limited_integrators,
         zero_poles,
         lags,
@@ -317,6 +329,7 @@ BLOCKS = BlockLibrary(
         transport,
         periodic,
         dynamic_limits,
+        rate_limits,
         edges,
     )
     for kind in _defined_in(family)
@@ -370,6 +383,7 @@ __all__ = [
     "Delta2Tr",
     "Demux",
     "Derivative",
+    "DescriptorStateSpace",
     "Determinant",
     "DiagonalMatrix",
     "Difference",
@@ -480,12 +494,14 @@ __all__ = [
     "RandomNumber",
     "RateLimiter",
     "RateLimiterContinuous",
+    "RateLimiterDynamic",
     "RateTransition",
     "RelationalOperator",
     "Relay",
     "RepeatingSequence",
     "RepeatingSequenceInterpolated",
     "RepeatingSequenceStair",
+    "ResettableDelay",
     "ResettableIntegrator",
     "ResettableSubsystem",
     "Reshape",

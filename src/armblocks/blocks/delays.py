@@ -9,9 +9,17 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, vertcat
+from casadi import SX, if_else, logic_or, repmat, vertcat
 from numpy.typing import ArrayLike
 
+from armblocks.blocks.external_resets import (
+    SEEN,
+    external_reset_parameter,
+    fires_at_tick,
+    initial_source_parameter,
+    reset_ports,
+    side_of,
+)
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -26,6 +34,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.equations import Shape
 from armblocks.errors import InputError
 
 INPUT = Port("u", "what is sampled")
@@ -145,9 +154,7 @@ class Delay(Block):
         return (OUTPUT,)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        if len(inputs["u"]) > 1:
-            raise InputError(f"'u' has shape {inputs['u']}", allowed="a scalar or a vector")
-        return {"y": inputs["u"]}
+        return {"y": _a_vector(inputs["u"])}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": ()}
@@ -166,6 +173,108 @@ class Delay(Block):
 
     def initial_outputs(self, p: Signals) -> Signals:
         return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResettableDelay(Block):
+    """A delay that starts anew at a trigger: y(k) = u(k - length), or initial where k - length is before it.
+
+    It is Simulink's Delay with its ports. At the tick of a reset y is the initial value, and all that is on
+    its way becomes that value. With ``enable_port`` the block stands still, y held, at ticks at which the
+    input enable is 0.
+    """
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Resettable Delay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine three ticks late, begun anew from -1 at each rising edge of the pulses.",
+        parameters={"length": 3, "external_reset": "rising", "sample_time": 0.1},
+        inputs={
+            "u": made("SineWave"),
+            "reset": made("PulseGenerator", period=4.0, delay=2.0),
+            "initial": made("Constant", value=-1.0),
+        },
+    )
+    sampled: ClassVar[bool] = True
+
+    length: int = parameter(2, minimum=1, doc="by how many ticks")
+    external_reset: str = external_reset_parameter("level")
+    initial_condition_source: str = initial_source_parameter("external")
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="the first outputs, and those after a reset, where no port says it"
+    )
+    enable_port: bool = parameter(False, doc="whether the block works at ticks only at which enable is not 0")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        enable = Port("enable", "not 0 where the block works", shape=())
+        further = reset_ports(self.external_reset, self.initial_condition_source)
+        return (INPUT, *((enable,) if self.enable_port else ()), *further)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (OUTPUT,)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        wide = {name: shape for name, shape in inputs.items() if name in ("u", "initial")}
+        return {"y": _a_vector(broadcast({**wide, "initial value": shape_of(self.initial)}))}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        past = State("x", (self.length, math.prod(shape)), "the last inputs, the oldest first")
+        held = (State("held", shape, "the output at the tick before"),)
+        return (past, SEEN, *(held if self.enable_port else ()))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        oldest = x["x"][0, :].T
+        fresh = if_else(self._anew(x, u), self._start(u, p) + SX.zeros(*oldest.shape), oldest)
+        return {"y": if_else(u["enable"] != 0.0, fresh, x["held"]) if self.enable_port else fresh}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        past = x["x"]
+        row = SX.zeros(1, past.shape[1])
+        start = repmat(self._start(u, p).T + row, self.length, 1)
+        now = if_else(self._anew(x, u), start, past)
+        after = {"x": vertcat(now[1:, :], u["u"].T + row), "seen": self._side(u)}
+        if not self.enable_port:
+            return after
+        works = u["enable"] != 0.0
+        held = {"held": self.outputs(t, x, u, p)["y"]}
+        return {name: if_else(works, value, x[name]) for name, value in after.items()} | held
+
+    def initial_states(self, p: Signals) -> Signals:
+        many = p["initial"].numel() > 1
+        past = repmat(p["initial"].T, self.length, 1) if many else p["initial"]
+        return {"x": past, "seen": SX(-1.0), **({"held": p["initial"]} if self.enable_port else {})}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+    def _side(self, u: Signals) -> SX:
+        return SX(0.0) if self.external_reset == "none" else side_of(self.external_reset, u["reset"])
+
+    def _start(self, u: Signals, p: Signals) -> SX:
+        return u.get("initial", p["initial"])
+
+    def _anew(self, x: Signals, u: Signals) -> SX:
+        """1 at the first tick where a port says the start value, and where the trigger fires."""
+        first = x["seen"] < 0.0 if self.initial_condition_source == "external" else SX(0.0)
+        if self.external_reset == "none":
+            return first
+        return logic_or(first, fires_at_tick(self.external_reset, u["reset"], x["seen"]))
+
+
+def _a_vector(shape: Shape) -> Shape:
+    """The shape; raises ``InputError`` for a matrix, which a row of the past does not hold."""
+    if len(shape) > 1:
+        raise InputError(
+            f"'u' has shape {shape}",
+            allowed="a scalar or a vector",
+            fix="put a Reshape before the block",
+        )
+    return shape
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,18 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fmax, fmin, if_else
+from casadi import SX, fmax, fmin, if_else, logic_or
 from numpy.typing import ArrayLike
 
+from armblocks.blocks.external_resets import (
+    SEEN,
+    external_reset_parameter,
+    fires_at_tick,
+    initial_source_parameter,
+    reset_ports,
+    side_of,
+)
+from armblocks.blocks.switching import limits_in_order
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -38,6 +47,8 @@ class DiscreteIntegrator(Block):
 
     The output is that of Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler:
     y(k) = x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2.
+    An external reset makes x(k) the initial value at its tick, before anything else; the ``state_port`` gives
+    x(k) as it was before that, so that no loop through it is algebraic.
     """
 
     family: ClassVar[str] = "discrete"
@@ -49,41 +60,82 @@ class DiscreteIntegrator(Block):
 
     method: str = parameter("forward_euler", choices=_METHODS, doc="the rule of integration")
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick")
+    external_reset: str = external_reset_parameter("none")
+    initial_condition_source: str = initial_source_parameter()
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick and at a reset, where no port says it"
+    )
     lower: float = parameter(-math.inf, finite=False, doc="the least value")
     upper: float = parameter(math.inf, finite=False, doc="the greatest value")
+    state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
+    saturation_port: bool = parameter(False, doc="whether an output says at which limit the sum is")
     sample_time: ArrayLike = sample_time_parameter()
 
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the rate"),)
+        return (Port("u", "the rate"), *reset_ports(self.external_reset, self.initial_condition_source))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the sum"),)
+        saturated = Port("saturated", "1 at the upper limit, -1 at the lower, else 0")
+        return (
+            Port("y", "the sum"),
+            *((saturated,) if self.saturation_port else ()),
+            *((Port("state", "the sum before a reset"),) if self.state_port else ()),
+        )
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        own = {"gain": shape_of(self.gain), "initial": shape_of(self.initial)}
-        return {"y": broadcast({**inputs, **own})}
+        wide = {name: shape for name, shape in inputs.items() if name != "reset"}
+        own = {"gain": shape_of(self.gain), "initial value": shape_of(self.initial)}
+        shape = broadcast({**wide, **own})
+        return {port.name: shape for port in self.output_ports()}
 
     def assumed_output_shapes(self) -> Shapes:
-        return {"y": broadcast({"gain": shape_of(self.gain), "initial": shape_of(self.initial)})}
+        return self.output_shapes({})
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the sum"),)
+        x = State("x", self.output_shapes(inputs)["y"], "the sum")
+        return (x, SEEN) if self._has_resets else (x,)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        if self.method == "forward_euler":
-            return {"y": x["x"]}
-        share = 1.0 if self.method == "backward_euler" else 0.5
-        return {"y": self._limited(x["x"] + share * p["gain"] * p["T"] * u["u"], p)}
+        share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[self.method]
+        free = self._begun(x, u, p)
+        if share:
+            free = free + share * p["gain"] * p["T"] * u["u"]
+        y = self._limited(free, p) if share or self._has_resets else free
+        found = {"y": y}
+        if self.saturation_port:
+            found["saturated"] = if_else(y >= p["upper"], 1.0, if_else(y <= p["lower"], -1.0, 0.0))
+        return found | ({"state": x["x"]} if self.state_port else {})
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"x": self._limited(x["x"] + p["gain"] * p["T"] * u["u"], p)}
+        after = {"x": self._limited(self._begun(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
+        if self._has_resets:
+            still = self.external_reset == "none"
+            after["seen"] = SX(0.0) if still else side_of(self.external_reset, u["reset"])
+        return after
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"x": p["initial"]}
+        return {"x": p["initial"], **({"seen": SX(-1.0)} if self._has_resets else {})}
 
     def initial_outputs(self, p: Signals) -> Signals:
-        return {"y": p["initial"]}
+        return {port.name: SX(0.0) for port in self.output_ports()} | {"y": p["initial"]}
+
+    @property
+    def _has_resets(self) -> bool:
+        return self.external_reset != "none" or self.initial_condition_source != "internal"
+
+    def _begun(self, x: Signals, u: Signals, p: Signals) -> SX:
+        """The state at this tick, after a reset."""
+        if not self._has_resets:
+            return x["x"]
+        anew = SX(0.0)
+        if self.external_reset != "none":
+            anew = fires_at_tick(self.external_reset, u["reset"], x["seen"])
+        if self.initial_condition_source == "external":
+            anew = logic_or(anew, x["seen"] < 0.0)
+        return if_else(anew, u.get("initial", p["initial"]), x["x"])
 
     def _limited(self, value: SX, p: Signals) -> SX:
         return fmin(fmax(value, p["lower"]), p["upper"])

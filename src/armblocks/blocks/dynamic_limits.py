@@ -1,4 +1,4 @@
-"""Limits that move, limits on the rate of change, and signals that start again: each switch is an event."""
+"""Limits that move, crossings that are counted, and signals that start again: each switch is an event."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fabs, fmax, if_else, logic_and, logic_or
+from casadi import SX, fabs, if_else
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST, located, zero_crossing_parameter
+from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
     Condition,
@@ -25,9 +25,6 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-
-SMALLEST_JUMP = 1e-6
-"""Of a rate limiter's input, beside its size: a smaller one is passed on."""
 
 
 def _moving_ports() -> tuple[Port, ...]:
@@ -203,99 +200,3 @@ class HitCrossing(Block):
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"count": x["count"] + fabs(e["crosses"]), "last": if_else(e["crosses"] == 0.0, x["last"], t)}
-
-
-@dataclass(frozen=True, kw_only=True)
-class RateLimiterContinuous(Block):
-    """The input, no faster than allowed: y = u while falling <= u' <= rising, else y' is that limit.
-
-    Then y goes on at the limit until it meets u again. Where u jumps, y does not. (The Rate Limiter is the
-    sampled one; Simulink has both in one block, and takes the rate between two steps, not the exact one.)
-    """
-
-    family: ClassVar[str] = "discontinuities"
-    title: ClassVar[str] = "Rate Limiter (continuous)"
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
-    example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine of which the rise is limited to 0.5 a second and the fall to 0.8.",
-        parameters={"rising": 0.5, "falling": -0.8},
-        inputs={"u": made("SineWave")},
-    )
-
-    rising: ArrayLike = parameter(
-        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the fastest rise", unit="1/s"
-    )
-    falling: ArrayLike = parameter(
-        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="the fastest fall, not positive", unit="1/s"
-    )
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the signal"),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        own = {name: shape_of(self.parameter_value(name)) for name in ("rising", "falling", "initial")}
-        return {"y": broadcast({**inputs, **own})}
-
-    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        return {"y": inputs["u"]}
-
-    def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("y", self.output_shapes(inputs)["y"], "the output"),)
-
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        doc = "1 rising at the limit, -1 falling at the limit, 0 following u"
-        return (State("mode", self.output_shapes(inputs)["y"], doc),)
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        shape = self.output_shapes(inputs)["y"]
-        return (
-            Guard("ahead", shape, "u leaves y upwards, or y has met it", 0),
-            Guard("behind", shape, "u leaves y downwards, or y has met it", 0),
-            Guard("fast", shape, "u' - rising", 1),
-            Guard("fast_down", shape, "u' - falling", -1),
-        )
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": if_else(x["mode"] == 0.0, u["u"], x["y"])}
-
-    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        limit = if_else(x["mode"] > 0.0, p["rising"], p["falling"])
-        return {"y": if_else(x["mode"] == 0.0, u["u'"], limit)}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"y": p["initial"]}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        gap = u["u"] - x["y"]
-        # While it follows, y is u but for rounding: what is wider is a jump.
-        band = if_else(x["mode"] == 0.0, SMALLEST_JUMP * fmax(1.0, fabs(u["u"])), 0.0)
-        return {
-            "ahead": gap - band - JUST,
-            "behind": gap + band + JUST,
-            "fast": u["u'"] - p["rising"] - JUST,
-            "fast_down": u["u'"] - p["falling"] + JUST,
-        }
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        gap = u["u"] - x["y"]
-        band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
-        up = logic_or(gap > band, logic_and(gap >= -band, u["u'"] > p["rising"]))
-        down = logic_or(gap < -band, logic_and(gap <= band, u["u'"] < p["falling"]))
-        return {"mode": if_else(up, 1.0, if_else(down, -1.0, 0.0))}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        follows = x["mode"] == 0.0
-        up = logic_and(follows, logic_or(e["ahead"] > 0.0, e["fast"] > 0.0))
-        down = logic_and(follows, logic_or(e["behind"] < 0.0, e["fast_down"] < 0.0))
-        met = logic_or(
-            logic_and(x["mode"] > 0.0, logic_or(e["ahead"] < 0.0, e["behind"] < 0.0)),
-            logic_and(x["mode"] < 0.0, logic_or(e["ahead"] > 0.0, e["behind"] > 0.0)),
-        )
-        # Where it meets u on its way, u may be too fast the other way.
-        after = if_else(u["u'"] > p["rising"], 1.0, if_else(u["u'"] < p["falling"], -1.0, 0.0))
-        mode = if_else(up, 1.0, if_else(down, -1.0, if_else(met, after, x["mode"])))
-        return {"mode": mode, "y": if_else(logic_and(met, mode == 0.0), u["u"], x["y"])}

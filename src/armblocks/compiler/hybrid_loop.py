@@ -288,7 +288,7 @@ class HybridLoop(Loop):
         w.place(on)
 
     def emit_settling(self, time: str) -> None:
-        """At the start, resets without events: modes take the values that the signals ask for.
+        """At the start, resets without events: modes and states take the values that the signals ask for.
 
         A mode may move a signal on which another one depends, so this is repeated until nothing changes, at
         most as often as there are guards.
@@ -310,12 +310,14 @@ class HybridLoop(Loop):
         w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
         same = w.variable("double", number_text(1.0))
 
-        def compare(i: str) -> None:
-            old, new = (self.step.read(where, i) for where in (places.z, places.new_z))
+        def compare(i: str, before: int, after: int) -> None:
+            old, new = (self.step.read(where, i) for where in (before, after))
             w.put(w.select(w.compare("une", old, new), number_text(0.0), w.get(same)), same)
 
         w.put(number_text(1.0), same)
-        w.for_each(self.sizes.discrete, compare)
+        w.for_each(self.n, lambda i: compare(i, places.x, places.new_x))
+        w.for_each(self.sizes.discrete, lambda i: compare(i, places.z, places.new_z))
+        self.copy(places.new_x, places.x, self.n)
         self.copy(places.new_z, places.z, self.sizes.discrete)
         left = w.word_op("sub", w.get(place, "i64"), "1")
         w.put(left, place, "i64")

@@ -1,0 +1,123 @@
+"""Linear systems with algebraic equations, against closed forms and SciPy's generalised eigenvalues."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+import armblocks as ab
+from armblocks.blocks import DescriptorStateSpace, Gain, SineWave, StateSpace, Step, Sum
+from armblocks.diagram import Block, Diagram, DiagramBuilder
+from armblocks.errors import InputError
+
+SOLVERS = pytest.mark.parametrize("solver", [{"solver": "rk45"}, {"solver": "rk4", "step": 0.01}], ids=str)
+TOLERANCES: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-12, "stop_time": 3.0, "sample_time": 0.05}
+
+
+def diagram(block: Block, source: Block) -> Diagram:
+    builder = DiagramBuilder("d")
+    builder.add("block", block, builder.add("source", source))
+    return builder.build()
+
+
+@SOLVERS
+def test_a_circuit_with_the_current_as_an_unknown(solver: dict[str, Any]) -> None:
+    """RC = 0.5 s: C v' = i, 0 = u - v - R i; v = 1 - exp(-2 t) after a step, and i = (1 - v) / R."""
+    R, C = 0.25, 2.0
+    block = DescriptorStateSpace(
+        E=((C, 0.0), (0.0, 0.0)),
+        A=((0.0, 1.0), (-1.0, -R)),
+        B=((0.0,), (1.0,)),
+        C=np.eye(2),
+        D=np.zeros((2, 1)),
+    )
+    result = ab.simulate(diagram(block, Step(time=0.0)), **TOLERANCES, **solver)
+    v = -np.expm1(-2.0 * result.time)
+    # RK4 of 0.01: (2 h)^4 / 120 = 1e-9 of the exponential
+    assert result["block/y"] == pytest.approx(np.column_stack([v, (1.0 - v) / R]), abs=4e-9)
+
+
+@SOLVERS
+def test_it_is_the_state_space_where_E_is_regular(solver: dict[str, Any]) -> None:
+    random = np.random.default_rng(3)
+    E, A = random.normal(size=(3, 3)) + 3 * np.eye(3), random.normal(size=(3, 3)) - 3 * np.eye(3)
+    B, C, D = random.normal(size=(3, 2)), random.normal(size=(2, 3)), random.normal(size=(2, 2))
+    start, source = random.normal(size=3), SineWave(amplitude=[1.0, 2.0], frequency=[1.0, 3.0])
+    found = ab.simulate(
+        diagram(DescriptorStateSpace(E=E, A=A, B=B, C=C, D=D, initial=start), source), **TOLERANCES, **solver
+    )
+    plain = StateSpace(A=np.linalg.solve(E, A), B=np.linalg.solve(E, B), C=C, D=D, initial=start)
+    expected = ab.simulate(diagram(plain, source), **TOLERANCES, **solver)
+    assert found["block/y"] == pytest.approx(expected["block/y"], abs=1e-12)
+
+
+def test_its_poles_are_the_finite_generalised_eigenvalues() -> None:
+    """Of a random pencil with E of rank 3 of 5; and the gain at rest is C (-A)^-1 B + D."""
+    random = np.random.default_rng(5)
+    E = random.normal(size=(5, 3)) @ random.normal(size=(3, 5))
+    A, B, C, D = (random.normal(size=size) for size in ((5, 5), (5, 1), (1, 5), (1, 1)))
+    block = DescriptorStateSpace(E=E, A=A, B=B, C=C, D=D)
+    linear = ab.linearize(diagram(block, Step()), inputs="source.final", outputs="block/y", at=2.0)
+    values = scipy.linalg.eigvals(A, E)
+    finite = values[np.abs(values) < 1e8]
+    assert len(finite) == 3
+    assert np.sort_complex(linear.poles()) == pytest.approx(np.sort_complex(finite), rel=1e-8)
+    assert linear.dcgain() == pytest.approx(C @ np.linalg.solve(-A, B) + D, rel=1e-9)
+
+
+def test_the_start_keeps_what_is_differentiated_and_the_rest_follows() -> None:
+    """x1' = -x1, 0 = x2 - 2 x1: of the start (3, 100) only x1 counts."""
+    block = DescriptorStateSpace(
+        E=((1.0, 0.0), (0.0, 0.0)),
+        A=((-1.0, 0.0), (-2.0, 1.0)),
+        B=np.zeros((2, 1)),
+        C=np.eye(2),
+        D=np.zeros((2, 1)),
+        initial=(3.0, 100.0),
+    )
+    result = ab.simulate(diagram(block, Step()), **TOLERANCES)
+    course = 3.0 * np.exp(-result.time)
+    assert result["block/y"] == pytest.approx(np.column_stack([course, 2.0 * course]), abs=1e-9)
+
+
+def test_nothing_but_algebra_is_a_gain() -> None:
+    """E = 0: 0 = A x + B u."""
+    block = DescriptorStateSpace(
+        E=np.zeros((2, 2)), A=((2.0, 0.0), (0.0, 4.0)), B=((1.0,), (1.0,)), C=np.eye(2), D=np.zeros((2, 1))
+    )
+    result = ab.simulate(diagram(block, SineWave()), stop_time=1.0, sample_time=0.1)
+    assert result["block/y"] == pytest.approx(np.outer(np.sin(result.time), [-0.5, -0.25]), abs=1e-15)
+
+
+def test_what_does_not_feed_through_may_stand_in_a_loop() -> None:
+    """E is singular, but y = x1 alone: y' = -y + (u - y), which is (1 - exp(-2 t)) / 2."""
+    builder = DiagramBuilder("d")
+    block = DescriptorStateSpace(
+        E=((0.0, 2.0), (0.0, 0.0)),
+        A=((0.0, -2.0), (1.0, 0.0)),
+        B=((2.0,), (1.0,)),
+        C=((0.0, 1.0),),
+        D=((0.0,),),
+    )
+    plant = builder.add("plant", block)
+    error = builder.add("error", Sum(signs="+-"))
+    builder.connect(builder.add("u", Step(time=0.0)), error["u1"])
+    builder.connect(builder.add("unity", Gain(gain=[1.0]), plant), error["u2"])
+    builder.connect(error, plant["u"])
+    result = ab.simulate(builder.build(), **TOLERANCES)
+    assert np.ravel(result["plant/y"]) == pytest.approx(-np.expm1(-2.0 * result.time) / 2.0, abs=1e-9)
+
+
+def test_equations_that_do_not_decide_the_rest_are_refused() -> None:
+    """Index 2: x1' = x2, 0 = x1 - u."""
+    shapes = {"B": ((0.0,), (-1.0,)), "C": ((1.0, 0.0),), "D": ((0.0,),)}
+    E = ((1.0, 0.0), (0.0, 0.0))
+    with pytest.raises(InputError, match=r"E has rank 1 of 2, and its 1 algebraic equations do not decide"):
+        DescriptorStateSpace(E=E, A=((0.0, 1.0), (1.0, 0.0)), **shapes)
+    with pytest.raises(InputError, match=r"E is \(2, 2\), A is \(2, 2\), B is \(1, 1\).*make the five"):
+        DescriptorStateSpace(E=E, A=np.eye(2), B=((1.0,),), C=((1.0, 0.0),), D=((0.0,),))
+    with pytest.raises(InputError, match=r"DescriptorStateSpace.initial: initial has shape \(3,\)"):
+        DescriptorStateSpace(E=E, A=np.eye(2), **shapes, initial=(1.0, 2.0, 3.0))
