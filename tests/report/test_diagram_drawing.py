@@ -31,10 +31,18 @@ from armblocks.blocks import (
 from armblocks.diagram import Block, Diagram, DiagramBuilder, PortRef
 from armblocks.face.block_examples import example_block
 from armblocks.report.block_faces import face_size
-from armblocks.report.diagram_drawing import _nets, _obstacle, block_picture, diagram_picture, diagram_svg
-from armblocks.report.diagram_layout import boxes
-from armblocks.report.face_symbols import CURVES, TEXTS
-from armblocks.report.picture import Curve, text_marks
+from armblocks.report.diagram_drawing import (
+    _nets,
+    _obstacle,
+    block_marks,
+    block_picture,
+    diagram_picture,
+    diagram_svg,
+)
+from armblocks.report.diagram_layout import boxes, sized_box
+from armblocks.report.face_symbols import SIGNS
+from armblocks.report.picture import Curve, Picture, text_marks
+from armblocks.report.text_width import text_width
 from armblocks.report.wire_routing import Net, Obstacle, RoutedNet, WireEnd, route
 
 EXAMPLES = ("kr180model", "falling_pendulum", "puma560_computed_torque", "van_der_pol_pid")
@@ -187,8 +195,29 @@ def test_a_block_alone_is_drawn_within_its_picture(kind: type[Block]) -> None:
         assert 0 <= mark.y <= picture.height
 
 
-def test_signs_and_curves_stand_for_blocks_that_exist() -> None:
-    assert {*CURVES, *TEXTS} <= set(BLOCKS)
+@pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+def test_a_face_is_read_whole(kind: type[Block]) -> None:
+    """No text is cut, too small, beside the block, or over another one."""
+    block = example_block(kind)
+    box = sized_box("", block)
+    faces = [(block, box), (block, dataclasses.replace(box, flipped=True))]
+    for _, drawn in faces[:1] if isinstance(block, Display) else faces:
+        texts = text_marks(Picture(width=0, height=0, title="", marks=block_marks(drawn)))
+        places: list[tuple[float, float, float, float]] = []
+        for mark in texts:
+            assert mark.size >= 8.0, mark.text
+            assert "…" not in mark.text or isinstance(block, Display)
+            wide = text_width(mark.text, mark.size, mono=mark.mono)
+            left = mark.x - {"start": 0.0, "middle": 0.5, "end": 1.0}[mark.anchor] * wide
+            assert box.x - 0.5 <= left and left + wide <= box.x + box.width + 0.5, mark.text
+            assert box.y <= mark.y - 0.6 * mark.size and mark.y <= box.y + box.height, mark.text
+            places.append((left + 0.5, left + wide - 0.5, mark.y - 0.6 * mark.size, mark.y))
+        for (a, b, c, d), (e, f, g, h) in itertools.combinations(places, 2):
+            assert b <= e or f <= a or d <= g or h <= c, [mark.text for mark in texts]
+
+
+def test_signs_stand_for_blocks_that_exist() -> None:
+    assert set(SIGNS) <= set(BLOCKS)
 
 
 def test_a_run_shows_on_the_sinks_faces() -> None:

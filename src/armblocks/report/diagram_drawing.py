@@ -22,9 +22,11 @@ from armblocks.diagram import (
 )
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.report import block_faces
-from armblocks.report.block_faces import FaceShape, Room, Trend
+from armblocks.report.block_faces import FaceShape
 from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes, sized_box
+from armblocks.report.face_marks import Room
 from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text
+from armblocks.report.sink_faces import Trend
 from armblocks.report.style import Theme, Tone
 from armblocks.report.svg import svg_file
 from armblocks.report.text_width import shorten, text_width
@@ -84,18 +86,22 @@ def block_picture(block: Block) -> Picture:
     box = sized_box("", block)
     marks: list[Mark] = []
     for spot in (*box.inputs, *box.outputs):
-        outside = (spot.x + _STUB * (-1 if spot in box.inputs else 1) * abs(spot.dx), spot.y)
-        path = (outside, (spot.x, spot.y)) if spot in box.inputs else ((spot.x, spot.y), outside)
-        marks.append(Curve(_rounded((path[0], path[1])), stroke=Tone.WIRE, width=1.2))
-        if spot in box.inputs:
+        enters = spot in box.inputs
+        reach = -_STUB if enters else _STUB
+        port, outside = (spot.x, spot.y), (spot.x + reach * spot.dx, spot.y + reach * spot.dy)
+        path = (outside, port) if enters else (port, outside)
+        marks.append(Curve(_rounded(path), stroke=Tone.WIRE, width=1.2))
+        if enters:
             marks.append(_arrow_head(path))
     marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
+    above, below = (any(spot.dy == way for spot in box.inputs) for way in (1, -1))
     picture = Picture(
         width=box.width + 2 * (_STUB + 2),
-        height=box.height + 8,
+        height=box.height + 8 + _STUB * (above + below),
         title=f"Symbol of {block.title}",
     )
-    picture.place(Picture(width=0, height=0, title="", marks=marks), _STUB + 2 - box.x, 4 - box.y)
+    drawn = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(drawn, _STUB + 2 - box.x, 4 + _STUB * above - box.y)
     return picture
 
 
@@ -145,17 +151,20 @@ def _trend(path: str, view: View | None, result: SimulationResult | None) -> Tre
 
 def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
     """A block without its name: outline, port names and face, where its box stands."""
-    shape = _shape(box)
-    marks: list[Mark] = [block_faces.outline(shape, box.x, box.y, box.width, box.height, box.flipped)]
+    shape, block = _shape(box), box.block
+    marks: list[Mark] = [block_faces.outline(block, box.x, box.y, box.width, box.height, box.flipped)]
     room = Room(box.x, box.y, box.width, box.height)
-    if shape is FaceShape.CARD:
+    if shape in (FaceShape.CARD, FaceShape.BUS):
         names, room = _port_names(box)
         marks += names
     elif shape is FaceShape.CIRCLE:
         marks += _signs(box)
-    if shape is not FaceShape.BAR:
-        marks += block_faces.face(box.block, room, trend)
-    return marks
+    if shape is FaceShape.BAR:
+        return marks
+    heights = tuple(spot.y for spot in box.inputs if spot.dx)
+    tops = tuple((spot.name, spot.x) for spot in box.inputs if not spot.dx)
+    own = block_faces.face_at_ports(block, room, heights, tops, flipped=box.flipped)
+    return marks + (own if own is not None else block_faces.face(block, room, trend, flipped=box.flipped))
 
 
 def _block(box: Box, trend: Trend | None) -> list[Mark]:
@@ -178,10 +187,12 @@ def _port_names(box: Box) -> tuple[list[Mark], Room]:
         (box.inputs, into, "right" if box.flipped else "left"),
         (box.outputs, out, "left" if box.flipped else "right"),
     ):
-        if not labels:
+        if not any(labels):
             continue
         taken[side] = max(text_width(label, PORT_TEXT) for label in labels) + 5
         for spot, label in zip(spots, labels):
+            if not label:
+                continue
             x = box.x + 5 if side == "left" else box.x + box.width - 5
             anchor = "start" if side == "left" else "end"
             marks.append(Text(x, spot.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from armblocks.diagram import Block, Diagram, Placement
-from armblocks.report.block_faces import FaceShape, face_size, port_labels
+from armblocks.diagram import Block, Diagram, Inport, Outport, Placement
+from armblocks.report.block_faces import FaceShape, bus_width, face_size, face_width, port_labels
+from armblocks.report.structure_faces import CONTROL_ROOM, control_ports
 from armblocks.report.text_width import text_width
 
 NAME_SIZE = 11.0
@@ -65,11 +66,24 @@ class Box:
 
 def boxes(diagram: Diagram) -> dict[str, Box]:
     """Every block's box: from the diagram's layout if it names all blocks, else from :func:`layered`."""
+    drawn = drawn_blocks(diagram)
     if not diagram.layout or set(diagram.layout) < set(diagram.blocks):
-        sized = {name: sized_box(name, block) for name, block in diagram.blocks.items()}
-        return _turned(diagram, layered(diagram, sized))
-    placed = {name: standing_box(name, block, diagram.layout[name]) for name, block in diagram.blocks.items()}
+        sized = {name: sized_box(name, block) for name, block in drawn.items()}
+        return _turned(diagram, _straightened(diagram, layered(diagram, sized)))
+    placed = {name: standing_box(name, block, diagram.layout[name]) for name, block in drawn.items()}
     return _turned(diagram, _straightened(diagram, placed))
+
+
+def drawn_blocks(diagram: Diagram) -> dict[str, Block]:
+    """The blocks as they are drawn: ends whose number is not stated show the one that they have."""
+    drawn = dict(diagram.blocks)
+    for kind in (Inport, Outport):
+        found = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
+        found.sort(key=lambda entry: (entry[1].port or len(drawn) + 1, entry[0]))
+        for number, (name, block) in enumerate(found, start=1):
+            if not block.port:
+                drawn[name] = replace(block, port=number)
+    return drawn
 
 
 def standing_box(name: str, block: Block, place: Placement) -> Box:
@@ -294,17 +308,17 @@ def _port_y(spots: Sequence[PortSpot], port: str) -> float:
 def sized_box(name: str, block: Block) -> Box:
     """A box of the size that suits the block, its ports along the edges, at the origin."""
     shape, width, height = face_size(block)
-    inputs, outputs = len(block.input_ports()), len(block.output_ports())
+    inputs, outputs = len(block.input_ports()) - len(control_ports(block)), len(block.output_ports())
     if shape is FaceShape.CARD:
-        labels = [label for side in port_labels(block) for label in side]
-        if labels:
-            widest = [
-                max((text_width(t, PORT_TEXT) for t in side), default=0.0) for side in port_labels(block)
-            ]
-            width = max(width, width * 0.62 + sum(widest) + 12)
-        height = max(height, 20.0 * max(inputs, outputs) + 8)
+        labels = port_labels(block)
+        if any(label for side in labels for label in side):
+            widest = [max((text_width(t, PORT_TEXT) + 5 for t in side if t), default=0.0) for side in labels]
+            width = max(width, face_width(block) + sum(widest) + 4)
+        height = max(height, 20.0 * max(inputs, outputs) + 8 + CONTROL_ROOM * bool(control_ports(block)))
     elif shape is FaceShape.BAR:
         height = max(height, 20.0 * max(inputs, outputs) + 4)
+    elif shape is FaceShape.BUS:
+        width, height = bus_width(block, PORT_TEXT), max(height, 20.0 * max(inputs, outputs) + 4)
     return _with_ports(Box(name=name, block=block, x=0.0, y=0.0, width=float(round(width)), height=height))
 
 
@@ -325,16 +339,23 @@ def _with_ports(box: Box) -> Box:
         return replace(
             box, inputs=tuple(spots), outputs=tuple(PortSpot(n, leave, cy, forwards, 0) for n in out)
         )
-    return replace(
-        box,
-        inputs=tuple(
-            PortSpot(name, entry, box.y + box.height * (k + 1) / (len(into) + 1), forwards, 0)
-            if len(into) < 2
-            else PortSpot(name, entry, box.y + box.height * (k + 0.5) / len(into), forwards, 0)
-            for k, name in enumerate(into)
-        ),
-        outputs=tuple(
-            PortSpot(name, leave, box.y + box.height * (k + 0.5) / len(out), forwards, 0)
-            for k, name in enumerate(out)
-        ),
-    )
+    above = control_ports(box.block)
+    side = [name for name in into if name not in above]
+    top = CONTROL_ROOM if above else 0.0
+    spots = {
+        **_spread(side, entry, box.y + top, box.height - top, forwards),
+        **{
+            name: PortSpot(name, box.x + box.width * (k + 1) / (len(above) + 1), box.y, 0, 1)
+            for k, name in enumerate(above)
+        },
+    }
+    leaving = _spread(out, leave, box.y + top, box.height - top, forwards)
+    return replace(box, inputs=tuple(spots[name] for name in into), outputs=tuple(leaving.values()))
+
+
+def _spread(names: Sequence[str], x: float, y: float, height: float, forwards: int) -> dict[str, PortSpot]:
+    """Ports at equal distances along an edge that begins at y."""
+    return {
+        name: PortSpot(name, x, y + height * (k + 0.5) / len(names), forwards, 0)
+        for k, name in enumerate(names)
+    }
