@@ -74,8 +74,12 @@ def boxes(diagram: Diagram) -> dict[str, Box]:
     return _turned(diagram, _straightened(diagram, placed))
 
 
-def drawn_blocks(diagram: Diagram) -> dict[str, Block]:
+def drawn_blocks(diagram: Diagram) -> Mapping[str, Block]:
     """The blocks as they are drawn: ends whose number is not stated show the one that they have."""
+    return diagram.keep("drawn blocks", lambda: _numbered(diagram))
+
+
+def _numbered(diagram: Diagram) -> dict[str, Block]:
     drawn = dict(diagram.blocks)
     for kind in (Inport, Outport):
         found = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]

@@ -13,7 +13,7 @@ from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.report.block_faces import FaceShape, face_size, port_labels
 from armblocks.report.diagram_drawing import block_marks
-from armblocks.report.diagram_layout import Box, boxes, standing_box
+from armblocks.report.diagram_layout import Box, boxes, drawn_blocks, standing_box
 from armblocks.report.picture import Picture
 from armblocks.report.svg import svg_marks
 from armblocks.studio.edits import DEFAULT_ROBOT, Place, Wire
@@ -51,8 +51,10 @@ def sheet(diagram: Diagram) -> Sheet:
 def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
     """What is other in ``after``. Blocks that are the same objects are not looked at."""
     blocks: dict[str, SheetBlock | None] = {name: None for name in before.blocks if name not in after.blocks}
+    shown, shows = drawn_blocks(before), drawn_blocks(after)
     for name, block in after.blocks.items():
-        if before.blocks.get(name) is not block or before.layout.get(name) != after.layout.get(name):
+        same = before.blocks.get(name) is block and (shown[name] is shows[name] or shown[name] == shows[name])
+        if not same or before.layout.get(name) != after.layout.get(name):
             blocks[name] = _sheet_block(name, block, after)
     old, new = set(before.connections), set(after.connections)
     return SheetChange(
@@ -110,8 +112,12 @@ def _default(kind: type[Block]) -> Block:
 
 def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     place = diagram.layout[name]
-    drawn = _drawn(block, place.width, place.height, place.flipped)
-    return drawn.model_copy(update={"name": name, "place": Place(**dataclasses.asdict(place))})
+    shown = drawn_blocks(diagram)[name]
+    drawn = _drawn(shown, place.width, place.height, place.flipped)
+    own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
+    if shown is not block:
+        own["parameters"] = _parameters(block)
+    return drawn.model_copy(update=own)
 
 
 @lru_cache(maxsize=4096)
@@ -131,12 +137,16 @@ def _drawn(block: Block, width: float | None, height: float | None, flipped: boo
         inputs=_spots(box, into, inputs=True),
         outputs=_spots(box, out, inputs=False),
         opens=isinstance(block, Subsystem),
-        parameters={
-            rule.name: parameter_json(block.parameter_value(rule.name))
-            for rule in block.parameters()
-            if rule.kind is not ParameterKind.DIAGRAM
-        },
+        parameters=_parameters(block),
     )
+
+
+def _parameters(block: Block) -> dict[str, Any]:
+    return {
+        rule.name: parameter_json(block.parameter_value(rule.name))
+        for rule in block.parameters()
+        if rule.kind is not ParameterKind.DIAGRAM
+    }
 
 
 def _face(box: Box) -> str:
