@@ -59,6 +59,8 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
     package are added to it. ``trace()`` is only called when the cache does not know the key: otherwise there
     is no tracing, no CasADi and no LLVM optimiser. Raises what ``trace`` and :func:`compile_system` raise.
     """
+    if cache.folder() is None:
+        return compile_system(trace())
     name = cache.record_name(f"system {key}")
     stored = cache.load(name)
     if stored is not None:

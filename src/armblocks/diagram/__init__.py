@@ -12,6 +12,7 @@ from armblocks.diagram.conditional import (
     ResettableSubsystem,
     TriggeredSubsystem,
 )
+from armblocks.diagram.content_key import content_key
 from armblocks.diagram.diagram import Connection, Diagram, Placement
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.hierarchy import (
@@ -103,6 +104,7 @@ __all__ = [
     "broadcast",
     "check_block_name",
     "check_diagram",
+    "content_key",
     "diagram_difference",
     "diagram_views",
     "flat_diagram",

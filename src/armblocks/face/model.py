@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint
-from armblocks.compiler.system import CompiledSystem, compile_system
-from armblocks.diagram import Diagram, trace_diagram, with_parameters
+from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
+from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import UnknownNameError
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
@@ -40,8 +40,9 @@ class CompiledDiagram:
 
     @cached_property
     def compiled(self) -> CompiledSystem:
-        """The equations as native code."""
-        return compile_system(self.system)
+        """The equations as native code; nothing is traced that an earlier process has compiled."""
+        key = content_key(self.diagram)
+        return compile_system(self.system) if key is None else recall_system(key, lambda: self.system)
 
     def simulate(
         self,
@@ -106,7 +107,7 @@ def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
 
 def state_at(diagram: Diagram | CompiledDiagram, point: OperatingPoint) -> RunState:
     """The state of a run that stands at an operating point."""
-    system = (diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)).system
+    system = (diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)).compiled
     layouts = (system.states, system.discrete, system.algebraic)
     parts = (point.states, point.discrete, point.algebraic)
     states, discrete, algebraic = (layout.pack(part) for layout, part in zip(layouts, parts))

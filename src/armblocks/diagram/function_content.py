@@ -1,0 +1,140 @@
+"""What a Python function of the user's depends on: its code, and everything outside of it that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from typing import Any, cast
+
+import numpy as np
+
+_PURE_BUILTINS = frozenset(
+    (
+        *(
+            "abs",
+            "all",
+            "any",
+            "divmod",
+            "enumerate",
+            "filter",
+            "isinstance",
+            "len",
+            "map",
+            "max",
+            "min",
+            "pow",
+        ),
+        *("range", "reversed", "round", "slice", "sorted", "sum", "zip"),
+        *("bool", "complex", "dict", "float", "frozenset", "int", "list", "set", "str", "tuple", "type"),
+        *("Exception", "IndexError", "KeyError", "RuntimeError", "TypeError", "ValueError"),
+    )
+)
+_KNOWN_MODULES = ("math", "cmath", "numpy", "casadi", "armblocks")
+"""Modules whose content their versions tell."""
+_READING = frozenset(
+    ("fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap", "open_memmap", "random")
+)
+"""Names in those modules that give what a file holds, or something else each time."""
+
+
+class UnknownContentError(Exception):
+    """What something depends on cannot be known; only :func:`~armblocks.diagram.content_key` sees it."""
+
+
+def function_parts(function: Callable[..., object]) -> list[object]:
+    """Values that change whenever what the function works out might: plain ones, lists, arrays, texts.
+
+    Code, defaults, what it holds of the function around it, and the content of the global names that it uses,
+    functions among them included. Raises ``UnknownContentError`` where the content of a name cannot be known.
+    """
+    return _parts(function, [])
+
+
+def _parts(function: object, above: list[object]) -> list[object]:
+    if any(function is other for other in above):
+        return ["calls itself", next(k for k, other in enumerate(above) if other is function)]
+    module = str(getattr(function, "__module__", None) or "")
+    if _is_known_module(module) and isinstance(
+        function, FunctionType | BuiltinFunctionType | np.ufunc | type
+    ):
+        return ["known", module, getattr(function, "__qualname__", function.__name__)]
+    if isinstance(function, np.ufunc):
+        return ["known", "numpy", function.__name__]
+    if not isinstance(function, FunctionType):
+        raise UnknownContentError(f"{function!r}")
+    above = [*above, function]
+    try:
+        cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    except ValueError:
+        raise UnknownContentError("a variable that has no value yet") from None
+    outside = cast("dict[str, object]", function.__globals__)
+    parts: list[object] = ["code", *_code_parts(function.__code__)]
+    parts += [_value(value, above) for value in function.__defaults__ or ()]
+    parts += [[name, _value(value, above)] for name, value in (function.__kwdefaults__ or {}).items()]
+    parts += [_value(value, above) for value in cells]
+    for name in sorted(_global_names(function.__code__)):
+        if name in outside:
+            parts.append([name, _value(outside[name], above)])
+        elif name not in _PURE_BUILTINS:
+            raise UnknownContentError(name)
+    return parts
+
+
+def _value(value: object, above: list[object]) -> object:
+    """What a name stands for."""
+    if isinstance(value, ModuleType):
+        if not _is_known_module(value.__name__):
+            raise UnknownContentError(value.__name__)
+        return ["module", value.__name__]
+    if isinstance(value, tuple | list):
+        return [_value(entry, above) for entry in cast("tuple[object, ...]", value)]
+    if isinstance(value, dict):
+        entries = cast("dict[object, object]", value)
+        return ["dict", *([_value(key, above), _value(entry, above)] for key, entry in entries.items())]
+    if value is None or isinstance(value, bool | int | float | complex | str | bytes):
+        return value
+    if isinstance(value, np.ndarray | np.generic) and not cast("Any", value).dtype.hasobject:
+        return cast("object", value)
+    return _parts(cast("object", value), above)
+
+
+def _code_parts(code: CodeType) -> list[object]:
+    """The instructions with all that they are read with; names of files and numbers of lines are left out."""
+    constants = [_constant(entry) for entry in code.co_consts]
+    names = [list(part) for part in (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)]
+    counts = [code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags]
+    return [code.co_code, code.co_exceptiontable, *counts, *names, constants]
+
+
+def _constant(entry: object) -> object:
+    if isinstance(entry, CodeType):
+        return _code_parts(entry)
+    if isinstance(entry, tuple | frozenset):
+        parts = [_constant(part) for part in cast("tuple[object, ...]", entry)]
+        return parts if isinstance(entry, tuple) else sorted(map(repr, parts))
+    return "..." if entry is ... else entry
+
+
+def _global_names(code: CodeType) -> set[str]:
+    """Names that are looked up outside of the function.
+
+    Raises ``UnknownContentError`` where it imports a module of its user's or reads files.
+    """
+    import dis  # most diagrams have no function
+
+    found: set[str] = set()
+    for instruction in dis.get_instructions(code):
+        if instruction.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            found.add(str(instruction.argval))
+        elif instruction.opname == "IMPORT_NAME" and not _is_known_module(str(instruction.argval)):
+            raise UnknownContentError(str(instruction.argval))
+    if _READING.intersection(code.co_names):
+        raise UnknownContentError(", ".join(_READING.intersection(code.co_names)))
+    for entry in code.co_consts:
+        if isinstance(entry, CodeType):
+            found |= _global_names(entry)
+    return found
+
+
+def _is_known_module(name: str) -> bool:
+    return name.split(".")[0] in _KNOWN_MODULES

@@ -1,0 +1,259 @@
+"""The key by which the disk cache knows a diagram: it changes with all that equations depend on."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS, Constant, FromFile, Gain, PythonFunction, Scope, Sum
+from armblocks.diagram import (
+    Block,
+    Diagram,
+    Outport,
+    Parameter,
+    ParameterKind,
+    Placement,
+    Subsystem,
+    content_key,
+)
+from armblocks.errors import ArmblocksError
+from armblocks.robot import Robot
+
+
+def line(*blocks: Block) -> Diagram:
+    """Blocks one behind the other, after a constant."""
+    builder = ab.DiagramBuilder("line")
+    last = builder.add("start", Constant(value=1.0))
+    for k, block in enumerate(blocks):
+        last = builder.add(f"b{k}", block, last)
+    builder.add("end", Scope(), last)
+    return builder.build()
+
+
+def key_of(*blocks: Block) -> str:
+    key = content_key(line(*blocks))
+    assert key is not None
+    return key
+
+
+def others(rule: Parameter, value: Any) -> Iterator[object]:
+    """Values that may stand in the place of a parameter's; not each fits each block."""
+    match rule.kind:
+        case ParameterKind.NUMBER | ParameterKind.ARRAY:
+            array = np.asarray(value, dtype=np.float64)
+            finite = np.where(np.isfinite(array), array, 7.0)
+            for changed in (finite * (1 + 2.0**-50), finite + 1.0, finite * 0.5, finite - 1.0, finite * 2.0):
+                yield changed if changed.ndim else float(changed)
+            if array.ndim == 1:
+                yield np.append(finite, finite[-1:] + 1.0)
+        case ParameterKind.INTEGER:
+            yield from (value + 1, value + 2, value - 1, value * 2)
+        case ParameterKind.CHOICE:
+            yield from rule.choices
+        case ParameterKind.STRING:
+            yield from (f"{value}x", f"{value} + 1", f"{value}, more", "other", "u[1]", "++", "-")
+        case ParameterKind.BOOLEAN:
+            yield not value
+        case ParameterKind.ROBOT:
+            robot: Robot = value
+            yield dataclasses.replace(robot, gravity=(0.0, 0.0, -1.6))
+        case ParameterKind.TABLE:
+            rows = np.array(value, dtype=np.float64)
+            rows[-1, -1] += 1e-9
+            yield rows
+        case ParameterKind.FUNCTION:
+            yield by_default
+        case ParameterKind.DIAGRAM:
+            yield line(Gain(gain=7.0))
+
+
+@pytest.mark.parametrize("name", sorted(BLOCKS))
+def test_every_parameter_of_every_block_is_in_the_key(name: str) -> None:
+    diagram = ab.block_example(BLOCKS[name])
+    for place in [place for place, block in diagram.blocks.items() if type(block) is BLOCKS[name]][:1]:
+        block = diagram.blocks[place]
+        found: dict[Block, str | None] = {block: content_key(diagram)}
+        for rule in block.parameters():
+            before = len(found)
+            for value in others(rule, block.parameter_value(rule.name)):
+                try:
+                    checked = rule.check(value, "here")
+                except ArmblocksError:
+                    continue
+                # Whether such a block and diagram could be made is no matter here.
+                changed = copy.copy(block)
+                object.__setattr__(changed, rule.name, checked)
+                blocks = {**diagram.blocks, place: changed}
+                found.setdefault(changed, content_key(dataclasses.replace(diagram, blocks=blocks)))
+            assert len(found) > before, f"no other value for {rule.name}"
+        assert None not in found.values()
+        assert len(set(found.values())) == len(found)
+
+
+values = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(first=st.lists(values, min_size=1, max_size=3), second=st.lists(values, min_size=1, max_size=3))
+def test_keys_are_equal_where_the_bits_of_all_numbers_are(first: list[float], second: list[float]) -> None:
+    same = len(first) == len(second) and all(
+        a == b and math.copysign(1.0, a) == math.copysign(1.0, b) for a, b in zip(first, second)
+    )
+    keys = [key_of(*(Gain(gain=value) for value in gains)) for gains in (first, second)]
+    assert (keys[0] == keys[1]) == same
+
+
+def test_wires_names_and_inner_diagrams_are_in_the_key() -> None:
+    def keyed(swap: bool, name: str, inner: float) -> str | None:
+        builder = ab.DiagramBuilder(name)
+        one, other = builder.add("one", Constant(value=1.0)), builder.add("other", Constant(value=2.0))
+        builder.add("sum", Sum(signs="+-"), *((other, one) if swap else (one, other)))
+        inside = ab.DiagramBuilder("inside")
+        inside.add("out", Outport(), inside.add("k", Constant(value=inner)))
+        builder.add("part", Subsystem(diagram=inside.build()))
+        return content_key(builder.build())
+
+    keys = [keyed(False, "d", 1.0), keyed(True, "d", 1.0), keyed(False, "e", 1.0), keyed(False, "d", 2.0)]
+    assert None not in keys and len(set(keys)) == 4
+
+
+def test_looks_settings_and_where_a_robot_was_read_are_not_in_the_key() -> None:
+    diagram = ab.load_diagram("kr180model")
+    arms = {
+        name: dataclasses.replace(block, robot=dataclasses.replace(block.robot, source="elsewhere.json"))  # pyright: ignore[reportAttributeAccessIssue, reportUnknownArgumentType, reportUnknownMemberType]
+        for name, block in diagram.blocks.items()
+        if hasattr(block, "robot")
+    }
+    assert arms
+    other = dataclasses.replace(
+        diagram,
+        blocks={**diagram.blocks, **arms},
+        description="another",
+        layout={"fkine": Placement(x=1.0, y=2.0)},
+        settings=dataclasses.replace(diagram.settings, stop_time=3.0),
+        extras={"": {"colour": "green"}},
+    )
+    assert content_key(other) == content_key(diagram)
+
+
+def test_a_table_is_known_by_its_content() -> None:
+    rows = np.array([[0.0, 1.0], [1.0, 3.0], [2.0, -1.0]])
+
+    def keyed(rows: np.ndarray[Any, Any]) -> str | None:
+        builder = ab.DiagramBuilder("table")
+        builder.add("end", Scope(), builder.add("table", FromFile(data=rows)))
+        return content_key(builder.build())
+
+    changed = rows.copy()
+    changed[1, 1] = np.nextafter(3.0, 4.0)
+    assert keyed(rows) == keyed(rows.copy()) is not None
+    assert keyed(rows) != keyed(changed)
+
+
+STIFFNESS = 3.0
+
+
+def spring(u: Any) -> Any:
+    return -STIFFNESS * u
+
+
+def through_another(u: Any) -> Any:
+    return spring(u) + 1.0
+
+
+def made(factor: float) -> Callable[[Any], Any]:
+    return lambda u: factor * u
+
+
+def by_default(u: Any, factor: float = 2.0) -> Any:
+    return factor * u
+
+
+def by_modules(u: Any) -> Any:
+    return casadi.fmax(np.sin(u), math.pi) + sum(value for value in (1.0, 2.0))
+
+
+def test_the_code_of_a_function_and_all_it_names_are_in_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    def keyed(function: Callable[..., Any]) -> str:
+        return key_of(PythonFunction(function=function))
+
+    functions: list[Callable[..., Any]] = [
+        spring,
+        through_another,
+        by_default,
+        by_modules,
+        made(2.0),
+        made(3.0),
+    ]
+    found = [keyed(function) for function in functions]
+    assert len(set(found)) == len(found)
+    assert found == [keyed(function) for function in functions]
+    assert keyed(made(2.0)) == found[4]
+    monkeypatch.setattr(sys.modules[__name__], "STIFFNESS", 3.5)
+    assert keyed(spring) != found[0] and keyed(through_another) != found[1]
+    monkeypatch.undo()
+    assert keyed(spring) == found[0]
+    monkeypatch.setattr(by_default, "__defaults__", (2.5,))
+    assert keyed(by_default) != found[2]
+
+
+class Law:
+    """Something whose content nobody can list."""
+
+    factor = 2.0
+
+
+def with_an_object(u: Any) -> Any:
+    return Law.factor * u
+
+
+def with_an_import(u: Any) -> Any:
+    import statistics
+
+    return statistics.mean([1.0, 2.0]) * u
+
+
+def with_a_file(u: Any) -> Any:
+    return np.loadtxt([b"3.0"]).item() * u
+
+
+def with_chance(u: Any) -> Any:
+    return u * np.random.default_rng(1).normal()
+
+
+@pytest.mark.parametrize("function", [with_an_object, with_an_import, with_a_file, with_chance])
+def test_what_cannot_be_known_has_no_key(function: Callable[[Any], Any]) -> None:
+    assert content_key(line(PythonFunction(function=function))) is None
+
+
+def test_a_block_class_of_somebody_elses_has_no_key() -> None:
+    class Doubled(Gain):
+        """Not of this package."""
+
+    assert content_key(line(Doubled(gain=2.0))) is None
+
+
+def test_the_key_is_the_same_in_another_process() -> None:
+    code = "import armblocks as ab; from armblocks.diagram import content_key as k; " + (
+        "print(k(ab.load_diagram('puma560_payload_drop')))"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONHASHSEED": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    assert told == content_key(ab.load_diagram("puma560_payload_drop"))
