@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armblocks import blocks, errors
     from armblocks.analysis.linear_system import LinearSystem
     from armblocks.analysis.operating_point import OperatingPoint
-    from armblocks.diagram import Diagram, DiagramBuilder, DiagramDifference, diagram_difference
+    from armblocks.diagram import Diagram, DiagramBuilder, DiagramDifference, diagram_difference, formula
     from armblocks.equations import SimulationOptions
     from armblocks.face.arm import Arm
     from armblocks.face.block_examples import block_example
@@ -77,6 +77,7 @@ else:
             "diagram_difference": "armblocks.diagram",
             "draw_diagram": "armblocks.face.reporting",
             "errors": "armblocks.errors",
+            "formula": "armblocks.diagram",
             "jtraj": "armblocks.face.trajectory",
             "linearize": "armblocks.face.linearizing",
             "list_blocks": "armblocks.face.diagrams",
@@ -128,6 +129,7 @@ __all__ = [
     "diagram_difference",
     "draw_diagram",
     "errors",
+    "formula",
     "jtraj",
     "linearize",
     "list_blocks",

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from armblocks.blocks import Expression
-from armblocks.blocks.expression_language import Formula
+from armblocks.diagram.expression_language import Formula
 from armblocks.errors import ArmblocksError, DiagramError, InputError, UnknownNameError
 
 U = np.array([0.3, -1.2, 2.5])
@@ -39,6 +39,7 @@ U = np.array([0.3, -1.2, 2.5])
         ("rem(7, u[3])", 2.0),
         ("hypot(3, 4) + abs(-2) + sqrt(4) + power(2, 3)", 17.0),
         ("2 ** 3", 8.0),
+        ("sum([1 2 3] .* u)", 0.3 - 2.4 + 7.5),
         ("t * u[1]", 0.21),
     ],
 )
@@ -71,7 +72,9 @@ def test_a_long_sum_is_not_deep() -> None:
         "__import__('os')",
         "u.__class__",
         "(lambda: 1)()",
-        "[1, 2]",
+        "[1, 2",
+        "[u; 1]",
+        "[1 2; 3 4]",
         "u[1:2]",
         "u[0]",
         "u[4]",
@@ -127,7 +130,7 @@ def test_messages_say_place_and_way_out() -> None:
         evaluate(Expression(formula="atan2(u)"), U)
     with pytest.raises(DiagramError, match=r"the function 'sin' has no arguments"):
         evaluate(Expression(formula="sin"), U)
-    with pytest.raises(DiagramError, match=r"'u @ u' has no meaning in a formula"):
+    with pytest.raises(InputError, match=r"'u @ u' has no meaning in a formula"):
         evaluate(Expression(formula="u @ u"), U)
     with pytest.raises(DiagramError, match=r"vectors of 2 and 3 elements meet"):
         evaluate(Expression(formula="u1 + u2", inputs=2), U, [1.0, 2.0])

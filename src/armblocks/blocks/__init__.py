@@ -275,7 +275,8 @@ from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelec
 
 def _defined_in(family: ModuleType) -> list[type[Block]]:
     kinds = [value for value in vars(family).values() if isinstance(value, type) and issubclass(value, Block)]
-    return [kind for kind in kinds if kind.__module__ == family.__name__]
+    # What several kinds have in common has no title of its own.
+    return [kind for kind in kinds if kind.__module__ == family.__name__ and "title" in vars(kind)]
 
 
 BLOCKS = BlockLibrary(

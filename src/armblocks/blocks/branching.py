@@ -9,8 +9,8 @@ from typing import ClassVar
 from casadi import SX, fabs, floor, if_else, logic_or, vertcat
 
 from armblocks.blocks.elementwise import numbered_ports
-from armblocks.blocks.expression_language import Formula
 from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, WorkedExample, made, parameter
+from armblocks.diagram.expression_language import Formula
 from armblocks.errors import InputError
 
 JUST = 1e-300

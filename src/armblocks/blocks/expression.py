@@ -10,7 +10,6 @@ from casadi import SX
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
-from armblocks.blocks.expression_language import CONSTANTS, FUNCTIONS, Formula
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -22,6 +21,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.expression_language import CONSTANTS, FUNCTIONS, Formula
 from armblocks.errors import InputError, UnknownNameError
 
 
@@ -89,9 +89,15 @@ class Expression(Block):
         u = {name: SX.sym(name, math.prod(shape)) for name, shape in inputs.items()}
         values = SX.sym("p", max(1, len(self._names())))
         try:
-            size = self._value(SX.sym("t"), u, values).numel()
+            size, columns = self._value(SX.sym("t"), u, values).shape
         except UnknownNameError as error:
             raise InputError(error.what, allowed=error.allowed, fix=error.fix) from None
+        if columns > 1:
+            raise InputError(
+                f"the formula gives a matrix of {size} x {columns}",
+                allowed="scalars and vectors",
+                fix="use the blocks for matrices",
+            )
         return {"y": (size,) if size > 1 else ()}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

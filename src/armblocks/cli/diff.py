@@ -59,9 +59,11 @@ def print_difference(found: DiagramDifference, before: str, after: str, console:
     types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in found.types]
     settings = [_change_text(entry, "." if entry.path else "") for entry in found.settings]
     about = [_change_text(entry, "." if entry.path else "") for entry in found.descriptions]
-    parameters = [_change_text(entry, ".") for entry in found.parameters]
+    parameters = [_change_text(entry, "." if entry.path else "") for entry in found.parameters]
+    masks = [_change_text(entry, "." if entry.path else "") for entry in found.masks]
     _print_group("Blocks", (("-", removed), ("+", added), ("~", [*renamed, *types])), console)
     _print_group("Parameters", (("~", parameters),), console)
+    _print_group("Masks", (("~", masks),), console)
     wires = (("-", _wires(found.wires_removed)), ("+", _wires(found.wires_added)))
     _print_group("Wires", wires, console)
     _print_group("Settings", (("~", settings),), console)
@@ -94,10 +96,11 @@ def _block_text(block: Block) -> str:
 
 
 def _own_values(block: Block) -> dict[str, object]:
-    values = {rule.name: block.parameter_value(rule.name) for rule in block.parameters()}
+    rules = block.own_parameters()
+    values = {rule.name: block.stated_value(rule.name) for rule in rules}
     return {
         rule.name: values[rule.name]
-        for rule in block.parameters()
+        for rule in rules
         if rule.required or rule.check(rule.default, rule.name) != values[rule.name]
     }
 
@@ -157,6 +160,13 @@ def _array_text(rows: tuple[object, ...]) -> str:
 
 
 def _object_text(value: object) -> str:
+    from armblocks.diagram import Parameter, ParameterFormula
+
+    if isinstance(value, ParameterFormula):
+        return f"= {value}"
+    if isinstance(value, Parameter):
+        rest = " ".join(filter(None, (value.unit, f"({value.doc})" if value.doc else "")))
+        return f"{value.kind.value} {value_text(value.default)} {rest}".rstrip()
     blocks = getattr(value, "blocks", None)
     if isinstance(blocks, Mapping):
         return f"({len(cast('Diagram', value).blocks)} blocks inside)"
@@ -180,6 +190,7 @@ def difference_document(found: DiagramDifference) -> dict[str, object]:
         ],
         "types": [_change(entry) for entry in found.types],
         "parameters": [_change(entry) for entry in found.parameters],
+        "masks": [_change(entry) for entry in found.masks],
         "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_added],
         "wires_removed": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_removed],
         "settings": [_change(entry) for entry in found.settings],

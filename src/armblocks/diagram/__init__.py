@@ -25,6 +25,7 @@ from armblocks.diagram.hierarchy import (
     levels_of,
 )
 from armblocks.diagram.library import BlockLibrary
+from armblocks.diagram.mask import ParameterFormula, formula, mask_parameter
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
 from armblocks.diagram.port import (
@@ -42,7 +43,7 @@ from armblocks.diagram.port import (
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
-from armblocks.diagram.structure import Inport, Outport, Subsystem
+from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem
 from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
@@ -67,6 +68,7 @@ __all__ = [
     "Connection",
     "DelayLine",
     "Diagram",
+    "DiagramBlock",
     "DiagramBuilder",
     "DiagramDifference",
     "DiagramShapes",
@@ -83,6 +85,7 @@ __all__ = [
     "Merge",
     "Outport",
     "Parameter",
+    "ParameterFormula",
     "ParameterKind",
     "Placement",
     "Port",
@@ -109,11 +112,13 @@ __all__ = [
     "diagram_views",
     "flat_diagram",
     "flatten_hierarchy",
+    "formula",
     "infer_shapes",
     "infer_units",
     "integral_unit",
     "levels_of",
     "made",
+    "mask_parameter",
     "parameter",
     "rate_unit",
     "sample_time_parameter",

@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from casadi import SX
 
+from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formula_value
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
+from armblocks.errors import UnknownNameError
 
 Shapes = Mapping[str, Shape]
 """Shapes by port name."""
@@ -48,6 +50,9 @@ class Block(ABC):
     A block may read what an input was some time ago: ``delay_lines`` names such values, ``delay_times`` says
     how long ago. The equations find them as ``x[name]``; the numerics keep the past.
 
+    A parameter may be given as a :func:`~armblocks.diagram.mask.formula` over the mask of the diagram that
+    the block stands in. The diagram gives it the value; the text stays in ``formulas``.
+
     The first line of a subclass's docstring says in one sentence what the block does, with its equation.
     """
 
@@ -77,11 +82,24 @@ class Block(ABC):
     example: ClassVar[WorkedExample] = WorkedExample()
     """What shows the block at work; left out, it is fed with signals that fit its ports."""
 
+    formulas: tuple[tuple[str, str], ...] = field(default=(), repr=False, metadata={"formulas": True})
+    """The parameters that are formulas, by name, with their texts."""
+
     def __post_init__(self) -> None:
+        formulas, open_ones = dict(self.formulas), False
         for rule in self.parameters():
             where = f"{type(self).__name__}.{rule.name}"
-            object.__setattr__(self, rule.name, rule.check(getattr(self, rule.name), where))
-        self.check()
+            value = getattr(self, rule.name)
+            if isinstance(value, ParameterFormula):
+                formulas[rule.name] = value.text
+                if formula_names(value.text):
+                    open_ones = True  # the diagram that the block is put into knows the names
+                    continue
+                value = formula_value(rule, value.text, {}, type(self).__name__)
+            object.__setattr__(self, rule.name, rule.check(value, where))
+        object.__setattr__(self, "formulas", tuple(sorted(formulas.items())))
+        if not open_ones:
+            self.check()
 
     # -- description -------------------------------------------------------------------------------------
 
@@ -105,9 +123,53 @@ class Block(ABC):
         """One sentence for people: the docstring's first line."""
         return (cls.__doc__ or "").strip().splitlines()[0]
 
+    def own_parameters(self) -> tuple[Parameter, ...]:
+        """The parameters of this block: those of its type, and of a diagram inside those of its mask."""
+        return self.parameters()
+
     def parameter_value(self, name: str) -> Value:
         """The checked value of one parameter."""
         return getattr(self, name)
+
+    def stated_value(self, name: str) -> Value | ParameterFormula:
+        """What somebody has written for a parameter: its formula where it has one, else its value."""
+        text = dict(self.formulas).get(name)
+        return self.parameter_value(name) if text is None else ParameterFormula(text)
+
+    def with_parameters(self, **values: Any) -> Self:
+        """The block with other values or formulas of some of its parameters.
+
+        Raises ``UnknownNameError`` for a parameter that it has not, ``InputError`` for a value.
+        """
+        known = [rule.name for rule in self.own_parameters()]
+        for name in values:
+            if name not in known:
+                raise UnknownNameError("parameter", name, known, where=self.type_name())
+        texts = {name: value.text for name, value in values.items() if isinstance(value, ParameterFormula)}
+        kept = {name: text for name, text in self.formulas if name not in values} | texts
+        plain = {name: value for name, value in values.items() if name not in texts}
+        return self.replaced({**plain, "formulas": tuple(sorted(kept.items()))})
+
+    def in_scope(self, scope: Scope, where: str) -> Self:
+        """The block with the values that its formulas give in a scope.
+
+        Raises ``UnknownNameError`` for a name that is not in scope, ``InputError`` for a value.
+        """
+        if not self.formulas:
+            return self
+        rules = {rule.name: rule for rule in self.own_parameters()}
+        values: dict[str, Any] = {}
+        for name, text in self.formulas:
+            if name not in rules:
+                raise UnknownNameError("parameter", name, rules, where=where)
+            values[name] = formula_value(rules[name], text, scope, where)
+        if all(self.parameter_value(name) == value for name, value in values.items()):
+            return self
+        return self.replaced(values)
+
+    def replaced(self, values: Mapping[str, Any]) -> Self:
+        """A copy with other values of parameters; formulas stay as they are, unless they are given."""
+        return dataclasses.replace(self, **values)
 
     def check(self) -> None:  # noqa: B027 - optional, most blocks have nothing to add
         """Raise ``InputError`` where parameters contradict each other; each alone is already checked."""
@@ -249,7 +311,8 @@ class Block(ABC):
 
 @cache
 def _parameters_of(kind: type[Block]) -> tuple[Parameter, ...]:
-    return tuple(dataclasses.replace(_declared(field), name=field.name) for field in dataclasses.fields(kind))
+    fields = [entry for entry in dataclasses.fields(kind) if "formulas" not in entry.metadata]
+    return tuple(dataclasses.replace(_declared(entry), name=entry.name) for entry in fields)
 
 
 def _declared(field: dataclasses.Field[Any]) -> Parameter:

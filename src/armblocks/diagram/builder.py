@@ -9,8 +9,10 @@ from typing import Any
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.check import check_diagram
-from armblocks.diagram.diagram import Connection, Diagram, Placement
+from armblocks.diagram.diagram import Connection, Diagram, Placement, block_in_scope
+from armblocks.diagram.mask import ParameterFormula, checked_mask, formula, mask_parameter, values_of
 from armblocks.diagram.names import check_block_name, folded
+from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.equations import SimulationOptions
@@ -56,8 +58,15 @@ class DiagramBuilder:
             inner.output("force", inner.add("gain", Gain(gain=5.0), error))
         builder.connect(builder["controller"], motor["force"])
 
-    Errors are ``DiagramError`` or
-    ``UnknownNameError``, at the line that makes them.
+    It may have parameters of its own, its *mask*, that are seen from outside as ``"controller.kp"``, and that
+    the values of blocks inside follow by formulas::
+
+        with builder.subsystem("controller", …) as inner:
+            kp = inner.parameter("kp", 5.0, unit="N/m", doc="how hard it pulls")
+            inner.add("gain", Gain(gain=kp), …)
+            inner.add("filter", FirstOrderLag(time_constant=formula("1 / (10*kp)")), …)
+
+    Errors are ``DiagramError``, ``InputError`` or ``UnknownNameError``, at the line that makes them.
     """
 
     def __init__(
@@ -77,6 +86,31 @@ class DiagramBuilder:
         self._taken: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
         self._layout: dict[str, Placement] = {}
+        self._mask: list[Parameter] = []
+        self._mask_values: dict[str, Value] = {}
+        self._outer: dict[str, ParameterFormula] = {}
+
+    def parameter(
+        self, name: str, default: Any, *, value: Any = None, doc: str = "", unit: str = "", **rules: Any
+    ) -> Any:
+        """Declare a parameter of this diagram, and return the formula that is its name.
+
+        ``rules`` are those of a block's parameter: ``minimum``, ``above``, ``maximum``, ``choices``, …
+        ``value`` is what it is here, where that is not its default; inside a ``with builder.subsystem(…)``
+        it may be a formula over the parameters of the diagram around. Raises ``InputError``.
+        """
+        return self.declare(mask_parameter(name, default, doc=doc, unit=unit, **rules), value)
+
+    def declare(self, rule: Parameter, value: Any = None) -> Any:
+        """Declare a parameter of this diagram that is described already; see :meth:`parameter`."""
+        checked_mask((*self._mask, rule), f"diagram '{self.name}'")
+        if isinstance(value, ParameterFormula):
+            self._outer[rule.name] = value
+            value = None
+        given = {} if value is None else {rule.name: value}
+        self._mask_values |= values_of((rule,), given, f"diagram '{self.name}'")
+        self._mask.append(rule)
+        return formula(rule.name)
 
     def add(self, name: str, block: Block, *inputs: Source, **inputs_by_port: Source) -> BlockHandle:
         """Add a block under a new name and connect its inputs, in order or by port name.
@@ -96,6 +130,7 @@ class DiagramBuilder:
                 allowed="every name once",
                 fix="rename one of them",
             )
+        block = block_in_scope(name, block, self._mask_values)
         ports = block.input_ports()
         if len(inputs) > len(ports):
             raise DiagramError(
@@ -134,7 +169,8 @@ class DiagramBuilder:
         """Build a diagram inside a block of this diagram; the block is added when the ``with`` ends."""
         inner = DiagramBuilder(name)
         yield inner
-        self.add(name, Subsystem(diagram=inner.build()), *inputs, **inputs_by_port)
+        block = Subsystem(diagram=inner.build()).with_parameters(**inner._outer)
+        self.add(name, block, *inputs, **inputs_by_port)
 
     def connect(self, source: Source, target: Source) -> None:
         """Connect an output port to an input port; a block stands for its only output or only input."""
@@ -181,6 +217,8 @@ class DiagramBuilder:
             settings=self.settings,
             extras=self._extras,
             description=self.description,
+            mask=tuple(self._mask),
+            mask_values=self._mask_values,
         )
 
     def _next_port(self, kind: type[Inport | Outport]) -> int:

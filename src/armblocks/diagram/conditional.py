@@ -16,19 +16,10 @@ from typing import ClassVar
 from numpy.typing import ArrayLike
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.parameter import ParameterKind, parameter
 from armblocks.diagram.port import Port
-from armblocks.diagram.structure import (
-    PASS_THROUGH,
-    Inport,
-    Outport,
-    ends,
-    inner_inputs,
-    inner_outputs,
-)
+from armblocks.diagram.structure import DiagramBlock
 from armblocks.diagram.worked_example import WorkedExample, made
-from armblocks.errors import DiagramError
 
 _STATES = ("held", "reset")
 _EDGES = ("rising", "falling", "either")
@@ -36,7 +27,7 @@ _PULSES = made("PulseGenerator", period=4.0, width=50.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class EnabledSubsystem(Block):
+class EnabledSubsystem(DiagramBlock):
     """A subsystem that works while its input enable is positive, and stands still while it is not.
 
     While it is off, its continuous and sampled states keep their values, and its outputs are held, or go back
@@ -44,152 +35,96 @@ class EnabledSubsystem(Block):
     were or start anew.
     """
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Enabled Subsystem"
-    virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="While the pulse is 0 the output keeps the value that the sine had last.",
         inputs={"enable": _PULSES},
         shown=("In1", "enable", "Out1"),
     )
 
-    diagram: Diagram = parameter(
-        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
-    )
     states_when_enabling: str = parameter(
         "held", choices=_STATES, doc="whether states go on or start anew when it is switched on"
     )
 
-    def check(self) -> None:
-        _check_ends(self.diagram, "enable")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (*inner_inputs(self.diagram), Port("enable", "works while it is positive", "", ()))
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return inner_outputs(self.diagram)
+    def control_ports(self) -> tuple[Port, ...]:
+        return (Port("enable", "works while it is positive", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TriggeredSubsystem(Block):
+class TriggeredSubsystem(DiagramBlock):
     """A subsystem that works once, at the instant, whenever its input trigger fires; outputs are held.
 
     The trigger fires where it becomes positive (rising), stops being positive (falling), or either. Sampled
     blocks inside take one step at each firing, with the time since the last one as their period.
     """
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Triggered Subsystem"
-    virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Each time the pulse rises the output takes the value of the sine, and holds it.",
         inputs={"trigger": _PULSES},
         shown=("In1", "trigger", "Out1"),
     )
 
-    diagram: Diagram = parameter(
-        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
-    )
     edge: str = parameter("rising", choices=_EDGES, doc="when the trigger fires")
 
-    def check(self) -> None:
-        _check_ends(self.diagram, "trigger")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (*inner_inputs(self.diagram), Port("trigger", "works when it fires", "", ()))
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return inner_outputs(self.diagram)
+    def control_ports(self) -> tuple[Port, ...]:
+        return (Port("trigger", "works when it fires", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
-class EnabledTriggeredSubsystem(Block):
+class EnabledTriggeredSubsystem(DiagramBlock):
     """A subsystem that works once, at the instant, whenever its trigger fires while enable is positive."""
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Enabled and Triggered Subsystem"
-    virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The output takes the value of the sine where the pulse rises, but only while enable is 1.",
         inputs={"trigger": _PULSES, "enable": made("Step", time=3.0)},
         shown=("In1", "trigger", "Out1"),
     )
 
-    diagram: Diagram = parameter(
-        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
-    )
     edge: str = parameter("rising", choices=_EDGES, doc="when the trigger fires")
 
-    def check(self) -> None:
-        _check_ends(self.diagram, "enable", "trigger")
-
-    def input_ports(self) -> tuple[Port, ...]:
+    def control_ports(self) -> tuple[Port, ...]:
         return (
-            *inner_inputs(self.diagram),
             Port("enable", "the trigger counts while it is positive", "", ()),
             Port("trigger", "works when it fires", "", ()),
         )
 
-    def output_ports(self) -> tuple[Port, ...]:
-        return inner_outputs(self.diagram)
-
 
 @dataclass(frozen=True, kw_only=True)
-class ResettableSubsystem(Block):
+class ResettableSubsystem(DiagramBlock):
     """A subsystem that always works, and whose states all start anew whenever its input reset fires."""
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Resettable Subsystem"
-    virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A subsystem without states: the output is the input, whatever the reset does.",
         inputs={"reset": _PULSES},
         shown=("In1", "reset", "Out1"),
     )
 
-    diagram: Diagram = parameter(
-        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
-    )
     edge: str = parameter("rising", choices=_EDGES, doc="when the reset fires")
 
-    def check(self) -> None:
-        _check_ends(self.diagram, "reset")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (*inner_inputs(self.diagram), Port("reset", "starts all states anew when it fires", "", ()))
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return inner_outputs(self.diagram)
+    def control_ports(self) -> tuple[Port, ...]:
+        return (Port("reset", "starts all states anew when it fires", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ActionSubsystem(Block):
+class ActionSubsystem(DiagramBlock):
     """A subsystem that works while an If or Switch Case block chooses it: while its input action is 1."""
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Action Subsystem"
-    virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The If block chooses the subsystem while the sine is positive; its output is held otherwise.",
         inputs={"action": made("If").by(u="In1").at("if1")},
         shown=("In1", "Out1"),
     )
 
-    diagram: Diagram = parameter(
-        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
-    )
     states_when_resuming: str = parameter(
         "held", choices=_STATES, doc="whether states go on or start anew when it is chosen again"
     )
 
-    def check(self) -> None:
-        _check_ends(self.diagram, "action")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (*inner_inputs(self.diagram), Port("action", "works while it is 1", "", ()))
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return inner_outputs(self.diagram)
+    def control_ports(self) -> tuple[Port, ...]:
+        return (Port("action", "works while it is 1", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,16 +169,3 @@ class Merge(Block):
 Conditional = (
     EnabledSubsystem | TriggeredSubsystem | EnabledTriggeredSubsystem | ResettableSubsystem | ActionSubsystem
 )
-
-
-def _check_ends(diagram: Diagram, *controls: str) -> None:
-    ends(diagram, Inport)
-    ends(diagram, Outport)
-    taken = [name for name in controls if name in diagram.blocks]
-    if taken:
-        raise DiagramError(
-            f"a block inside is named '{taken[0]}', as an input of the subsystem is",
-            where=f"diagram '{diagram.name}'",
-            allowed="other names",
-            fix="rename the block",
-        )

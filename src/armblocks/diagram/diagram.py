@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from armblocks.diagram.block import Block
+from armblocks.diagram.mask import Scope, checked_mask, values_of
+from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
-from armblocks.errors import UnknownNameError
+from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 
 _Kept = TypeVar("_Kept")
 
@@ -45,13 +48,32 @@ Gate = Mapping[str, PortRef]
 """What feeds the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
 
 
+def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
+    """A block of a diagram with the values of its formulas.
+
+    Raises ``DiagramError`` or ``UnknownNameError`` that name the block.
+    """
+    where = f"block '{name}' ({block.title})"
+    try:
+        return block.in_scope(scope, where)
+    except (DiagramError, UnknownNameError):
+        raise
+    except ArmblocksError as error:
+        place = error.where if error.where.startswith(where) else f"{where}, {error.where}"
+        raise DiagramError(error.what, where=place, allowed=error.allowed, fix=error.fix) from None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Diagram:
     """Blocks and wires. Only ``DiagramBuilder.build`` makes one, and what it makes is checked.
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams look alike. ``layout``
-    may name only some blocks. ``extras`` are unknown keys of a file, preserved: it has the keys
-    ``""`` (the document), ``"blocks"`` (by block name), and whatever else a file format puts there.
+    may name only some blocks. ``mask`` are the parameters that it declares (see
+    :mod:`armblocks.diagram.mask`) and ``mask_values`` what they are, the defaults where nothing is given;
+    blocks whose parameters are formulas have the values that follow from these. ``link`` names the entry of a
+    library file that the diagram is, ``servos.json#JointServo``; it is empty for one of its own. ``extras``
+    are unknown keys of a file, preserved: it has the keys ``""`` (the document), ``"blocks"`` (by block
+    name), and whatever else a file format puts there.
     """
 
     name: str
@@ -64,13 +86,34 @@ class Diagram:
     """One line for people: what the diagram shows."""
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
     """Of a flat diagram, by block: see :mod:`armblocks.diagram.conditional_equations`."""
+    mask: tuple[Parameter, ...] = ()
+    mask_values: Mapping[str, Value] = field(default_factory=dict[str, Value])
+    link: str = ""
     _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
 
     def __post_init__(self) -> None:
-        for name in ("blocks", "layout", "extras"):
+        where = f"diagram '{self.name}'"
+        if self.mask or self.mask_values:
+            object.__setattr__(self, "mask", checked_mask(self.mask, where))
+            object.__setattr__(self, "mask_values", values_of(self.mask, self.mask_values, where))
+        if any(block.formulas for block in self.blocks.values()):
+            blocks = {
+                name: block_in_scope(name, block, self.mask_values) for name, block in self.blocks.items()
+            }
+            object.__setattr__(self, "blocks", blocks)
+        for name in ("blocks", "layout", "extras", "mask_values"):
             ordered = dict(sorted(getattr(self, name).items()))
             object.__setattr__(self, name, MappingProxyType(ordered))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))
+
+    def with_mask_values(self, values: Mapping[str, object]) -> Diagram:
+        """A copy in which some parameters of the mask have other values, and what follows from them.
+
+        Raises ``UnknownNameError`` for a name, ``InputError`` or ``DiagramError`` for a value.
+        """
+        if all(name in self.mask_values and self.mask_values[name] == values[name] for name in values):
+            return self
+        return dataclasses.replace(self, mask_values={**self.mask_values, **cast("Any", values)})
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.blocks.items()), self.connections, self.settings))

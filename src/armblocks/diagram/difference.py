@@ -63,7 +63,8 @@ class DiagramDifference:
     """All that is different between two diagrams and inside their subsystems; false where there is nothing.
 
     ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
-    where one type has no such parameter.
+    where one type has no such parameter. A value that follows by a formula is the formula. ``masks`` are
+    parameters that the diagram at ``path`` declares otherwise.
     """
 
     added: tuple[PlacedBlock, ...] = ()
@@ -71,6 +72,7 @@ class DiagramDifference:
     renamed: tuple[Renaming, ...] = ()
     types: tuple[ValueChange, ...] = ()
     parameters: tuple[ValueChange, ...] = ()
+    masks: tuple[ValueChange, ...] = ()
     wires_added: tuple[PlacedWire, ...] = ()
     wires_removed: tuple[PlacedWire, ...] = ()
     settings: tuple[ValueChange, ...] = ()
@@ -95,6 +97,10 @@ def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """
     found = _Findings()
     _compare_levels(before, after, "", found)
+    for name in {**before.mask_values, **after.mask_values}:
+        old, new = before.mask_values.get(name), after.mask_values.get(name)
+        if old != new:
+            found.parameters.append(ValueChange(path="", name=name, before=old, after=new))
     return DiagramDifference(**{name: tuple(entries) for name, entries in vars(found).items()})
 
 
@@ -105,6 +111,7 @@ class _Findings:
     renamed: list[Renaming] = field(default_factory=list[Renaming])
     types: list[ValueChange] = field(default_factory=list[ValueChange])
     parameters: list[ValueChange] = field(default_factory=list[ValueChange])
+    masks: list[ValueChange] = field(default_factory=list[ValueChange])
     wires_added: list[PlacedWire] = field(default_factory=list[PlacedWire])
     wires_removed: list[PlacedWire] = field(default_factory=list[PlacedWire])
     settings: list[ValueChange] = field(default_factory=list[ValueChange])
@@ -135,6 +142,11 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings
         old_value, new_value = getattr(before.settings, name), getattr(after.settings, name)
         if old_value != new_value:
             found.settings.append(ValueChange(path=path, name=name, before=old_value, after=new_value))
+    old_mask, new_mask = ({rule.name: rule for rule in diagram.mask} for diagram in (before, after))
+    for name in {**old_mask, **new_mask}:
+        old_rule, new_rule = old_mask.get(name), new_mask.get(name)
+        if old_rule != new_rule:
+            found.masks.append(ValueChange(path=path, name=name, before=old_rule, after=new_rule))
     if before.description != after.description:
         found.descriptions.append(
             ValueChange(path=path, name="description", before=before.description, after=after.description)
@@ -148,16 +160,20 @@ def _compare_blocks(before: Block, after: Block, path: str, found: _Findings) ->
         )
     old_rules, new_rules = _rules(before), _rules(after)
     for name in {**old_rules, **new_rules}:
-        old = before.parameter_value(name) if name in old_rules else None
-        new = after.parameter_value(name) if name in new_rules else None
+        old = before.stated_value(name) if name in old_rules else None
+        new = after.stated_value(name) if name in new_rules else None
         if isinstance(old, Diagram) and isinstance(new, Diagram):
+            if old.link != new.link:
+                found.parameters.append(
+                    ValueChange(path=path, name="library", before=old.link or None, after=new.link or None)
+                )
             _compare_levels(old, new, path, found)
         elif old != new:
             found.parameters.append(ValueChange(path=path, name=name, before=old, after=new))
 
 
 def _rules(block: Block) -> Mapping[str, Parameter]:
-    return {rule.name: rule for rule in block.parameters()}
+    return {rule.name: rule for rule in block.own_parameters()}
 
 
 # -- blocks under other names --------------------------------------------------------------------------------
@@ -241,17 +257,17 @@ def _one_round(colours: _Colours, ends: Mapping[str, _Ends], paired: _Colours) -
 
 def _content(block: Block) -> tuple[object, ...]:
     """What a block is without its name and layout, as a value that compares and hashes."""
-    values = ((rule.name, _value_content(block, rule)) for rule in block.parameters())
+    values = ((rule.name, _value_content(block, rule)) for rule in block.own_parameters())
     return (block.type_name(), *values)
 
 
 def _value_content(block: Block, rule: Parameter) -> object:
-    value = block.parameter_value(rule.name)
+    value = block.stated_value(rule.name)
     if rule.kind is not ParameterKind.DIAGRAM:
         return value
     inside = cast("Diagram", value)
     blocks = frozenset((name, _content(inner)) for name, inner in inside.blocks.items())
-    return (blocks, inside.connections, inside.settings, inside.description)
+    return (blocks, inside.connections, inside.settings, inside.description, inside.mask, inside.link)
 
 
 def _renamed_wire(wire: Connection, names: Mapping[str, str]) -> Connection:

@@ -24,7 +24,7 @@ from armblocks.diagram.conditional_equations import ELAPSED, FIRE, ON, RESTART
 from armblocks.diagram.controls import EnableControl, HeldOutput, MergedOutput, TriggerControl
 from armblocks.diagram.diagram import Connection, Diagram, Gate
 from armblocks.diagram.port import PortRef, View
-from armblocks.diagram.structure import Inport, Outport, Subsystem, stated_shape
+from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem, stated_shape
 from armblocks.diagram.virtual_wiring import (
     BusAssignment,
     BusCreator,
@@ -44,8 +44,6 @@ CONDITIONAL = (
     ResettableSubsystem,
     ActionSubsystem,
 )
-SUBSYSTEMS = (Subsystem, *CONDITIONAL)
-"""Kinds of blocks that hold a diagram."""
 DEEPEST = 100
 """Subsystems inside each other."""
 MOST_LISTED = 20
@@ -170,7 +168,7 @@ def levels_of(diagram: Diagram) -> dict[str, Diagram]:
             )
         levels[path] = level
         for name, block in level.blocks.items():
-            if isinstance(block, SUBSYSTEMS):
+            if isinstance(block, DiagramBlock):
                 pending.append((joined(path, name), block.diagram, depth + 1))
     return levels
 
@@ -194,6 +192,10 @@ def check_connected(levels: Mapping[str, Diagram]) -> None:
             allowed="every input has a driver",
             fix="connect an output or a Constant to each",
         )
+
+
+def _plain(block: Block) -> Block:
+    return dataclasses.replace(block, formulas=()) if block.formulas else block
 
 
 class _Flattening:
@@ -247,11 +249,14 @@ class _Flattening:
         ]
         flat = dataclasses.replace(
             self.top,
-            blocks=real,
+            # Numbers, without the masks that they followed from.
+            blocks={path: _plain(block) for path, block in real.items()},
             connections=tuple(connections),
             layout={},
             extras={},
             gates=self._gates(real),
+            mask=(),
+            mask_values={},
         )
         return FlatForm(
             diagram=flat,

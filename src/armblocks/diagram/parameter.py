@@ -112,7 +112,7 @@ def parameter(
     Without ``kind`` the default tells it: a float is a number, an int an integer, a tuple an array, text a
     choice where ``choices`` are given. Numbers and arrays are tunable unless ``tunable=False``.
     """
-    kind = kind or _kind_of(default, rules)
+    kind = kind or kind_of(default, rules)
     if tunable is None:
         tunable = kind in (ParameterKind.NUMBER, ParameterKind.ARRAY)
     stated = Parameter(name="", kind=kind, doc=doc, default=default, unit=unit, tunable=tunable, **rules)
@@ -126,7 +126,8 @@ def shape_of(value: object) -> Shape:
     return np.shape(cast("Any", value))
 
 
-def _kind_of(default: object, rules: dict[str, Any]) -> ParameterKind:
+def kind_of(default: object, rules: dict[str, Any]) -> ParameterKind:
+    """The kind that a default tells."""
     if isinstance(default, bool):
         return ParameterKind.BOOLEAN
     if isinstance(default, int):

@@ -6,10 +6,12 @@ by the wires that it means before a diagram is traced.
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from casadi import SX
@@ -17,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.diagram import Connection, Diagram
-from armblocks.diagram.parameter import ParameterKind, parameter
+from armblocks.diagram.parameter import Parameter, ParameterKind, Value, parameter
 from armblocks.diagram.port import Port, PortRef
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
@@ -130,26 +132,71 @@ PASS_THROUGH = Diagram(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Subsystem(Block):
-    """A diagram inside a block, whose In and Out blocks are the ports; signals are name/block/port."""
+class DiagramBlock(Block):
+    """What all blocks with a diagram inside have in common: its ends are ports, its mask is their parameters.
+
+    Subclasses say which inputs they have besides, to control when the diagram works.
+    """
 
     family: ClassVar[str] = "structure"
-    title: ClassVar[str] = "Subsystem"
     virtual: ClassVar[bool] = True
 
     diagram: Diagram = parameter(
         PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
     )
 
+    def control_ports(self) -> tuple[Port, ...]:
+        """Inputs besides those of the diagram inside."""
+        return ()
+
     def check(self) -> None:
         ends(self.diagram, Inport)
         ends(self.diagram, Outport)
+        for port in self.control_ports():
+            if port.name in self.diagram.blocks:
+                raise DiagramError(
+                    f"a block inside is named '{port.name}', as an input of the subsystem is",
+                    where=f"diagram '{self.diagram.name}'",
+                    allowed="other names",
+                    fix="rename the block",
+                )
+        taken = {rule.name for rule in self.parameters()}
+        twice = next((rule.name for rule in self.diagram.mask if rule.name in taken), None)
+        if twice is not None:
+            raise InputError(
+                f"the mask has a parameter '{twice}', and so has every {self.title}",
+                where=f"diagram '{self.diagram.name}'",
+                allowed=f"other names than {', '.join(sorted(taken))}",
+                fix="choose another name",
+            )
+
+    def own_parameters(self) -> tuple[Parameter, ...]:
+        return (*self.parameters(), *self.diagram.mask)
+
+    def parameter_value(self, name: str) -> Value:
+        values = self.diagram.mask_values
+        return values[name] if name in values else getattr(self, name)
+
+    def replaced(self, values: Mapping[str, Any]) -> Self:
+        masked = {rule.name for rule in self.diagram.mask}
+        inside = {name: value for name, value in values.items() if name in masked}
+        plain = {name: value for name, value in values.items() if name not in masked}
+        if inside:
+            plain["diagram"] = plain.get("diagram", self.diagram).with_mask_values(inside)
+        return dataclasses.replace(self, **plain)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return inner_inputs(self.diagram)
+        return (*inner_inputs(self.diagram), *self.control_ports())
 
     def output_ports(self) -> tuple[Port, ...]:
         return inner_outputs(self.diagram)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subsystem(DiagramBlock):
+    """A diagram inside a block, whose In and Out blocks are the ports; signals are name/block/port."""
+
+    title: ClassVar[str] = "Subsystem"
 
 
 def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[str, Inport | Outport], ...]:

@@ -13,6 +13,10 @@ one line, a moved block is one line of the layout, and two people who add differ
       "settings": {"stop_time": 10, …}
     }
 
+A diagram may declare parameters, its ``mask``; a block's ``formulas`` over them stand beside its parameters,
+and the values that follow are not written. What the parameters are is said by the block that holds the
+diagram, among its own, and by the document itself of the outermost one, under ``parameters``.
+
 A block that holds a diagram has it beside its parameters, under ``diagram``, with the same keys, but without
 ``format`` and ``robots``, which stand once, and without settings and layout where there is nothing to say.
 
@@ -27,7 +31,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
@@ -43,6 +47,7 @@ from armblocks.diagram import (
     PortRef,
     TimeTable,
     UserFunction,
+    formula,
 )
 from armblocks.equations import SimulationOptions
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError, FormatError, UnknownNameError
@@ -53,6 +58,7 @@ from armblocks.formats.json_document import (
     read_document,
     split_members,
 )
+from armblocks.formats.mask_json import mask_parameter_from, mask_parameter_to
 from armblocks.formats.robot_references import ResolveRobot, RobotReader, RobotWriter
 from armblocks.robot import Robot
 
@@ -61,8 +67,8 @@ MOST_BYTES = 16 * 2**20
 DEEPEST = 320
 """Objects and arrays inside each other: a hundred subsystems, and what stands in the innermost."""
 
-_DOCUMENT_KEYS = ("format", "name", "description", "blocks", "connections", "layout", "robots", "settings")
-_INNER_KEYS = ("name", "description", "blocks", "connections", "layout", "settings")
+_INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "layout", "settings")
+_DOCUMENT_KEYS = ("format", *_INNER_KEYS, "parameters", "robots")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _WIRE = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
@@ -108,6 +114,8 @@ def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: P
     """
     writer = _Writer(RobotWriter(folder, resolve_robot))
     document = {"format": FORMAT_VERSION, **writer.diagram(diagram)}
+    if diagram.mask:
+        document["parameters"] = writer.values(diagram)
     if writer.robots.table:
         document["robots"] = writer.robots.table
     return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
@@ -138,6 +146,11 @@ class _Writer:
             **extras.get("", {}),
             "name": diagram.name,
             **({"description": diagram.description} if diagram.description else {}),
+            **(
+                {"mask": [mask_parameter_to(rule, self._value) for rule in diagram.mask]}
+                if diagram.mask
+                else {}
+            ),
             "blocks": {
                 key: {**_members(block_extras.get(key)), **self._block(block)}
                 for key, block in diagram.blocks.items()
@@ -149,16 +162,24 @@ class _Writer:
 
     def _block(self, block: Block) -> dict[str, object]:
         """A block; a diagram inside stands beside the parameters, so that depth costs little."""
-        values = {rule: block.parameter_value(rule.name) for rule in block.parameters()}
+        formulas = dict(block.formulas)
+        values = {rule: block.parameter_value(rule.name) for rule in block.own_parameters()}
         plain = {
-            rule.name: self._value(rule, value) for rule, value in values.items() if not _is_diagram(rule)
+            rule.name: self._value(rule, value)
+            for rule, value in values.items()
+            if not _is_diagram(rule) and rule.name not in formulas
         }
         inside = {
             rule.name: self._inside(cast("Diagram", value))
             for rule, value in values.items()
             if _is_diagram(rule)
         }
-        return {"type": block.type_name(), "parameters": plain, **inside}
+        stated = {"formulas": formulas} if formulas else {}
+        return {"type": block.type_name(), "parameters": plain, **stated, **inside}
+
+    def values(self, diagram: Diagram) -> dict[str, object]:
+        """What the parameters of the outermost diagram's own mask are."""
+        return {rule.name: self._value(rule, diagram.mask_values[rule.name]) for rule in diagram.mask}
 
     def _inside(self, diagram: Diagram) -> dict[str, object]:
         document = self.diagram(diagram)
@@ -250,6 +271,8 @@ class _Reader:
             extras=extras,
             description=members["description"].text() if "description" in members else "",
         )
+        given = members["parameters"].members() if "parameters" in members else {}
+        self._declare(builder, members["mask"].elements() if "mask" in members else [], given)
         for key, block in blocks.items():
             with _located(block_nodes[key]):
                 builder.add(key, block)
@@ -271,16 +294,15 @@ class _Reader:
             kind = self.library[node.members()["type"].text()]
         rules = {rule.name: rule for rule in kind.parameters()}
         inside = [name for name, rule in rules.items() if _is_diagram(rule)]
-        members = _split(node, ("type", "parameters", *inside), extras, "blocks", key)
-        given = members["parameters"].members() if "parameters" in members else {}
+        members = _split(node, ("type", "parameters", "formulas", *inside), extras, "blocks", key)
         values: dict[str, object] = {
             name: self.diagram(members[name], _INNER_KEYS, key) for name in inside if name in members
         }
-        for name, member in given.items():
-            if name not in rules or name in inside:
-                known = set(rules) - set(inside)
-                raise UnknownNameError(f"parameter of {kind.type_name()}", name, known, where=member.where)
-            values[name] = _parameter(rules[name], member, self.robots)
+        mask = {rule.name: rule for value in values.values() for rule in cast("Diagram", value).mask}
+        known = {**mask, **{name: rule for name, rule in rules.items() if name not in inside}}
+        masked: dict[str, object] = {}
+        for name, given in self._given(members, known, kind).items():
+            (masked if name in mask else values)[name] = given
         missing = [name for name, rule in rules.items() if rule.required and name not in values]
         if missing:
             raise node.error(
@@ -289,7 +311,44 @@ class _Reader:
                 fix=f"add '{missing[0]}': {rules[missing[0]].doc}",
             )
         with _located(node):
-            return kind(**values)
+            return kind(**values).with_parameters(**masked)  # pyright: ignore[reportArgumentType]
+
+    def _given(
+        self, members: Mapping[str, Node], rules: Mapping[str, Parameter], kind: type[Block]
+    ) -> dict[str, object]:
+        """The values and formulas of a block's parameters."""
+        found: dict[str, object] = {}
+        for key in ("parameters", "formulas"):
+            for name, member in (members[key].members() if key in members else {}).items():
+                if name not in rules:
+                    what = f"parameter of {kind.type_name()}"
+                    raise UnknownNameError(what, name, rules, where=member.where)
+                if name in found:
+                    raise member.error(f"'{name}' has a value and a formula", allowed="one of the two")
+                if key == "parameters":
+                    found[name] = _parameter(rules[name], member, self.robots)
+                else:
+                    with _located(member):
+                        found[name] = formula(member.text())
+        return found
+
+    def _default(self, rule: Parameter, node: Node) -> object:
+        return _parameter(rule, node, self.robots)
+
+    def _declare(self, builder: DiagramBuilder, mask: Sequence[Node], given: Mapping[str, Node]) -> None:
+        """The parameters of a diagram, and what they are of the outermost one."""
+        rules: list[Parameter] = []
+        for node in mask:
+            with _located(node):
+                rules.append(mask_parameter_from(node, self._default))
+        for name, member in given.items():
+            if name not in [rule.name for rule in rules]:
+                known = [rule.name for rule in rules]
+                raise UnknownNameError("mask parameter", name, known, where=member.where)
+        for rule, node in zip(rules, mask):
+            value = _parameter(rule, given[rule.name], self.robots) if rule.name in given else None
+            with _located(node):
+                builder.declare(rule, value)
 
 
 def _split(node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = "") -> dict[str, Node]:

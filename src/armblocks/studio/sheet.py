@@ -102,7 +102,7 @@ def _block_type(kind: type[Block]) -> BlockType:
 
 
 def _default(kind: type[Block]) -> Block:
-    robots = {
+    robots: dict[str, Any] = {
         rule.name: load_robot(DEFAULT_ROBOT)
         for rule in kind.parameters()
         if rule.required and rule.kind is ParameterKind.ROBOT

@@ -1,0 +1,122 @@
+"""The words of formulas: constants, and functions by name. A new one is one line here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import casadi
+import numpy as np
+from casadi import SX, if_else
+from numpy.typing import NDArray
+
+MOST_ELEMENTS = 100_000
+"""Numbers of an array that a function makes."""
+
+
+def _power(base: SX, exponent: SX) -> SX:
+    return base**exponent
+
+
+def _where(condition: SX, yes: SX, no: SX) -> SX:
+    return if_else(condition != 0.0, yes, no)
+
+
+def _radians(degrees: SX) -> SX:
+    return degrees * (math.pi / 180.0)
+
+
+def _degrees(radians: SX) -> SX:
+    return radians * (180.0 / math.pi)
+
+
+def _inverse(value: SX) -> SX:
+    if value.shape[0] != value.shape[1]:
+        raise ValueError(f"a {value.shape[0]} x {value.shape[1]} matrix has no inverse")
+    return casadi.inv(value)
+
+
+CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e, "deg": math.pi / 180.0, "inf": math.inf}
+
+FUNCTIONS: Mapping[str, tuple[int, Callable[..., SX]]] = {
+    **{
+        name: (1, getattr(casadi, name))
+        for name in (
+            *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+            *("exp", "expm1", "log", "log10", "log1p", "sqrt", "floor", "ceil", "sign", "erf"),
+        )
+    },
+    "abs": (1, casadi.fabs),
+    "ln": (1, casadi.log),
+    "atan2": (2, casadi.atan2),
+    "hypot": (2, casadi.hypot),
+    "min": (2, casadi.fmin),
+    "max": (2, casadi.fmax),
+    "power": (2, _power),
+    "pow": (2, _power),
+    "rem": (2, casadi.fmod),
+    "deg2rad": (1, _radians),
+    "rad2deg": (1, _degrees),
+    "if": (3, _where),
+}
+"""Functions by name: how many arguments they take, and what they give; of vectors, element by element."""
+
+MATRIX_FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
+    "transpose": casadi.transpose,
+    "diag": casadi.diag,
+    "inv": _inverse,
+    "sum": casadi.sum1,
+    "norm": casadi.norm_fro,
+}
+"""Functions of one whole vector or matrix."""
+
+
+def _count(number: float) -> int:
+    if not (number >= 0 and number == int(number) and number <= MOST_ELEMENTS):
+        raise ValueError(f"{number:g} is no count of elements")
+    return int(number)
+
+
+def _filled(value: float, rows: float, columns: float | None) -> NDArray[np.float64]:
+    both = (_count(rows), _count(rows if columns is None else columns))
+    _count(float(both[0] * both[1]))
+    return np.full(both, value)
+
+
+def _identity(n: float) -> NDArray[np.float64]:
+    size = _count(n)
+    _count(n * n)
+    return np.eye(size)
+
+
+def range_of(first: float, step: float, last: float | None = None) -> NDArray[np.float64]:
+    """``first:last`` with steps of 1, or ``first:step:last``: the elements are first + k step."""
+    if last is None:
+        step, last = 1.0, step
+    if step == 0 or not math.isfinite(last - first):
+        raise ValueError("the steps do not lead from the first to the last number")
+    # As many as fit, where rounding may be off by a hair.
+    count = _count(max(0.0, math.floor((last - first) / step * (1 + 4e-16) + 1e-10) + 1.0))
+    return first + step * np.arange(count, dtype=np.float64)
+
+
+def _zeros(rows: float, columns: float | None = None) -> NDArray[np.float64]:
+    return _filled(0.0, rows, columns)
+
+
+def _ones(rows: float, columns: float | None = None) -> NDArray[np.float64]:
+    return _filled(1.0, rows, columns)
+
+
+def _linspace(first: float, last: float, count: float) -> NDArray[np.float64]:
+    share = np.arange(_count(count), dtype=np.float64) / max(1.0, count - 1.0)
+    return first * (1.0 - share) + last * share
+
+
+MAKERS: Mapping[str, Callable[..., NDArray[np.float64]]] = {
+    "eye": _identity,
+    "zeros": _zeros,
+    "ones": _ones,
+    "linspace": _linspace,
+}
+"""Functions whose arguments say the size of the array that they make."""
