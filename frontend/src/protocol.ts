@@ -26,7 +26,20 @@ export interface Envelope {
     | Tune
     | TypedValue
     | Scene
-    | Pose;
+    | Pose
+    | RobotOpen
+    | RobotOfBlock
+    | RobotAttach
+    | RobotChange
+    | RobotUndo
+    | RobotRedo
+    | RobotSave
+    | RobotForm
+    | RobotBodies
+    | RobotPose
+    | RobotRead
+    | RobotPicture
+    | Drop;
 }
 /**
  * Open a file of the project, or the shipped example of this name.
@@ -281,6 +294,7 @@ export interface TypedValue {
 export interface Scene {
   kind: "scene";
   document: string;
+  inside?: string[];
   block: string;
 }
 /**
@@ -289,14 +303,189 @@ export interface Scene {
 export interface Pose {
   kind: "pose";
   document: string;
+  inside?: string[];
   block: string;
   q: number[];
+}
+/**
+ * Open a robot: a file of the project, a shipped one, or a new one where both are empty.
+ */
+export interface RobotOpen {
+  kind: "robot_open";
+  path?: string;
+  shipped?: string;
+}
+/**
+ * Open the robot that a block uses: its file, or a copy of it.
+ */
+export interface RobotOfBlock {
+  kind: "robot_of_block";
+  document: string;
+  inside?: string[];
+  block: string;
+}
+/**
+ * Show a robot that is open already: after a reload, or in a second page.
+ */
+export interface RobotAttach {
+  kind: "robot_attach";
+  robot: string;
+}
+/**
+ * Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once.
+ *
+ * Changes in a row of one ``gesture`` (the letters typed into one cell) are one step of undo.
+ */
+export interface RobotChange {
+  kind: "robot_change";
+  robot: string;
+  key: string;
+  gesture?: string;
+  edit: SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention;
+}
+/**
+ * Type into one cell: of a link, or of the robot where ``link`` is empty.
+ */
+export interface SetCell {
+  kind: "cell";
+  link: string;
+  column: string;
+  text: string;
+  angles: "deg" | "rad";
+}
+/**
+ * Give a link another name.
+ */
+export interface RenameLink {
+  kind: "rename";
+  link: string;
+  name: string;
+}
+/**
+ * Put a new link behind another one, or at the base where ``after`` is empty.
+ */
+export interface AddJoint {
+  kind: "add";
+  after: string;
+}
+/**
+ * Take a link out; what hangs on it hangs on its parent then.
+ */
+export interface RemoveJoint {
+  kind: "remove";
+  link: string;
+}
+/**
+ * Let a link of a chain change places with its neighbour.
+ */
+export interface MoveJoint {
+  kind: "move";
+  link: string;
+  by: -1 | 1;
+}
+/**
+ * Read the rows by the other convention, or write the same arm in it (``keep_arm``).
+ */
+export interface SetConvention {
+  kind: "convention";
+  convention: "standard" | "modified";
+  keep_arm: boolean;
+}
+/**
+ * Take the last edit back.
+ */
+export interface RobotUndo {
+  kind: "robot_undo";
+  robot: string;
+}
+/**
+ * Do again what was undone.
+ */
+export interface RobotRedo {
+  kind: "robot_redo";
+  robot: string;
+}
+/**
+ * Write the robot's file; ``path`` gives it another. ``overwrite``: also where the disk has changed.
+ */
+export interface RobotSave {
+  kind: "robot_save";
+  robot: string;
+  path?: string;
+  overwrite?: boolean;
+}
+/**
+ * Ask which tables a robot has and what stands in their columns.
+ */
+export interface RobotForm {
+  kind: "robot_form";
+}
+/**
+ * Ask for the bodies of an open robot.
+ */
+export interface RobotBodies {
+  kind: "robot_bodies";
+  robot: string;
+}
+/**
+ * Ask where the links of an open robot are at ``q``.
+ */
+export interface RobotPose {
+  kind: "robot_pose";
+  robot: string;
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
+}
+/**
+ * Ask what an open robot does at ``q, qd, qdd``.
+ */
+export interface RobotRead {
+  kind: "robot_read";
+  robot: string;
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
+  /**
+   * @maxItems 1000
+   */
+  qd: number[];
+  /**
+   * @maxItems 1000
+   */
+  qdd: number[];
+}
+/**
+ * Ask for a drawing, as SVG, of an open robot at ``q``, or of that of a block where ``block`` is said.
+ */
+export interface RobotPicture {
+  kind: "robot_picture";
+  robot?: string;
+  document?: string;
+  inside?: string[];
+  block?: string;
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
+  theme: "light" | "dark";
+}
+/**
+ * Open a file that was dropped on the page: a script, a robot or a diagram. Nothing of it is run.
+ */
+export interface Drop {
+  kind: "drop";
+  name: string;
+  content: string;
 }
 /**
  * Only for the page's types: everything that the server sends as text.
  */
 export interface ServerMessage {
-  event: Reply | Welcome | Opened | Changed | Checked | RunStarted | RunTuned | RunRewound | RunProgress;
+  event: Reply | Welcome | Opened | Changed | Checked | RunStarted | RunTuned | RunRewound | RunProgress | RobotShown;
+  values?: Opening | RobotTables | Readings | null;
 }
 /**
  * The answer to a request: ``fault`` where it was refused.
@@ -556,4 +745,101 @@ export interface RunProgress {
   fault?: Fault | null;
   solver?: string;
   reason?: string;
+}
+/**
+ * An open robot as it is now: sent to every page that shows it, after every change.
+ */
+export interface RobotShown {
+  kind: "robot";
+  robot: string;
+  version: number;
+  path: string | null;
+  shipped: string;
+  dirty: boolean;
+  undo: string;
+  redo: string;
+  name: string;
+  convention: "standard" | "modified" | "";
+  chain: boolean;
+  links: LinkRow[];
+  fields: {
+    [k: string]: number | string | null;
+  };
+  findings: RobotFinding[];
+  notes: string[];
+}
+/**
+ * A link as the tables show it: values by column in SI units, ``None`` where there is none.
+ */
+export interface LinkRow {
+  name: string;
+  parent: string | null;
+  turns: boolean;
+  moves: boolean;
+  variable: string;
+  cells: {
+    [k: string]: number | string | null;
+  };
+  locked: {
+    [k: string]: string;
+  };
+}
+/**
+ * What no real arm could have, at the columns of a link that say it.
+ */
+export interface RobotFinding {
+  link: string;
+  columns: string[];
+  what: string;
+  fix: string;
+}
+/**
+ * The answer to what opens: the robots or the diagram of a file, and what was said about it.
+ */
+export interface Opening {
+  robots: RobotSpot[];
+  document: string;
+  notes: string[];
+}
+/**
+ * Names of a robot that was opened.
+ */
+export interface RobotSpot {
+  robot: string;
+  name: string;
+}
+/**
+ * The answer to ``robot_form``.
+ */
+export interface RobotTables {
+  kinematics: CellColumn[];
+  dynamics: CellColumn[];
+  robot: CellColumn[];
+}
+/**
+ * A column of a table, or a field of the robot.
+ */
+export interface CellColumn {
+  name: string;
+  title: string;
+  doc: string;
+  quantity: "number" | "angle" | "coordinate" | "rate" | "text" | "choice";
+  unit: string;
+  optional: boolean;
+  choices: string[];
+  group: string;
+}
+/**
+ * What an arm does in one configuration; m, rad, N m, world axes.
+ */
+export interface Readings {
+  pose: number[][];
+  position: number[];
+  rpy: number[];
+  jacobian: number[][];
+  manipulability: number;
+  gravload: number[];
+  torque: number[];
+  singular: string;
+  limits: string[];
 }

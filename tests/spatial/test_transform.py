@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from casadi import SX
 from numpy.testing import assert_allclose
 
 from armblocks.errors import InputError
 from armblocks.spatial import Transform, transl, trotx, troty, trotz
+from armblocks.spatial.orientation import to_rpy
 from robots_for_tests import random_transform
 
 RANDOM = np.random.default_rng(0)
@@ -51,3 +53,17 @@ def test_matrix_that_is_no_pose_is_refused():
         Transform(rotation=np.diag((1.1, 1, 1)))
     with pytest.raises(InputError, match="should be a rotation is a mirror"):
         Transform(rotation=np.diag((1, 1, -1)))
+
+
+def test_roll_pitch_yaw_build_the_rotation_again_and_are_those_of_the_symbols():
+    turns = [random_transform(RANDOM) for _ in range(40)]
+    turns += [
+        trotz(yaw) @ troty(pitch) @ trotx(0.3) for yaw in (-2.0, 0.4) for pitch in (np.pi / 2, -np.pi / 2)
+    ]
+    turns += [troty(np.pi / 2 - 1e-9) @ trotx(0.7), Transform()]
+    for turn in turns:
+        roll, pitch, yaw = turn.rpy
+        again = trotz(yaw) @ troty(pitch) @ trotx(roll)
+        assert_allclose(again.R, turn.R, rtol=0, atol=4e-15)
+        assert_allclose(turn.rpy, [float(angle) for angle in to_rpy(SX(turn.R), "zyx")], rtol=0, atol=4e-15)
+    assert (trotz(0.5) @ troty(np.pi / 2)).rpy[0] == 0.0

@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
     from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.matlab_script import Script, read_script
-    from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot
+    from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot, read_robots
     from armblocks.formats.robot_format import RobotFormat
-    from armblocks.formats.robot_json import read_robot, write_robot
+    from armblocks.formats.robot_json import holds_robot, read_robot, write_robot
     from armblocks.formats.robot_references import ResolveRobot
     from armblocks.formats.table_files import load_table
 else:
@@ -26,6 +26,7 @@ else:
             "diagram_from_bytes": "armblocks.formats.diagram_json",
             "diagram_to_bytes": "armblocks.formats.diagram_json",
             "diagram_to_python": "armblocks.formats.diagram_python",
+            "holds_robot": "armblocks.formats.robot_json",
             "list_examples": "armblocks.formats.diagram_files",
             "list_robots": "armblocks.formats.robot_files",
             "load_diagram": "armblocks.formats.diagram_files",
@@ -33,6 +34,7 @@ else:
             "load_table": "armblocks.formats.table_files",
             "read_diagram": "armblocks.formats.diagram_files",
             "read_robot": "armblocks.formats.robot_json",
+            "read_robots": "armblocks.formats.robot_files",
             "read_script": "armblocks.formats.matlab_script",
             "write_diagram": "armblocks.formats.diagram_files",
             "write_robot": "armblocks.formats.robot_json",
@@ -47,6 +49,7 @@ __all__ = [
     "diagram_from_bytes",
     "diagram_to_bytes",
     "diagram_to_python",
+    "holds_robot",
     "list_examples",
     "list_robots",
     "load_diagram",
@@ -54,6 +57,7 @@ __all__ = [
     "load_table",
     "read_diagram",
     "read_robot",
+    "read_robots",
     "read_script",
     "write_diagram",
     "write_robot",

@@ -93,12 +93,30 @@ def _read_file(path: Path) -> Mapping[str, Robot]:
             allowed="a robot file: " + ", ".join(suffix for f in ROBOT_FORMATS for suffix in f.suffixes),
             fix=f"give the path of a file in it, such as {path.name}/{SHIPPED_FILE}",
         )
+    format = _format(str(path))
+    return format.read(read_bounded(path, format.most_bytes), str(path))
+
+
+def read_robots(data: bytes, name: str) -> Mapping[str, Robot]:
+    """The robots of a file's bytes, by the names that the file gives them; the suffix of ``name`` says the
+    format.
+
+    ``name`` is what messages call the file. Raises ``FormatError``.
+    """
+    format = _format(name)
+    if len(data) > format.most_bytes:
+        raise FormatError(f"it has {len(data)} bytes", where=name, allowed=f"at most {format.most_bytes}")
+    return format.read(data, name)
+
+
+def _format(name: str) -> RobotFormat:
+    suffix = Path(name).suffix.lower()
     for format in ROBOT_FORMATS:
-        if path.suffix.lower() in format.suffixes:
-            return format.read(read_bounded(path, format.most_bytes), str(path))
+        if suffix in format.suffixes:
+            return format
     raise FormatError(
-        f"'{path.suffix}' is no suffix of a robot file",
-        where=str(path),
+        f"'{Path(name).suffix}' is no suffix of a robot file",
+        where=name,
         allowed=", ".join(f"{suffix} ({f.name})" for f in ROBOT_FORMATS for suffix in f.suffixes),
         fix="rename the file",
     )

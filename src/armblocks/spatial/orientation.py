@@ -15,6 +15,8 @@ from collections.abc import Mapping, Sequence
 
 from casadi import SX, atan2, cos, dot, hypot, if_else, sin, sqrt, vertcat
 
+from armblocks.spatial.rotation import SINGULAR
+
 RPY_CONVENTIONS: Mapping[str, tuple[str, bool]] = {
     "zyx": ("zyx", True),
     "xyz": ("xyz", True),
@@ -28,8 +30,6 @@ RPY_CONVENTIONS: Mapping[str, tuple[str, bool]] = {
 release's other orders. ``release 9`` (and 8): R = Rx(roll) Ry(pitch) Rz(yaw). ``release 7``: R = Rz(roll)
 Ry(pitch) Rx(yaw), which releases 8 and 9 call ``zyx``.
 """
-SINGULAR = 2.2e-15
-"""Below this cosine of the middle angle (ten roundings) only the sum or difference of the others is known."""
 
 
 def rotation_about_axis(axis: str, angle: SX) -> SX:

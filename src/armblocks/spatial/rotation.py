@@ -21,6 +21,10 @@ Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 
 IDENTITY3: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
+SINGULAR = 2.2e-15
+"""Below this cosine of the middle of three angles (ten roundings) only the sum or difference of the others is
+known."""
+
 
 def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
     """Three numbers in any array shape of size 3 as a tuple; raises InputError for another count."""

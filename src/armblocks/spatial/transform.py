@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.errors import InputError
 from armblocks.spatial.rotation import (
     IDENTITY3,
+    SINGULAR,
     Matrix3,
     Vector3,
     matrix3,
@@ -74,6 +76,19 @@ class Transform:
     def p(self) -> NDArray[np.float64]:
         """The translation in m, a new (3,) array."""
         return np.array(self.translation)
+
+    @property
+    def rpy(self) -> Vector3:
+        """Roll, pitch, yaw (rad) with R = Rz(yaw) Ry(pitch) Rx(roll); roll is 0 where abs(pitch) is pi/2.
+
+        For numbers what :func:`armblocks.spatial.orientation.to_rpy` is for symbols, convention ``zyx``.
+        """
+        (_, xy, xz), (_, yy, yz), (zx, zy, zz) = self.rotation
+        cosine = math.hypot(zz, zy)
+        roll = 0.0 if cosine < SINGULAR else math.atan2(zy, zz)
+        # The y axis once the roll is undone: it does not depend on the pitch.
+        c, s = math.cos(roll), math.sin(roll)
+        return roll, math.atan2(-zx, cosine), math.atan2(s * xz - c * xy, c * yy - s * yz)
 
     @cached_property
     def is_identity(self) -> bool:

@@ -6,8 +6,9 @@ import asyncio
 import contextlib
 import dataclasses
 import secrets
+import warnings
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -18,14 +19,15 @@ from starlette.websockets import WebSocketDisconnect
 from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram
-from armblocks.errors import ArmblocksError, FormatError, InputError, UnknownNameError
+from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputError, UnknownNameError
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
 from armblocks.studio.document import Document
-from armblocks.studio.nesting import inside, with_inside
+from armblocks.studio.nesting import inside, with_inside, with_robot
 from armblocks.studio.parameter_values import parameter_json, parameter_value
 from armblocks.studio.project_folder import FileState, ProjectFolder
+from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
 from armblocks.studio.run_process import RunProcess, Worker
 from armblocks.studio.sheet import arranged, library, placed, sheet, sheet_change
@@ -89,6 +91,7 @@ class Hub:
         self.pages: set[Page] = set()
         self.documents: dict[str, OpenDocument] = {}
         self.runs: dict[str, RunProcess] = {}
+        self.robots = RobotDesk(folder, self)
         self._spare: Worker | None = None
 
     def prepare(self) -> None:
@@ -115,6 +118,7 @@ class Hub:
     def leave(self, page: Page) -> None:
         """A page has gone; what it showed stays open for when it returns."""
         self.pages.discard(page)
+        self.robots.leave(page)
 
     async def answer(self, page: Page, text: str) -> None:
         """Carry out one request and reply to it, whatever becomes of it."""
@@ -129,6 +133,8 @@ class Hub:
     async def carry_out(self, page: Page, request: say.Request) -> Any:
         """Do what a page asks; the value goes into the reply. Raises ``ArmblocksError``."""
         match request:
+            case say.Open(path=path) if path and self._is_robot_file(path):
+                return await self.robots.open_file(page, path)
             case say.Open():
                 return await self._show(page, self._open(request))
             case say.New():
@@ -144,13 +150,16 @@ class Hub:
             case say.TypedValue():
                 return self._typed(request)
             case say.Scene():
-                return scene_of(self._robot(request.document, request.block))
+                return scene_of(self.block_robot(request.document, request.inside, request.block))
             case say.Pose():
-                return link_frames_of(self._robot(request.document, request.block), request.q)
+                robot = self.block_robot(request.document, request.inside, request.block)
+                return link_frames_of(robot, request.q)
             case say.Run():
                 return await self._run(request)
             case say.Control() | say.SetSpeed() | say.Rewind() | say.Tune():
                 return self._known_run(request.run).obey(request)
+            case _:
+                return await self.robots.carry_out(page, request)
 
     async def tell_all(self, document: str, event: say.Message) -> None:
         """Tell every page that shows a document."""
@@ -271,13 +280,42 @@ class Hub:
 
     def resolve_robot(self, name: str) -> Robot:
         """A shipped robot or a robot file of the project."""
-        return formats.load_robot(self.folder.robot_path(name, formats.list_robots()))
+        with warnings.catch_warnings():  # the robot editor marks them
+            warnings.simplefilter("ignore", InertiaWarning)
+            return formats.load_robot(self.folder.robot_path(name, formats.list_robots()))
 
-    def _robot(self, key: str, block: str) -> Robot:
-        robot = getattr(self._known(key).document.diagram.block(block), "robot", None)
+    # -- robots ----------------------------------------------------------------------------------------------
+
+    def _is_robot_file(self, path: str) -> bool:
+        return path.lower().endswith(".m") or formats.holds_robot(self.folder.read(path))
+
+    def block_robot(self, document: str, path: Sequence[str], block: str) -> Robot:
+        """The robot that a block of an open diagram uses."""
+        level = inside(self._known(document).document.diagram, path)
+        robot = getattr(level.block(block), "robot", None)
         if not isinstance(robot, Robot):
             raise InputError("the block has no robot", where=f"block '{block}'", allowed="a robot block")
         return robot
+
+    async def show_diagram(self, page: Page, data: bytes, name: str) -> str:
+        """Open a diagram that has no file yet; its key."""
+        diagram = formats.diagram_from_bytes(
+            data, name, BLOCKS, self.resolve_robot, folder=self.folder.root, draft=True
+        )
+        return await self._show(page, self._add(diagram, None))
+
+    async def robot_saved(self, robot: Robot) -> None:
+        """The file of a robot has changed: diagrams that use it take it anew, as a step of undo."""
+        for found in self.documents.values():
+            document = found.document
+            before, version_before = document.diagram, document.version
+            after = with_robot(before, robot)
+            if after is before:
+                continue
+            document.replace(f"new form of {robot.name}", after)
+            for page in [page for page in self.pages if found.key in page.shows]:
+                await self._tell_change(page, found, before, version_before)
+            self._check_later(found)
 
     def _typed(self, request: say.TypedValue) -> Any:
         rules = {rule.name: rule for rule in BLOCKS[request.type].parameters()}

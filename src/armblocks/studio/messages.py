@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from armblocks.studio.edits import Edit, Message, Place, Wire
+from armblocks.studio.robot_messages import Opening, Readings, RobotRequest, RobotShown, RobotTables
 
 # -- what a page shows ---------------------------------------------------------------------------------------
 
@@ -289,6 +290,7 @@ class Scene(Message):
 
     kind: Literal["scene"] = "scene"
     document: str
+    inside: list[str] = Field(default_factory=list[str])
     block: str
 
 
@@ -297,6 +299,7 @@ class Pose(Message):
 
     kind: Literal["pose"] = "pose"
     document: str
+    inside: list[str] = Field(default_factory=list[str])
     block: str
     q: list[float]
 
@@ -318,7 +321,8 @@ Request = Annotated[
     | Tune
     | TypedValue
     | Scene
-    | Pose,
+    | Pose
+    | RobotRequest,
     Field(discriminator="kind"),
 ]
 
@@ -440,10 +444,14 @@ class RunProgress(Message):
 
 RunEvent = Annotated[RunStarted | RunTuned | RunRewound | RunProgress, Field(discriminator="kind")]
 """What the process of a run has to say, besides its samples."""
-Event = Annotated[Reply | Welcome | Opened | Changed | Checked | RunEvent, Field(discriminator="kind")]
+Event = Annotated[
+    Reply | Welcome | Opened | Changed | Checked | RunEvent | RobotShown, Field(discriminator="kind")
+]
 
 
 class ServerMessage(Message):
     """Only for the page's types: everything that the server sends as text."""
 
     event: Event
+    values: Opening | RobotTables | Readings | None = None
+    """Some of what replies carry as their value."""

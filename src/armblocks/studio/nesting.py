@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
+from pathlib import Path
 
 from armblocks.diagram import Block, Connection, Diagram, Inport, Outport, Placement, PortRef, Subsystem
 from armblocks.diagram.names import check_block_name, folded
-from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
+from armblocks.robot import Robot
 
 _MARGIN = 120.0
 """px between the blocks of a new subsystem and its ends."""
@@ -51,6 +54,32 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
             and (wire.target.block != name or wire.target.port in into)
         ),
     )
+
+
+def with_robot(diagram: Diagram, robot: Robot) -> Diagram:
+    """The diagram in which every block whose robot comes from the same file as this one has this one.
+
+    On all levels; the same diagram where there is no such block. A block that cannot take the robot (its
+    parameters were made for another count of joints) keeps what it has.
+    """
+    changed: dict[str, Block] = {}
+    for name, block in diagram.blocks.items():
+        if isinstance(block, Subsystem):
+            inner = with_robot(block.diagram, robot)
+            if inner is not block.diagram:
+                changed[name] = dataclasses.replace(block, diagram=inner)
+            continue
+        known = getattr(block, "robot", None)
+        if isinstance(known, Robot) and _same_file(known, robot) and known != robot:
+            with contextlib.suppress(ArmblocksError):
+                changed[name] = dataclasses.replace(block, robot=robot)  # pyright: ignore[reportCallIssue]
+    for name, block in changed.items():
+        diagram = with_block(diagram, name, block)
+    return diagram
+
+
+def _same_file(one: Robot, other: Robot) -> bool:
+    return bool(one.source) and Path(one.source).resolve() == Path(other.source).resolve()
 
 
 def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:

@@ -54,11 +54,12 @@ def number_value(text: str, where: str) -> float | list[Any]:
     if len(text) > LONGEST_TEXT or not text.strip() or any(mark in text for mark in "\n\r\0"):
         raise InputError("this is no value", where=where, allowed=allowed, fix="type a value")
     try:
-        variables = read_script(f"deg = pi/180; value = {text};".encode(), "field").variables
+        variables = read_script(f"deg = pi/180; rad = 1; value = {text};".encode(), "field").variables
     except ArmblocksError as error:
-        raise InputError(f"'{_short(text)}': {error.what}", where=where, allowed=allowed) from None
+        what = error.what.partition(", in: ")[0]  # the line around it is not the user's
+        raise InputError(f"'{_short(text)}': {what}", where=where, allowed=allowed) from None
     value = variables.get("value")
-    if set(variables) != {"deg", "value"} or not isinstance(value, np.ndarray):
+    if set(variables) != {"deg", "rad", "value"} or not isinstance(value, np.ndarray):
         raise InputError(f"'{_short(text)}' is no number", where=where, allowed=allowed, fix="type a value")
     array = np.asarray(value, dtype=np.float64)
     if array.size == 1:

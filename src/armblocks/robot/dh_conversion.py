@@ -1,0 +1,105 @@
+"""From standard to modified Denavit-Hartenberg rows and back: the same arm, told the other way.
+
+Both conventions say the same product of turns and shifts,
+
+    Rz(theta1) Tz(d1) · Tx(a1) Rx(alpha1) · Rz(theta2) Tz(d2) · Tx(a2) Rx(alpha2) …
+
+and cut it at different places: a standard row holds what follows its joint, a modified row what goes before.
+So the numbers alpha and a move on by one row; what is left over at the end goes into the tool, or into the
+base. Each link's frame moves, and its centre of mass, inertia and shapes are told in the new one.
+
+Sources: Corke, *Robotics, Vision and Control*, 2nd ed., 7.1.2; Craig, *Introduction to Robotics*, 3.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armblocks.errors import RobotError
+from armblocks.robot.dh import link_from_dh, serial_chain
+from armblocks.robot.dh_row import DhConvention, DhRow
+from armblocks.robot.link import Link
+from armblocks.robot.robot import Robot
+from armblocks.robot.shapes import Pose
+from armblocks.spatial import Transform, transl, trotx
+
+
+def converted(robot: Robot, convention: DhConvention) -> Robot:
+    """The same arm in rows of ``convention``: pose of the tool, Jacobian and joint torques stay.
+
+    Frames of the links do change, and so what a wrench in the last link's frame means. Raises RobotError
+    for a robot that is no single chain of D-H rows.
+    """
+    rows = _rows(robot)
+    if all(row.convention is convention for row in rows):
+        return robot
+    shifts = [transl(row.a, 0.0, 0.0) @ trotx(row.alpha) for row in rows]
+    if convention is DhConvention.MODIFIED:
+        numbers = [(0.0, 0.0), *((row.alpha, row.a) for row in rows[:-1])]
+        moved = shifts  # a link's old frame as seen from its new one, which stands before the shift
+        ends = {"tool": shifts[-1] @ robot.tool}
+    else:
+        numbers = [*((row.alpha, row.a) for row in rows[1:]), (0.0, 0.0)]
+        moved = [*(shift.inverse() for shift in shifts[1:]), Transform()]
+        ends = {"base": robot.base @ shifts[0]}
+    links = [
+        _retold(link, replace(row, alpha=alpha, a=a, convention=convention), shift)
+        for link, row, (alpha, a), shift in zip(robot.links, rows, numbers, moved)
+    ]
+    return replace(robot, links=tuple(links), **ends)
+
+
+def reread(robot: Robot, convention: DhConvention) -> Robot:
+    """The same numbers in rows of the other convention: another arm.
+
+    Raises RobotError as :func:`converted` does.
+    """
+    rows = [replace(row, convention=convention) for row in _rows(robot)]
+    return replace(
+        robot, links=tuple(_retold(link, row, Transform()) for link, row in zip(robot.links, rows))
+    )
+
+
+def _rows(robot: Robot) -> Sequence[DhRow]:
+    where = f"robot '{robot.name}'"
+    rows = [link.dh for link in robot.links if link.dh is not None]
+    if len(rows) < len(robot.links) or robot.links != serial_chain(robot.links):
+        raise RobotError(
+            "it is no single chain of D-H rows",
+            where=where,
+            allowed="robots whose every link has a row and hangs on the link before it",
+        )
+    if len({row.convention for row in rows}) > 1:
+        raise RobotError(
+            "its rows are of both conventions", where=where, allowed="rows of one convention throughout"
+        )
+    return rows
+
+
+def _retold(link: Link, row: DhRow, T_new_old: Transform) -> Link:
+    """The link with another row, its body told in the frame in which the old one has this pose."""
+    R = T_new_old.R
+    inertia = R @ link.I @ R.T
+    geometry = link.geometry
+    if geometry is not None:
+        geometry = tuple(replace(shape, pose=_pose(T_new_old, shape.pose)) for shape in geometry)
+    return link_from_dh(
+        link.name,
+        row,
+        parent=link.parent,
+        limits=link.joint.limits,
+        mass=link.mass,
+        centre_of_mass=T_new_old.apply(link.centre_of_mass),
+        inertia=(inertia + inertia.T) / 2,
+        motor=link.motor,
+        geometry=geometry,
+    )
+
+
+def _pose(T_new_old: Transform, pose: Pose) -> Pose:
+    moved = (T_new_old.matrix @ np.array(pose)).tolist()
+    a, b, c, d = ((row[0], row[1], row[2], row[3]) for row in moved)
+    return a, b, c, d

@@ -1,0 +1,92 @@
+"""Telling an arm in the other D-H convention changes its rows and nothing that it does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from armblocks.errors import RobotError
+from armblocks.formats import load_robot
+from armblocks.robot import DhConvention, Link, Robot, standard_dh
+from armblocks.robot.dh_conversion import converted, reread
+from armblocks.robot.shapes import Box
+from armblocks.spatial import transl, trotx
+from robots_for_tests import evaluate, random_states
+
+STANDARD, MODIFIED = DhConvention.STANDARD, DhConvention.MODIFIED
+
+
+def arms() -> list[Robot]:
+    sliding = load_robot("puma560")
+    first = sliding.links[0]
+    slide = standard_dh(
+        "slide",
+        alpha=0.4,
+        a=0.1,
+        theta=0.3,
+        sigma=1,
+        offset=0.05,
+        mass=2.0,
+        centre_of_mass=(0.1, 0.2, 0.3),
+        inertia=(0.1, 0.2, 0.15, 0.01, 0.02, 0.03),
+    )
+    chain = (slide, replace(first, parent="slide"), *sliding.links[1:])
+    tooled = replace(sliding, links=chain, tool=transl(0.1, 0.0, 0.2) @ trotx(0.3), base=transl(0, 0, 1))
+    return [load_robot("kr180"), load_robot("puma560"), tooled]
+
+
+@pytest.mark.parametrize("robot", arms(), ids=lambda robot: f"{robot.name}-{robot.joint_letters}")
+def test_the_converted_arm_is_the_same_arm(robot: Robot) -> None:
+    modified = converted(robot, MODIFIED)
+    assert {link.dh.convention for link in modified.links if link.dh} == {MODIFIED}
+    assert converted(modified, MODIFIED) is modified
+    back = converted(modified, STANDARD)
+    for q, qd, qdd in random_states(robot):
+        for told in (modified, back):
+            for name, inputs in (("fkine", (q,)), ("jacob0", (q,)), ("rne", (q, qd, qdd))):
+                expected = evaluate(robot, name, *inputs)
+                scale = max(1.0, float(np.abs(expected).max()))
+                # Frames are built by other products of the same turns: some tens of roundings.
+                assert_allclose(evaluate(told, name, *inputs), expected, rtol=0, atol=2e-13 * scale)
+    for link, again in zip(robot.links, back.links):
+        # What was left over went to the tool on the way there and stays there on the way back.
+        if link is not robot.links[-1]:
+            assert again.dh == link.dh
+            assert_allclose(again.I, link.I, rtol=0, atol=1e-14)
+
+
+def test_shapes_stay_where_they_are_in_the_world() -> None:
+    boxed = load_robot("kr180").with_link("link3", geometry=(Box(size=(1.0, 1.0, 1.0)),))
+    told = converted(boxed, MODIFIED)
+    q = [0.1, 0.2, 0.3, 0.4]
+    poses = [evaluate(robot, "link_poses", q)[3] for robot in (boxed, told)]
+    shapes = [robot.link("link3").geometry for robot in (boxed, told)]
+    assert shapes[0] and shapes[1]
+    assert_allclose(
+        poses[1] @ np.array(shapes[1][0].pose), poses[0] @ np.array(shapes[0][0].pose), atol=1e-13
+    )
+
+
+def test_reading_the_same_numbers_by_the_other_convention_is_another_arm() -> None:
+    robot = load_robot("kr180")
+    other = reread(robot, MODIFIED)
+    assert [replace(link.dh, convention=STANDARD) for link in other.links if link.dh] == [
+        link.dh for link in robot.links
+    ]
+    assert not np.allclose(evaluate(other, "fkine", np.zeros(4)), evaluate(robot, "fkine", np.zeros(4)))
+    assert reread(other, STANDARD) == robot
+
+
+def test_what_is_no_chain_of_rows_is_refused() -> None:
+    robot = load_robot("puma560")
+    tree = replace(robot, links=(*robot.links, standard_dh("finger", parent="link2")))
+    loose = replace(robot, links=(*robot.links, Link(name="plate", parent=robot.links[-1].name)))
+    for other in (tree, loose):
+        with pytest.raises(RobotError, match="no single chain of D-H rows"):
+            converted(other, MODIFIED)
+    first = reread(robot, MODIFIED).links[0]
+    with pytest.raises(RobotError, match="rows are of both conventions"):
+        converted(replace(robot, links=(first, *robot.links[1:])), STANDARD)
