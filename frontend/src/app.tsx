@@ -8,7 +8,9 @@ import { Palette } from './library/palette'
 import { QuickInsert } from './library/quick_insert'
 import { Notices } from './notices'
 import { TopBar } from './run/top_bar'
+import { Configuration } from './run/configuration'
 import { Timeline } from './run/timeline'
+import { TunePanel } from './run/tune_panel'
 import { Shortcuts } from './shortcuts'
 import { Scopes } from './scopes/scopes'
 
@@ -18,6 +20,7 @@ const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
   library: Palette,
   canvas: Canvas,
   scopes: Scopes,
+  tune: TunePanel,
   robot: () => (
     <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
       <RobotView />
@@ -47,6 +50,7 @@ function arrange({ api }: DockviewReadyEvent): void {
     position: { referencePanel: 'canvas', direction: 'right' },
     initialWidth: Math.min(420, 0.28 * innerWidth),
   })
+  api.addPanel({ id: 'tune', component: 'tune', title: 'Tune', position: { referencePanel: 'robot' }, inactive: true })
   api.addPanel({
     id: 'scopes',
     component: 'scopes',
@@ -71,6 +75,7 @@ export function App() {
       </main>
       <Timeline />
       <BlockDialog />
+      <Configuration />
       <QuickInsert />
       <ConnectDialog />
       <Shortcuts />

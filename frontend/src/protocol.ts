@@ -25,6 +25,7 @@ export interface Envelope {
     | Rewind
     | Tune
     | TypedValue
+    | TypedSettings
     | Scene
     | Pose
     | RobotOpen
@@ -289,6 +290,16 @@ export interface TypedValue {
   text: string;
 }
 /**
+ * Ask what is wrong with settings while they are typed: a text for each that is, by name.
+ */
+export interface TypedSettings {
+  kind: "typed_settings";
+  document: string;
+  values: {
+    [k: string]: number | string | null;
+  };
+}
+/**
  * Ask for the bodies of the robot that a block shows.
  */
 export interface Scene {
@@ -515,7 +526,8 @@ export interface Welcome {
   version: string;
   library: BlockType[];
   robots: string[];
-  solvers: string[];
+  solvers: SolverChoice[];
+  settings: SettingRule[];
   examples: {
     [k: string]: string;
   };
@@ -548,6 +560,25 @@ export interface ParameterRule {
   tunable: boolean;
   choices: string[];
   allowed: string;
+}
+/**
+ * A solver that a model may ask for.
+ */
+export interface SolverChoice {
+  name: string;
+  title: string;
+  adaptive: boolean;
+  stiff: boolean;
+}
+/**
+ * One setting of a run, as the dialog of configuration parameters needs it.
+ */
+export interface SettingRule {
+  name: string;
+  title: string;
+  unit: string;
+  doc: string;
+  default: number | string | null;
 }
 /**
  * Where a document stands.

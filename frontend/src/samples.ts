@@ -7,37 +7,43 @@ interface Columns {
   channel: Channel
 }
 
+/** One recorded signal: its channel, the instants (s), and one typed array for each of its elements. */
+export interface Signal {
+  channel: Channel
+  time: Float64Array
+  columns: Float64Array[]
+}
+
+const FIRST_ROOM = 1024
+let versions = 0
+
 /**
- * The samples of the run on the screen, outside of React: frames arrive faster than a page may render.
+ * The samples of one run, outside of React: frames arrive faster than a page may render.
  * Every view draws from here on its own animation frame and compares `version` with what it drew last.
  */
-class Samples {
-  version = 0
-  run = ''
+export class RunSamples {
+  version = ++versions
   count = 0
-  time = new Float64Array(0)
-  private data: Float64Array[] = []
+  time = new Float64Array(FIRST_ROOM)
+  private data: Float64Array[]
   private readonly columns = new Map<string, Columns>()
-  private aliases: Record<string, string> = {}
 
-  clear(): void {
-    this.begin('', [], {})
-  }
-
-  begin(run: string, channels: Channel[], aliases: Record<string, string>): void {
-    this.run = run
-    this.count = 0
-    this.time = new Float64Array(1024)
-    this.columns.clear()
-    this.aliases = aliases
+  constructor(
+    readonly run: string,
+    channels: Channel[],
+    private readonly aliases: Record<string, string>,
+  ) {
     let first = 0
     for (const channel of channels) {
       const count = channel.shape.reduce((product, n) => product * n, 1)
       this.columns.set(channel.name, { first, count, channel })
       first += count
     }
-    this.data = Array.from({ length: first }, () => new Float64Array(1024))
-    this.version++
+    this.data = Array.from({ length: first }, () => new Float64Array(FIRST_ROOM))
+  }
+
+  get bytes(): number {
+    return 8 * this.time.length * (1 + this.data.length)
   }
 
   receive(frame: ArrayBuffer): void {
@@ -57,38 +63,46 @@ class Samples {
       column.set(new Float64Array(frame, at, count), first)
     }
     this.count = first + count
-    this.version++
+    this.version = ++versions
   }
 
   /** Only the first samples are still true: the run has gone back. */
   truncate(count: number): void {
     this.count = Math.min(this.count, count)
-    this.version++
+    this.version = ++versions
   }
 
-  /** The signal of this name or alias: its channel and one typed array for each of its elements. */
-  signal(name: string): { channel: Channel; columns: Float64Array[] } | undefined {
+  /** The run has ended: no more room than is needed. */
+  close(): void {
+    this.time = this.time.slice(0, this.count)
+    this.data = this.data.map((column) => column.slice(0, this.count))
+  }
+
+  /** Names of all signals, as they were recorded. */
+  get names(): string[] {
+    return [...this.columns.keys()]
+  }
+
+  /** The signal of this name or alias. */
+  signal(name: string): Signal | undefined {
     const found = this.columns.get(name) ?? this.columns.get(this.aliases[name] ?? '')
     if (!found) return undefined
     const columns = this.data.slice(found.first, found.first + found.count)
-    return { channel: found.channel, columns: columns.map((column) => column.subarray(0, this.count)) }
+    return {
+      channel: found.channel,
+      time: this.time.subarray(0, this.count),
+      columns: columns.map((column) => column.subarray(0, this.count)),
+    }
   }
 
   /** Index of the last sample at or before a time (s); -1 if there is none. */
   indexAt(time: number): number {
-    let low = 0
-    let high = this.count
-    while (low < high) {
-      const middle = (low + high) >> 1
-      if ((this.time[middle] ?? Infinity) <= time) low = middle + 1
-      else high = middle
-    }
-    return low - 1
+    return firstAfter(this.time, time, this.count) - 1
   }
 
   private reserve(count: number): void {
     if (count <= this.time.length) return
-    let size = this.time.length
+    let size = Math.max(this.time.length, FIRST_ROOM)
     while (size < count) size *= 2
     const grown = (old: Float64Array) => {
       const column = new Float64Array(size)
@@ -100,4 +114,21 @@ class Samples {
   }
 }
 
-export const samples = new Samples()
+/** Index of the first of `count` increasing times that is later than a time; `count` if none is. */
+export function firstAfter(times: Float64Array, time: number, count = times.length): number {
+  let low = 0
+  let high = count
+  while (low < high) {
+    const middle = (low + high) >> 1
+    if ((times[middle] ?? Infinity) <= time) low = middle + 1
+    else high = middle
+  }
+  return low
+}
+
+/** The samples of the run on the screen; another object for each run. */
+export let samples = new RunSamples('', [], {})
+
+export function showSamples(shown: RunSamples): void {
+  samples = shown
+}

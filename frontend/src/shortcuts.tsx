@@ -23,6 +23,7 @@ const SHORTCUTS: [keys: string, what: string][] = [
   ['Ctrl+Z, Ctrl+Y', 'undo, redo'],
   ['Ctrl+S', 'save'],
   ['Ctrl+Enter', 'run, or go on after a pause'],
+  ['Ctrl+E', 'configuration parameters: solver, tolerances, stop time'],
   ['Space', 'fit the sheet into the window'],
   ['?', 'this list'],
 ]

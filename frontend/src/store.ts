@@ -15,6 +15,7 @@ import type {
   Wire,
   WireKind,
 } from './protocol'
+import * as runs from './run/runs'
 import { samples } from './samples'
 
 export type Edit = Extract<Envelope['request'], { kind: 'change' }>['edit']
@@ -41,6 +42,9 @@ export interface RunView {
   realTimeFactor: number
   message: string
   fault: Fault | null
+  /** What worked it out and why that: known at the end. */
+  solver: string
+  reason: string
   channels: Channel[]
   views: ViewOf[]
   aliases: Record<string, string>
@@ -136,7 +140,7 @@ function receive(event: ServerEvent): void {
         },
         ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
       })
-      if (!same) samples.clear()
+      if (!same) runs.forget()
       break
     }
     case 'changed':
@@ -149,7 +153,7 @@ function receive(event: ServerEvent): void {
       if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
       break
     case 'run_started':
-      samples.begin(event.run, event.channels, event.aliases)
+      runs.began(event)
       useStudio.setState({
         run: {
           run: event.run,
@@ -159,6 +163,8 @@ function receive(event: ServerEvent): void {
           realTimeFactor: 0,
           message: '',
           fault: null,
+          solver: '',
+          reason: '',
           channels: event.channels,
           views: event.views,
           aliases: event.aliases,
@@ -166,10 +172,14 @@ function receive(event: ServerEvent): void {
         },
       })
       break
+    case 'run_tuned':
+      runs.tuned(event)
+      break
     case 'run_rewound':
-      if (run?.run === event.run) samples.truncate(event.count)
+      runs.rewound(event)
       break
     case 'run_progress':
+      runs.progressed(event)
       if (run?.run === event.run)
         useStudio.setState({
           run: {
@@ -179,6 +189,8 @@ function receive(event: ServerEvent): void {
             realTimeFactor: event.real_time_factor,
             message: event.message,
             fault: event.fault ?? null,
+            solver: event.solver ?? '',
+            reason: event.reason ?? '',
           },
         })
       if (event.fault) notify(event.fault)

@@ -152,7 +152,7 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
     page.get_by_role("button", name="Pause").click()
     expect(state).to_contain_text("paused")
     before = page.locator(".run-state .numbers").first.inner_text()
-    page.get_by_role("button", name="Step").click()
+    page.get_by_role("button", name="Step", exact=True).click()
     expect(page.locator(".run-state .numbers").first).not_to_have_text(before)
     page.get_by_role("button", name="Resume").click()
     expect(state).to_contain_text("running")

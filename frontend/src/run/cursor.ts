@@ -6,26 +6,30 @@ interface Cursor {
   /** The instant (s) that every view shows; null follows the end of the run. */
   time: number | null
   playing: boolean
+  loop: boolean
   rate: number
 }
 
 /** One time cursor for scopes, values and the robot. */
-export const useCursor = create<Cursor>(() => ({ time: null, playing: false, rate: 1 }))
+export const useCursor = create<Cursor>(() => ({ time: null, playing: false, loop: false, rate: 1 }))
+
+const reached = () => samples.time[samples.count - 1] ?? 0
 
 /** The instant to show now. */
 export function shownTime(): number {
-  const { time } = useCursor.getState()
-  return time ?? samples.time[samples.count - 1] ?? 0
+  return useCursor.getState().time ?? reached()
 }
 
 let last = 0
 
 function tick(now: number): void {
-  const { playing, time, rate } = useCursor.getState()
-  const stop = useStudio.getState().run?.stopTime ?? 0
+  const { playing, loop, time, rate } = useCursor.getState()
   if (playing && time !== null) {
     const next = time + (rate * (now - last)) / 1000
-    useCursor.setState(next >= stop ? { time: stop, playing: false } : { time: next })
+    const end = reached()
+    if (next < end) useCursor.setState({ time: next })
+    else if (loop) useCursor.setState({ time: samples.time[0] ?? 0 })
+    else useCursor.setState({ time: end, playing: false })
   }
   last = now
   requestAnimationFrame(tick)
@@ -34,7 +38,22 @@ requestAnimationFrame(tick)
 
 /** Play the recorded run from the cursor, from the start where it stands at the end. */
 export function play(): void {
-  const stop = useStudio.getState().run?.stopTime ?? 0
   const from = shownTime()
-  useCursor.setState({ playing: true, time: from >= stop ? 0 : from })
+  useCursor.setState({ playing: true, time: from >= reached() ? (samples.time[0] ?? 0) : from })
+}
+
+export function hold(): void {
+  useCursor.setState({ playing: false })
+}
+
+/** Show an earlier or later recorded instant. */
+export function stepCursor(by: number): void {
+  const index = Math.min(Math.max(samples.indexAt(shownTime()) + by, 0), samples.count - 1)
+  if (index >= 0) useCursor.setState({ time: samples.time[index]!, playing: false })
+}
+
+/** Whether the run has ended: nothing is left but to look at it. */
+export function ended(): boolean {
+  const { run } = useStudio.getState()
+  return run !== null && run.state !== 'running' && run.state !== 'paused'
 }

@@ -1,21 +1,40 @@
-import { ActionIcon, Slider, Text } from '@mantine/core'
-import { IconPlayerPauseFilled, IconPlayerPlayFilled } from '@tabler/icons-react'
-import { useStudio } from '../store'
-import { play, shownTime, useCursor } from './cursor'
+import { ActionIcon, Button, NativeSelect, Slider, Text, Tooltip } from '@mantine/core'
+import { IconPlayerPauseFilled, IconPlayerPlayFilled, IconRepeat } from '@tabler/icons-react'
+import { ask, useStudio } from '../store'
+import { hold, play, shownTime, stepCursor, useCursor } from './cursor'
+
+const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} ×` }))
+const LONG_STEP = 10
 
 /** The time cursor of all views: drag it through the run, or play the run again. */
 export function Timeline() {
   const run = useStudio((s) => s.run)
-  const time = useCursor((s) => s.time)
-  const playing = useCursor((s) => s.playing)
+  const { time, playing, loop, rate } = useCursor()
   const stop = run?.stopTime ?? 10
   const at = time ?? run?.time ?? 0
   const label = playing ? 'Hold the playback' : 'Play the run'
+  const keys = (event: React.KeyboardEvent) => {
+    if (event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey) return
+    const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key]
+    if (by) stepCursor(event.shiftKey ? LONG_STEP * by : by)
+    else if (event.key === ' ' && run) playing ? hold() : play()
+    else return
+    event.preventDefault()
+    event.stopPropagation()
+  }
   return (
-    <footer className="timeline">
-      <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={!run} onClick={() => (playing ? useCursor.setState({ playing: false }) : play())}>
-        {playing ? <IconPlayerPauseFilled size={15} /> : <IconPlayerPlayFilled size={15} />}
-      </ActionIcon>
+    <footer className="timeline" onKeyDownCapture={keys}>
+      <Tooltip label={`${label} (Space)`} openDelay={400}>
+        <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={!run} onClick={() => (playing ? hold() : play())}>
+          {playing ? <IconPlayerPauseFilled size={15} /> : <IconPlayerPlayFilled size={15} />}
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label="Begin again at the end" openDelay={400}>
+        <ActionIcon variant={loop ? 'light' : 'subtle'} color={loop ? 'accent' : 'gray'} aria-label="Loop" aria-pressed={loop} onClick={() => useCursor.setState({ loop: !loop })}>
+          <IconRepeat size={15} />
+        </ActionIcon>
+      </Tooltip>
+      <NativeSelect size="xs" w={74} aria-label="Playback rate" data={RATES} value={String(rate)} onChange={(event) => useCursor.setState({ rate: Number(event.currentTarget.value) })} />
       <Slider
         className="track"
         size="sm"
@@ -28,6 +47,17 @@ export function Timeline() {
         value={Math.min(at, stop)}
         onChange={(value) => useCursor.setState({ time: value, playing: false })}
       />
+      {run?.state === 'paused' && time !== null && time < run.time && (
+        <Tooltip label="The run returns to this instant; what came later is forgotten, tuned values stay" multiline w={260}>
+          <Button
+            size="compact-xs"
+            variant="default"
+            onClick={() => void ask({ kind: 'rewind', run: run.run, time }).then(() => useCursor.setState({ time: null, playing: false }))}
+          >
+            Go back to here
+          </Button>
+        </Tooltip>
+      )}
       <Text size="sm" className="numbers instant">
         {(run ? shownTime() : 0).toFixed(3)} s
       </Text>

@@ -7,14 +7,18 @@ import {
   IconMenu2,
   IconPlayerPauseFilled,
   IconPlayerPlayFilled,
+  IconPlayerSkipBackFilled,
   IconPlayerSkipForwardFilled,
   IconPlayerStopFilled,
   IconPlus,
+  IconSettings,
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
 import { openQuickInsert } from '../library/quick_insert'
 import { ask, change, useStudio } from '../store'
-import { useCursor } from './cursor'
+import { openConfiguration } from './configuration'
+import { stepCursor, useCursor } from './cursor'
+import { useRuns } from './runs'
 
 const SPEEDS = [
   { value: '', label: 'as fast as possible' },
@@ -25,7 +29,8 @@ async function run(speed: string): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
   useCursor.setState({ time: null, playing: false })
-  await ask({ kind: 'run', document: document.state.document, speed: speed ? Number(speed) : null })
+  const { tried } = useRuns.getState()
+  await ask({ kind: 'run', document: document.state.document, speed: speed ? Number(speed) : null, tuned: tried })
 }
 
 /** Save under the present name; asks for one where there is none. */
@@ -44,7 +49,11 @@ export function TopBar() {
   const runKey = useStudio((s) => s.run?.run)
   const busy = state === 'running' || state === 'paused'
   const key = document?.state.document ?? ''
-  const control = (action: 'pause' | 'resume' | 'step' | 'stop') => runKey && void ask({ kind: 'control', run: runKey, action })
+  const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') => runKey && void ask({ kind: 'control', run: runKey, action })
+  const goBack = () => {
+    useCursor.setState({ time: null, playing: false })
+    control('back')
+  }
   const start = () => (state === 'paused' ? control('resume') : void run(speed))
 
   useEffect(() => {
@@ -52,6 +61,7 @@ export function TopBar() {
       if (!(event.ctrlKey || event.metaKey)) return
       const pressed = event.key.toLowerCase()
       if (pressed === 'enter') start()
+      else if (pressed === 'e') openConfiguration()
       else if (pressed === 's') void save()
       else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) void ask({ kind: 'undo', document: key })
       else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) void ask({ kind: 'redo', document: key })
@@ -81,8 +91,9 @@ export function TopBar() {
         <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!document || state === 'running'} onClick={start}>
           {state === 'paused' ? 'Resume' : 'Run'}
         </Button>
+        <Tool label={busy ? 'Step back' : 'One instant back'} icon={IconPlayerSkipBackFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? goBack() : stepCursor(-1))} />
         <Tool label="Pause" icon={IconPlayerPauseFilled} disabled={state !== 'running'} onClick={() => control('pause')} />
-        <Tool label="Step" icon={IconPlayerSkipForwardFilled} disabled={state !== 'paused'} onClick={() => control('step')} />
+        <Tool label={busy ? 'Step' : 'One instant on'} icon={IconPlayerSkipForwardFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? control('step') : stepCursor(1))} />
         <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
         <NumberInput
           size="xs"
@@ -110,7 +121,9 @@ export function TopBar() {
           }}
         />
       </Group>
+      <Tool label="Configuration parameters (Ctrl+E)" icon={IconSettings} disabled={!document} onClick={openConfiguration} />
       <RunState />
+      <RunProgress />
     </header>
   )
 }
@@ -156,6 +169,14 @@ function FileMenu() {
       </Menu.Dropdown>
     </Menu>
   )
+}
+
+/** How far a run has come, along the lower edge of the bar. */
+function RunProgress() {
+  const run = useStudio((s) => s.run)
+  if (run?.state !== 'running' && run?.state !== 'paused') return null
+  const part = run.stopTime ? Math.min(run.time / run.stopTime, 1) : 1
+  return <div className="run-progress" role="progressbar" aria-label="Progress of the run" aria-valuenow={Math.round(100 * part)} style={{ width: `${100 * part}%` }} />
 }
 
 function RunState() {

@@ -105,7 +105,8 @@ def make_plan(
     A run that is ``logged`` to a file may record as much as it likes. Raises ``InputError`` for values that
     cannot be run.
     """
-    stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
+    check_options(options, system.name)
+    stop, step = float(options.stop_time), options.step
     if start > 0.0 and stop <= start:
         raise InputError(
             f"stop_time is {stop:g} s, and the run goes on from {start:g} s",
@@ -113,36 +114,12 @@ def make_plan(
             allowed=f"a time after {start:g} s: stop_time counts from 0, not from the saved state",
             fix=f"for 1 s more, stop_time={start + 1.0:g}",
         )
-    step = options.step
-    if step is not None:
-        step = _number("step", step, "a time in s above 0, at most the stop time", above=0.0)
-        if stop > 0.0 and step > stop:
-            raise InputError(
-                f"step is {step:g} s",
-                where=system.name,
-                allowed=f"above 0, at most the stop time {stop:g} s",
-                fix="choose a smaller step",
-            )
-        _resolvable("step", step, stop, system.name)
-        _countable("step", step, stop, system.name)
     for period, _ in system.sizes.clocks:
         _countable("the period of a sampled block", period, stop, system.name)
     tableau, reason = _choose(system, options)
     fixed_step = None if tableau is None or tableau.adaptive else step
     sample_time = _sample_time(system, options, stop, fixed_step, logged=logged)
-    rtol, atol = options.rtol, options.atol
-    if not SMALLEST_RTOL <= rtol <= 1.0:
-        raise InputError(
-            f"rtol is {rtol!r}",
-            where=system.name,
-            allowed=f"{SMALLEST_RTOL:g} to 1: doubles carry 16 digits",
-            fix="1e-6 is a good start, 1e-10 is tight",
-        )
-    _number("atol", atol, "a number above 0, in the units of the states", above=0.0)
-    max_step = math.inf
-    if options.max_step is not None:
-        max_step = _number("max_step", options.max_step, "a time in s above 0", above=0.0)
-        _resolvable("max_step", max_step, stop, system.name)
+    max_step = math.inf if options.max_step is None else float(options.max_step)
     solver = "none" if tableau is None or system.states.size == 0 else tableau.name
     return Plan(
         tableau=tableau,
@@ -153,6 +130,42 @@ def make_plan(
         step=step if step is not None else sample_time,
         max_step=max_step,
     )
+
+
+def check_options(options: SimulationOptions, where: str) -> None:
+    """Refuse options with which nothing can be run, whatever the system. Raises ``InputError``.
+
+    Of a named ``solver`` only the name is looked at: whether it fits is known with the system.
+    """
+    stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
+    step = options.step
+    if step is not None:
+        step = _number("step", step, "a time in s above 0, at most the stop time", above=0.0)
+        if stop > 0.0 and step > stop:
+            raise InputError(
+                f"step is {step:g} s",
+                where=where,
+                allowed=f"above 0, at most the stop time {stop:g} s",
+                fix="choose a smaller step",
+            )
+        _resolvable("step", step, stop, where)
+        _countable("step", step, stop, where)
+    if options.solver.casefold() != "auto":
+        find_tableau(options.solver)
+    if options.sample_time is not None:
+        _number("sample_time", options.sample_time, "a time in s above 0", above=0.0)
+    if not SMALLEST_RTOL <= options.rtol <= 1.0:
+        raise InputError(
+            f"rtol is {options.rtol!r}",
+            where=where,
+            allowed=f"{SMALLEST_RTOL:g} to 1: doubles carry 16 digits",
+            fix="1e-6 is a good start, 1e-10 is tight",
+        )
+    _number("atol", options.atol, "a number above 0, in the units of the states", above=0.0)
+    if options.max_step is not None:
+        _resolvable(
+            "max_step", _number("max_step", options.max_step, "a time in s above 0", above=0.0), stop, where
+        )
 
 
 def _resolvable(name: str, step: float, stop: float, where: str) -> None:
@@ -216,7 +229,7 @@ def _sample_time(
 ) -> float:
     """As asked; else the fixed step or its multiple that gives at most 10 000 rows; else stop / 1000."""
     if options.sample_time is not None:
-        sample_time = _number("sample_time", options.sample_time, "a time in s above 0", above=0.0)
+        sample_time = float(options.sample_time)
     elif fixed_step is not None and stop > 0.0:
         sample_time = fixed_step * max(1, math.ceil(stop / fixed_step / 10_000 * (1.0 - 1e-9)))
     else:

@@ -27,10 +27,10 @@ from armblocks.diagram import (
     with_parameters,
 )
 from armblocks.diagram.names import check_block_name, folded
-from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.studio.nesting import grouped, with_block
 from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
+from armblocks.studio.typed_settings import with_settings
 
 DEFAULT_ROBOT = "puma560"
 """The arm that a robot block starts with when it is dropped on the sheet."""
@@ -375,12 +375,7 @@ def _set_parameters(edit: SetParameters, diagram: Diagram, resolve_robot: Resolv
 
 
 def _set_settings(edit: SetSettings, diagram: Diagram) -> Diagram:
-    known = [field.name for field in dataclasses.fields(SimulationOptions)]
-    for name in edit.values:
-        if name not in known:
-            raise UnknownNameError("setting", name, known, where=f"diagram '{diagram.name}'")
-    values: dict[str, Any] = dict(edit.values)
-    return dataclasses.replace(diagram, settings=dataclasses.replace(diagram.settings, **values))
+    return dataclasses.replace(diagram, settings=with_settings(diagram.settings, edit.values))
 
 
 def _known(name: str, diagram: Diagram) -> str:

@@ -30,7 +30,9 @@ from armblocks.studio.project_folder import FileState, ProjectFolder
 from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
 from armblocks.studio.run_process import RunProcess, Worker
+from armblocks.studio.run_settings import setting_rules, solver_choices
 from armblocks.studio.sheet import arranged, library, placed, sheet, sheet_change
+from armblocks.studio.typed_settings import setting_faults
 
 MOST_DOCUMENTS = 100
 MOST_KEYS = 1000
@@ -108,7 +110,8 @@ class Hub:
                 version=version("armblocks"),
                 library=list(library()),
                 robots=list(formats.list_robots()),
-                solvers=_solvers(),
+                solvers=solver_choices(),
+                settings=setting_rules(),
                 examples=_examples(),
                 files=self.folder.files(),
                 documents=[document.state() for document in self.documents.values()],
@@ -149,6 +152,9 @@ class Hub:
                 return await self._save(request)
             case say.TypedValue():
                 return self._typed(request)
+            case say.TypedSettings():
+                options = self._known(request.document).document.diagram.settings
+                return setting_faults(options, request.values)
             case say.Scene():
                 return scene_of(self.block_robot(request.document, request.inside, request.block))
             case say.Pose():
@@ -382,12 +388,6 @@ class Hub:
             run.end()
         if self._spare is not None:
             self._spare.end()
-
-
-def _solvers() -> list[str]:
-    from armblocks.simulation.tableaux import TABLEAUX
-
-    return ["auto", *(tableau.name for tableau in TABLEAUX)]
 
 
 @lru_cache(maxsize=1)

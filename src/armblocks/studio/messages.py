@@ -131,6 +131,25 @@ class Channel(Message):
     unit: str
 
 
+class SettingRule(Message):
+    """One setting of a run, as the dialog of configuration parameters needs it."""
+
+    name: str
+    title: str
+    unit: str
+    doc: str
+    default: float | str | None
+
+
+class SolverChoice(Message):
+    """A solver that a model may ask for."""
+
+    name: str
+    title: str
+    adaptive: bool
+    stiff: bool
+
+
 class Tunable(Message):
     """A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
 
@@ -285,6 +304,14 @@ class TypedValue(Message):
     text: str
 
 
+class TypedSettings(Message):
+    """Ask what is wrong with settings while they are typed: a text for each that is, by name."""
+
+    kind: Literal["typed_settings"] = "typed_settings"
+    document: str
+    values: dict[str, float | str | None]
+
+
 class Scene(Message):
     """Ask for the bodies of the robot that a block shows."""
 
@@ -320,6 +347,7 @@ Request = Annotated[
     | Rewind
     | Tune
     | TypedValue
+    | TypedSettings
     | Scene
     | Pose
     | RobotRequest,
@@ -362,7 +390,8 @@ class Welcome(Message):
     version: str
     library: list[BlockType]
     robots: list[str]
-    solvers: list[str]
+    solvers: list[SolverChoice]
+    settings: list[SettingRule]
     examples: dict[str, str]
     files: list[str]
     documents: list[DocumentState]

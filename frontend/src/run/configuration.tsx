@@ -1,0 +1,107 @@
+import { Alert, Button, Group, Modal, NativeSelect, Stack, TextInput } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { create } from 'zustand'
+import { valueText } from '../inspector/value_text'
+import { ask, change, useStudio } from '../store'
+
+const CHECK_DELAY_MS = 200
+const useConfiguration = create<{ opened: boolean }>(() => ({ opened: false }))
+
+export function openConfiguration(): void {
+  if (useStudio.getState().document) useConfiguration.setState({ opened: true })
+}
+
+/** How the model is run: solver, steps, tolerances, stop time; kept with the model. */
+export function Configuration() {
+  const { opened } = useConfiguration()
+  const close = () => useConfiguration.setState({ opened: false })
+  return (
+    <Modal opened={opened} onClose={close} title={<b>Configuration parameters</b>} size="md">
+      {opened && <Form onClose={close} />}
+    </Modal>
+  )
+}
+
+/** Small numbers as one types them: 1e-6. */
+const numberText = (value: number | string | null) => (typeof value === 'number' && value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential() : valueText(value))
+
+function Form({ onClose }: { onClose: () => void }) {
+  const document = useStudio((s) => s.document?.state.document ?? '')
+  const settings = useStudio((s) => s.document?.settings)
+  const welcome = useStudio((s) => s.welcome)
+  const run = useStudio((s) => s.run)
+  const [start] = useState(() => Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])))
+  const [typed, setTyped] = useState<Record<string, string>>(start)
+  const [faults, setFaults] = useState<Record<string, string>>({})
+  const changed = Object.keys(typed).filter((name) => typed[name] !== start[name])
+  const values = Object.fromEntries(changed.map((name) => [name, typed[name]?.trim() ? typed[name] : null]))
+  const asked = JSON.stringify(values)
+  useEffect(() => {
+    let current = true
+    const timer = setTimeout(() => {
+      void ask<Record<string, string>>({ kind: 'typed_settings', document, values: JSON.parse(asked) as typeof values }).then((found) => {
+        if (current && found) setFaults(found)
+      })
+    }, CHECK_DELAY_MS)
+    return () => {
+      current = false
+      clearTimeout(timer)
+    }
+  }, [asked, document])
+  const wrong = changed.length > 0 && Object.keys(faults).length > 0
+  const put = (name: string) => (event: React.ChangeEvent<HTMLInputElement | HTMLSelectElement>) => {
+    const { value } = event.currentTarget
+    setTyped((now) => ({ ...now, [name]: value }))
+  }
+  const solvers = welcome?.solvers ?? []
+  const group = (label: string, adaptive: boolean, stiff: boolean) => ({
+    group: label,
+    items: solvers.filter((one) => one.name !== 'auto' && one.adaptive === adaptive && one.stiff === stiff).map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
+  })
+  const choices = [
+    { group: 'Automatic', items: solvers.filter(({ name }) => name === 'auto').map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })) },
+    group('Chooses its steps', true, false),
+    group('Chooses its steps, for stiff systems', true, true),
+    group('Fixed step', false, false),
+    group('Fixed step, for stiff systems', false, true),
+  ]
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault()
+        if (!changed.length) onClose()
+        else if (!wrong) void change({ kind: 'settings', values }).then((done) => done !== undefined && onClose())
+      }}
+    >
+      <Stack gap="sm">
+        <div className="settings">
+        {welcome?.settings.map(({ name, title, unit, doc }, index) => {
+          const label = (
+            <>
+              {title}
+              {unit && <span className="unit"> {unit}</span>}
+            </>
+          )
+          const fault = faults[name]
+          const common = { label, description: doc, size: 'sm' as const, error: fault || undefined }
+          if (name === 'solver') return <NativeSelect key={name} className="wide" {...common} data={choices} value={typed[name] ?? 'auto'} onChange={put(name)} />
+          return <TextInput key={name} {...common} data-autofocus={index === 0 || undefined} classNames={{ input: 'typed' }} value={typed[name] ?? ''} onChange={put(name)} placeholder="automatic" />
+        })}
+        </div>
+        {run?.reason && (
+          <Alert color="gray" title={`The last run used ${run.solver}`}>
+            {run.reason}
+          </Alert>
+        )}
+        <Group justify="flex-end" gap="xs">
+          <Button variant="default" onClick={onClose}>
+            Cancel
+          </Button>
+          <Button type="submit" disabled={wrong}>
+            OK
+          </Button>
+        </Group>
+      </Stack>
+    </form>
+  )
+}

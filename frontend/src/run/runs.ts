@@ -1,0 +1,101 @@
+import { create } from 'zustand'
+import type { EventOf } from '../connection'
+import type { ViewOf } from '../protocol'
+import { RunSamples, samples, showSamples } from '../samples'
+
+/** A parameter that got another value while a run went on. */
+export interface Tuning {
+  time: number
+  parameter: string
+  value: unknown
+}
+
+/** A run that the page remembers: its samples, and what was other than in the model. */
+export interface KeptRun {
+  key: string
+  document: string
+  name: string
+  began: Date
+  stopTime: number
+  state: string
+  solver: string
+  reason: string
+  samples: RunSamples
+  views: ViewOf[]
+  /** Values that were tried from the start. */
+  tried: Record<string, unknown>
+  tunings: Tuning[]
+}
+
+const MOST_RUNS = 50
+const MOST_BYTES = 384 * 2 ** 20
+
+interface Runs {
+  runs: KeptRun[]
+  /** Values of tunable parameters that are tried, by `block.parameter`: not in the model until they are kept. */
+  tried: Record<string, unknown>
+  rename: (key: string, name: string) => void
+  remove: (key: string) => void
+}
+
+/** Every run since the page was opened, the latest last; the oldest go when there are too many. */
+export const useRuns = create<Runs>((set) => ({
+  runs: [],
+  tried: {},
+  rename: (key, name) => set((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, name } : run)) })),
+  remove: (key) => set((s) => ({ runs: s.runs.filter((run) => run.key !== key || run.samples === samples) })),
+}))
+
+let counted = 0
+
+function update(key: string, change: (run: KeptRun) => Partial<KeptRun>): void {
+  useRuns.setState((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, ...change(run) } : run)) }))
+}
+
+export function began(event: EventOf<'run_started'>): void {
+  const made = new RunSamples(event.run, event.channels, event.aliases)
+  showSamples(made)
+  useRuns.setState((s) => {
+    const run: KeptRun = {
+      key: event.run,
+      document: event.document,
+      name: `Run ${++counted}`,
+      began: new Date(),
+      stopTime: event.stop_time,
+      state: 'running',
+      solver: '',
+      reason: '',
+      samples: made,
+      views: event.views,
+      tried: { ...s.tried },
+      tunings: [],
+    }
+    const runs = [...s.runs, run].slice(-MOST_RUNS)
+    const bytes = () => runs.reduce((sum, { samples }) => sum + samples.bytes, 0)
+    while (runs.length > 1 && bytes() > MOST_BYTES) runs.shift()
+    return { runs }
+  })
+}
+
+export function tuned({ run, time, parameter, value }: EventOf<'run_tuned'>): void {
+  update(run, ({ tunings }) => ({ tunings: [...tunings, { time, parameter, value }] }))
+}
+
+export function rewound({ run, time, count }: EventOf<'run_rewound'>): void {
+  if (samples.run === run) samples.truncate(count)
+  // What was tuned later holds from the instant to which the run has returned.
+  update(run, ({ tunings }) => ({ tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })) }))
+}
+
+export function progressed({ run, state, solver, reason }: EventOf<'run_progress'>): void {
+  const known = useRuns.getState().runs.find(({ key }) => key === run)
+  if (!known || known.state === state) return
+  if (state === 'done' || state === 'stopped' || state === 'failed') known.samples.close()
+  update(run, () => ({ state, solver, reason }))
+}
+
+/** Another document is shown: what was tried and run belongs to the one before. */
+export function forget(): void {
+  showSamples(new RunSamples('', [], {}))
+  useRuns.setState({ tried: {} })
+}

@@ -1,0 +1,205 @@
+import { ActionIcon, Button, Group, Slider, Text, TextInput, Tooltip } from '@mantine/core'
+import { IconArrowBackUp, IconPin, IconPinFilled } from '@tabler/icons-react'
+import { useEffect, useMemo, useState } from 'react'
+import { create } from 'zustand'
+import { valueText } from '../inspector/value_text'
+import type { Tunable } from '../protocol'
+import { ask, useStudio } from '../store'
+import { useRuns } from './runs'
+
+interface Tuning {
+  pinned: ReadonlySet<string>
+  ranges: Record<string, [number, number]>
+}
+
+const useTuning = create<Tuning>(() => ({ pinned: new Set(), ranges: {} }))
+const NUMERIC = ['number', 'array']
+const SLIDER_STEPS = 400
+
+/** What can be tuned on the sheet that is shown, with the values of the model; below it, by the last run's account. */
+function useTunables(): Map<string, Tunable> {
+  const blocks = useStudio((s) => s.document?.blocks)
+  const library = useStudio((s) => s.library)
+  const level = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
+  const ofRun = useStudio((s) => s.run?.tunables)
+  return useMemo(() => {
+    const found = new Map((ofRun ?? []).map((one) => [one.path, one]))
+    for (const block of Object.values(blocks ?? {}))
+      for (const rule of library.get(block.type)?.parameters ?? []) {
+        if (!rule.tunable || !NUMERIC.includes(rule.kind)) continue
+        const path = `${level}${block.name}.${rule.name}`
+        const known = found.get(path)
+        found.set(path, { path, value: block.parameters[rule.name], unit: rule.unit, doc: rule.doc, low: known?.low ?? null, high: known?.high ?? null })
+      }
+    return found
+  }, [blocks, library, level, ofRun])
+}
+
+/** Tunable parameters of the selected blocks and of those that are pinned: changed while the run goes on. */
+export function TunePanel() {
+  const tunables = useTunables()
+  const selection = useStudio((s) => s.selection)
+  const level = useStudio((s) => s.document?.inside.map((name) => `${name}/`).join('') ?? '')
+  const pinned = useTuning((s) => s.pinned)
+  const tried = useRuns((s) => s.tried)
+  const chosen = [...selection].map((name) => level + name)
+  const shown = [...tunables.values()].filter(
+    ({ path }) => pinned.has(path) || path in tried || chosen.some((name) => path.startsWith(`${name}.`) || path.startsWith(`${name}/`)),
+  )
+  const count = Object.keys(tried).length
+  return (
+    <div className="tune">
+      <div className="tuned-rows">
+        {shown.map((tunable) => (
+          <TuneRow key={tunable.path} tunable={tunable} />
+        ))}
+        {!shown.length && <p className="empty">Select a block to see the parameters that can be changed while the model runs. Pin those to keep at hand.</p>}
+      </div>
+      {count > 0 && (
+        <Group gap="xs" className="tried">
+          <Text size="xs" c="dimmed" flex={1}>
+            {count === 1 ? 'One value is' : `${count} values are`} tried, and not in the model.
+          </Text>
+          <Button size="compact-xs" variant="default" onClick={() => drop(Object.keys(tried), tunables)}>
+            Drop
+          </Button>
+          <Button size="compact-xs" onClick={() => void keep()}>
+            Keep in the model
+          </Button>
+        </Group>
+      )}
+    </div>
+  )
+}
+
+function send(path: string, value: unknown): void {
+  const { run } = useStudio.getState()
+  if (run?.state === 'running' || run?.state === 'paused') void ask({ kind: 'tune', run: run.run, parameter: path, value })
+}
+
+const waiting = new Map<string, unknown>()
+
+/** Try a value; while a slider moves, once a frame at most. */
+function attempt(path: string, value: unknown): void {
+  useRuns.setState((s) => ({ tried: { ...s.tried, [path]: value } }))
+  if (!waiting.size)
+    requestAnimationFrame(() => {
+      waiting.forEach((latest, one) => send(one, latest))
+      waiting.clear()
+    })
+  waiting.set(path, value)
+}
+
+function drop(paths: string[], tunables: Map<string, Tunable>): void {
+  for (const path of paths) {
+    waiting.delete(path)
+    const model = tunables.get(path)?.value
+    if (model !== undefined) send(path, model)
+  }
+  useRuns.setState((s) => ({ tried: Object.fromEntries(Object.entries(s.tried).filter(([path]) => !paths.includes(path))) }))
+}
+
+/** Put all that is tried into the model, as one step that can be undone. */
+async function keep(): Promise<void> {
+  const { document } = useStudio.getState()
+  const { tried } = useRuns.getState()
+  if (!document) return
+  const edit = { kind: 'keep_tuned' as const, values: tried }
+  const done = await ask({ kind: 'change', document: document.state.document, key: crypto.randomUUID(), inside: [], edit })
+  if (done !== undefined) useRuns.setState({ tried: {} })
+}
+
+function TuneRow({ tunable }: { tunable: Tunable }) {
+  const { path, unit, doc, low, high } = tunable
+  const tried = useRuns((s) => s.tried)
+  const pinned = useTuning((s) => s.pinned.has(path))
+  const given = useTuning((s) => s.ranges[path])
+  const changed = path in tried
+  const value = changed ? tried[path] : tunable.value
+  const text = valueText(value)
+  const [typed, setTyped] = useState(text)
+  useEffect(() => setTyped(text), [text])
+  const at = path.lastIndexOf('.')
+  const model = typeof tunable.value === 'number' ? tunable.value : 0
+  const [from, to] = given ?? [low ?? Math.min(2 * model, model === 0 ? -1 : 0), high ?? Math.max(2 * model, model === 0 ? 1 : 0)]
+  const done = () => {
+    const number = Number(typed)
+    if (typed.trim() && typed !== text) attempt(path, Number.isFinite(number) ? number : typed)
+  }
+  const bound = (index: 0 | 1) => (
+    <input
+      key={`${from} ${to}`}
+      className="bound numbers"
+      aria-label={`${index ? 'Greatest' : 'Least'} value of the slider of ${path}`}
+      defaultValue={index ? to : from}
+      onBlur={(event) => {
+        const number = Number(event.currentTarget.value)
+        const range: [number, number] = index ? [from, number] : [number, to]
+        if (Number.isFinite(number) && range[0] < range[1]) useTuning.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
+        else event.currentTarget.value = String(index ? to : from)
+      }}
+      onKeyDown={(event) => event.key === 'Enter' && event.currentTarget.blur()}
+    />
+  )
+  return (
+    <div className={changed ? 'tune-row changed' : 'tune-row'}>
+      <div className="tune-head" title={doc}>
+        <span className="path">
+          {path.slice(0, at)}
+          <b>.{path.slice(at + 1)}</b>
+          {unit && <span className="unit"> {unit}</span>}
+        </span>
+        {changed && (
+          <Tooltip label={`Back to ${valueText(tunable.value)}`}>
+            <ActionIcon size="xs" variant="subtle" color="gray" aria-label={`Drop the value of ${path}`} onClick={() => drop([path], new Map([[path, tunable]]))}>
+              <IconArrowBackUp size={13} />
+            </ActionIcon>
+          </Tooltip>
+        )}
+        <ActionIcon
+          size="xs"
+          variant="subtle"
+          color="gray"
+          aria-label={pinned ? `Unpin ${path}` : `Pin ${path}`}
+          aria-pressed={pinned}
+          onClick={() =>
+            useTuning.setState((s) => {
+              const next = new Set(s.pinned)
+              if (!next.delete(path)) next.add(path)
+              return { pinned: next }
+            })
+          }
+        >
+          {pinned ? <IconPinFilled size={13} /> : <IconPin size={13} />}
+        </ActionIcon>
+        <TextInput
+          size="xs"
+          w={typeof value === 'number' ? 92 : 160}
+          aria-label={path}
+          classNames={{ input: 'typed' }}
+          value={typed}
+          onChange={(event) => setTyped(event.currentTarget.value)}
+          onBlur={done}
+          onKeyDown={(event) => event.key === 'Enter' && done()}
+        />
+      </div>
+      {typeof value === 'number' && (
+        <div className="tune-slide">
+          {bound(0)}
+          <Slider
+            size="xs"
+            flex={1}
+            label={null}
+            thumbLabel={`Slider of ${path}`}
+            min={from}
+            max={to}
+            step={(to - from) / SLIDER_STEPS}
+            value={Math.min(Math.max(value, from), to)}
+            onChange={(moved) => attempt(path, Number(moved.toPrecision(6)))}
+          />
+          {bound(1)}
+        </div>
+      )}
+    </div>
+  )
+}

@@ -1,0 +1,57 @@
+import { ActionIcon, Menu } from '@mantine/core'
+import { IconDownload } from '@tabler/icons-react'
+import { useRef, useState } from 'react'
+import { saveCsv, savePng, saveSvg } from './export'
+import { MeasureTable } from './measure_table'
+import { Plot, type PlotHandle } from './plot'
+import type { Trace } from './trace'
+import { useWindow } from './window'
+import { XyPlot } from './xy_plot'
+
+/** A plot with its title, its legend (a click hides a trace), its exports, and the measures beside it. */
+export function Chart({ title, traces, path = false, band }: { title: string; traces: Trace[]; path?: boolean; band?: number }) {
+  const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
+  const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
+  const handle = useRef<PlotHandle>(null)
+  const figure = () => handle.current?.figure()
+  const toggle = (key: string) =>
+    setHidden((now) => {
+      const next = new Set(now)
+      if (!next.delete(key)) next.add(key)
+      return next
+    })
+  return (
+    <figure className={measured ? 'chart measured' : 'chart'}>
+      <figcaption>
+        <b>{title}</b>
+        <span className="legend">
+          {!path &&
+            traces.map(({ key, label, tone, dash }) => (
+              <button key={key} type="button" aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
+                <svg width="16" height="4" aria-hidden>
+                  <line x1="0" x2="16" y1="2" y2="2" stroke={`var(--${tone})`} strokeWidth="2.5" strokeDasharray={dash.join(' ')} />
+                </svg>
+                {label}
+              </button>
+            ))}
+        </span>
+        <Menu position="bottom-end" shadow="md">
+          <Menu.Target>
+            <ActionIcon className="more" variant="subtle" color="gray" size="xs" aria-label={`Export ${title}`}>
+              <IconDownload size={13} />
+            </ActionIcon>
+          </Menu.Target>
+          <Menu.Dropdown>
+            <Menu.Item onClick={() => saveCsv(title, traces)}>Samples as CSV</Menu.Item>
+            <Menu.Item onClick={() => figure() && void savePng(figure()!)}>Picture as PNG</Menu.Item>
+            <Menu.Item onClick={() => figure() && saveSvg(figure()!)}>Picture as SVG</Menu.Item>
+          </Menu.Dropdown>
+        </Menu>
+      </figcaption>
+      <div className="with-measures">
+        {path ? <XyPlot traces={traces} title={title} handle={handle} /> : <Plot traces={traces} hidden={hidden} title={title} handle={handle} {...(band === undefined ? {} : { band })} />}
+        {measured && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
+      </div>
+    </figure>
+  )
+}

@@ -1,0 +1,49 @@
+import { paint, svgOf, type Figure } from './figure'
+import type { Trace } from './trace'
+
+const PNG_SCALE = 2
+
+/** Hand a file to the browser. */
+export function download(name: string, content: Blob): void {
+  const link = document.createElement('a')
+  link.href = URL.createObjectURL(content)
+  link.download = name.replace(/[^\p{L}\p{N} ._-]+/gu, '-')
+  link.click()
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
+}
+
+export function saveSvg(figure: Figure): void {
+  download(`${figure.title || 'plot'}.svg`, new Blob([svgOf(figure)], { type: 'image/svg+xml' }))
+}
+
+export async function savePng(figure: Figure): Promise<void> {
+  const canvas = document.createElement('canvas')
+  canvas.width = PNG_SCALE * figure.width
+  canvas.height = PNG_SCALE * figure.height
+  paint(figure, canvas, PNG_SCALE)
+  const blob = await new Promise<Blob | null>((done) => canvas.toBlob(done, 'image/png'))
+  if (blob) download(`${figure.title || 'plot'}.png`, blob)
+}
+
+const quoted = (text: string) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)
+
+/** Every recorded sample of the traces, in SI units; a trace of another run has a column of times of its own. */
+export function csvOf(traces: Trace[]): string {
+  const columns: { name: string; values: Float64Array }[] = []
+  let last: Float64Array | undefined
+  for (const { label, unit, read } of traces) {
+    const found = read()
+    if (!found) continue
+    if (!last || last.length !== found.time.length || last.buffer !== found.time.buffer) columns.push({ name: 'time [s]', values: found.time })
+    last = found.time
+    columns.push({ name: unit ? `${label} [${unit}]` : label, values: found.values })
+  }
+  const rows = Math.max(0, ...columns.map(({ values }) => values.length))
+  const lines = [columns.map(({ name }) => quoted(name)).join(',')]
+  for (let row = 0; row < rows; row++) lines.push(columns.map(({ values }) => (row < values.length ? String(values[row]) : '')).join(','))
+  return `${lines.join('\n')}\n`
+}
+
+export function saveCsv(name: string, traces: Trace[]): void {
+  download(`${name || 'plot'}.csv`, new Blob([csvOf(traces)], { type: 'text/csv' }))
+}

@@ -1,0 +1,185 @@
+import { digits } from './quantity'
+
+export interface Axis {
+  min: number
+  max: number
+  label: string
+}
+
+/** One plot as data: painted on a canvas or written as SVG, alike. */
+export interface Figure {
+  title: string
+  width: number
+  height: number
+  x: Axis
+  y: Axis
+  /** One unit is as long both ways. */
+  equal?: boolean
+  lines: { tone: string; dash: number[]; label: string; x: ArrayLike<number>; y: ArrayLike<number | null | undefined> }[]
+  /** Where the run stands, on a path. */
+  mark?: [x: number, y: number] | undefined
+}
+
+interface Pen {
+  line: (points: [number, number][], tone: string, width: number, dash: number[]) => void
+  text: (x: number, y: number, text: string, tone: string, anchor: 'start' | 'middle' | 'end', bold?: boolean, upright?: boolean) => void
+  disc: (x: number, y: number, radius: number, tone: string) => void
+  inside: (box: Box, paint: () => void) => void
+}
+
+interface Box {
+  left: number
+  top: number
+  width: number
+  height: number
+}
+
+const FONT = 11
+
+/** Round numbers in a range, so many or fewer. */
+export function ticks(min: number, max: number, most: number): number[] {
+  const raw = (max - min) / Math.max(most, 1)
+  const size = 10 ** Math.floor(Math.log10(raw))
+  const step = [1, 2, 2.5, 5, 10].map((k) => k * size).find((k) => k >= raw * (1 - 1e-9)) ?? raw
+  const first = Math.ceil(min / step - 1e-9)
+  const made: number[] = []
+  for (let k = first; k * step <= max + 1e-9 * step; k++) made.push(k * step)
+  return made
+}
+
+function tickText(value: number, step: number): string {
+  if (Math.abs(value) >= 1e6 || step < 1e-5) return digits(value, 3)
+  const places = (String(Number(step.toPrecision(3))).split('.')[1] ?? '').length
+  return value.toFixed(places).replace('-', '−')
+}
+
+/** A range with some air around it. */
+export function aired(min: number, max: number): [number, number] {
+  if (!(max >= min)) return [0, 1]
+  if (max - min <= 1e-12 * Math.max(Math.abs(min), Math.abs(max))) {
+    const air = 0.1 * Math.abs(max) || 1
+    return [min - air, max + air]
+  }
+  const air = 0.06 * (max - min)
+  return [min - air, max + air]
+}
+
+function draw(figure: Figure, pen: Pen): void {
+  const { width, height, x, y } = figure
+  const legend = figure.lines.length > 1 || figure.title
+  let box: Box = { left: 58, top: legend ? 30 : 10, width: width - 58 - 12, height: height - (legend ? 30 : 10) - 40 }
+  let [x0, x1, y0, y1] = [x.min, x.max, y.min, y.max]
+  if (figure.equal) {
+    const scale = Math.max((x1 - x0) / box.width, (y1 - y0) / box.height)
+    const [moreX, moreY] = [(scale * box.width - (x1 - x0)) / 2, (scale * box.height - (y1 - y0)) / 2]
+    ;[x0, x1, y0, y1] = [x0 - moreX, x1 + moreX, y0 - moreY, y1 + moreY]
+  }
+  const atX = (value: number) => box.left + ((value - x0) / (x1 - x0)) * box.width
+  const atY = (value: number) => box.top + box.height - ((value - y0) / (y1 - y0)) * box.height
+  const across = ticks(x0, x1, Math.max(2, Math.floor(box.width / 80)))
+  const up = ticks(y0, y1, Math.max(2, Math.floor(box.height / 36)))
+  const bottom = box.top + box.height
+  for (const value of across) {
+    pen.line([[atX(value), box.top], [atX(value), bottom]], 'grid', 1, [])
+    pen.text(atX(value), bottom + 15, tickText(value, across[1]! - across[0]! || 1), 'muted', 'middle')
+  }
+  for (const value of up) {
+    pen.line([[box.left, atY(value)], [box.left + box.width, atY(value)]], 'grid', 1, [])
+    pen.text(box.left - 6, atY(value) + 4, tickText(value, up[1]! - up[0]! || 1), 'muted', 'end')
+  }
+  pen.text(box.left + box.width / 2, bottom + 32, x.label, 'muted', 'middle')
+  if (y.label) pen.text(13, box.top + box.height / 2, y.label, 'muted', 'middle', false, true)
+  pen.inside(box, () => {
+    for (const line of figure.lines) {
+      const points: [number, number][] = []
+      for (let k = 0; k < line.x.length; k++) {
+        const value = line.y[k]
+        if (typeof value === 'number' && Number.isFinite(value)) points.push([atX(line.x[k]!), atY(value)])
+      }
+      pen.line(points, line.tone, 1.5, line.dash)
+    }
+    if (figure.mark) pen.disc(atX(figure.mark[0]), atY(figure.mark[1]), 4.5, 'accent')
+  })
+  if (!legend) return
+  pen.text(box.left, 17, figure.title, 'ink', 'start', true)
+  let at = box.left + 8.0 * figure.title.length + 18
+  for (const { label, tone, dash } of figure.lines) {
+    if (figure.lines.length < 2 || at + 24 + 6.4 * label.length > width) break
+    pen.line([[at, 13], [at + 16, 13]], tone, 2.5, dash)
+    pen.text(at + 21, 17, label, 'muted', 'start')
+    at += 34 + 6.4 * label.length
+  }
+}
+
+const colour = (tone: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${tone}`).trim()
+const fontOf = () => colour('font') || 'sans-serif'
+
+/** Paint a figure; the canvas's own size is given by the caller, in device pixels. */
+export function paint(figure: Figure, canvas: HTMLCanvasElement, scale: number): void {
+  const c = canvas.getContext('2d')
+  if (!c) return
+  c.setTransform(scale, 0, 0, scale, 0, 0)
+  c.fillStyle = colour('surface')
+  c.fillRect(0, 0, figure.width, figure.height)
+  draw(figure, {
+    line: (points, tone, width, dash) => {
+      c.beginPath()
+      points.forEach(([x, y], k) => (k ? c.lineTo(x, y) : c.moveTo(x, y)))
+      c.strokeStyle = colour(tone)
+      c.lineWidth = width
+      c.lineJoin = 'round'
+      c.setLineDash(dash)
+      c.stroke()
+    },
+    text: (x, y, text, tone, anchor, bold, upright) => {
+      c.save()
+      c.translate(x, y)
+      if (upright) c.rotate(-Math.PI / 2)
+      c.font = `${bold ? '600 ' : ''}${bold ? FONT + 1 : FONT}px ${fontOf()}`
+      c.fillStyle = colour(tone)
+      c.textAlign = anchor === 'middle' ? 'center' : anchor
+      c.fillText(text, 0, 0)
+      c.restore()
+    },
+    disc: (x, y, radius, tone) => {
+      c.beginPath()
+      c.arc(x, y, radius, 0, 2 * Math.PI)
+      c.fillStyle = colour(tone)
+      c.fill()
+    },
+    inside: (box, within) => {
+      c.save()
+      c.beginPath()
+      c.rect(box.left, box.top, box.width, box.height)
+      c.clip()
+      within()
+      c.restore()
+    },
+  })
+}
+
+const escaped = (text: string) => text.replace(/[&<>"]/g, (mark) => `&#${mark.charCodeAt(0)};`)
+
+/** The figure as an SVG document, in the colours of the page as it is. */
+export function svgOf(figure: Figure): string {
+  const parts: string[] = []
+  draw(figure, {
+    line: (points, tone, width, dash) => {
+      const d = points.map(([x, y], k) => `${k ? 'L' : 'M'}${x.toFixed(2)} ${y.toFixed(2)}`).join('')
+      const dashed = dash.length ? ` stroke-dasharray="${dash.join(' ')}"` : ''
+      if (points.length) parts.push(`<path d="${d}" fill="none" stroke="${colour(tone)}" stroke-width="${width}" stroke-linejoin="round"${dashed}/>`)
+    },
+    text: (x, y, text, tone, anchor, bold, upright) =>
+      parts.push(
+        `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="${colour(tone)}" text-anchor="${anchor}" font-size="${bold ? FONT + 1 : FONT}"${bold ? ' font-weight="600"' : ''}${upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''}>${escaped(text)}</text>`,
+      ),
+    disc: (x, y, radius, tone) => parts.push(`<circle cx="${x.toFixed(2)}" cy="${y.toFixed(2)}" r="${radius}" fill="${colour(tone)}"/>`),
+    inside: ({ left, top, width, height }, within) => {
+      parts.push(`<clipPath id="field"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath><g clip-path="url(#field)">`)
+      within()
+      parts.push('</g>')
+    },
+  })
+  const { width, height } = figure
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" font-family="${escaped(fontOf())}"><rect width="100%" height="100%" fill="${colour('surface')}"/>${parts.join('')}</svg>\n`
+}

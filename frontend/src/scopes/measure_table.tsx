@@ -1,0 +1,96 @@
+import { useEffect, useRef, useState } from 'react'
+import { shownTime, useCursor } from '../run/cursor'
+import { samples } from '../samples'
+import { measures, type Measures } from './measures'
+import { digits, reading, spoken } from './quantity'
+import { valueAt, type Trace } from './trace'
+import { shownWindow, useWindow } from './window'
+
+const REFRESH_MS = 200
+const ROWS: [name: keyof Measures, head: string, title: string][] = [
+  ['least', 'min', 'the least value'],
+  ['greatest', 'max', 'the greatest value'],
+  ['mean', 'mean', 'the mean over time'],
+  ['rms', 'RMS', 'the root of the mean square over time'],
+  ['peakToPeak', 'p–p', 'from the least to the greatest'],
+  ['riseTime', 'rise', 'time from 10 to 90 % of the way, where the signal settles'],
+  ['overshoot', 'over', 'how far beyond the last value, as a part of the way'],
+]
+
+/** Draw again a few times a second while something changes: no sample goes through React's state. */
+function useRefresh(): void {
+  const [, setCount] = useState(0)
+  const seen = useRef('')
+  useEffect(() => {
+    const timer = setInterval(() => {
+      const { cursors, range } = useWindow.getState()
+      const now = `${samples.version} ${String(cursors)} ${String(range)} ${useCursor.getState().time}`
+      if (now === seen.current) return
+      seen.current = now
+      setCount((count) => count + 1)
+    }, REFRESH_MS)
+    return () => clearInterval(timer)
+  }, [])
+}
+
+/** What is read off the traces of one plot: values at the cursors, and measures over what is shown. */
+export function MeasureTable({ traces }: { traces: Trace[] }) {
+  useRefresh()
+  const cursors = useWindow((s) => s.cursors)
+  const measuring = useWindow((s) => s.measuring)
+  const [from, to] = shownWindow()
+  const now = shownTime()
+  const read = traces.map((trace) => ({ trace, data: trace.read() })).flatMap(({ trace, data }) => (data ? [{ trace, data }] : []))
+  return (
+    <div className="measures">
+      {cursors && (
+        <p className="between">
+          <span>A {spoken(cursors[0], 's', 5)}</span>
+          <span>B {spoken(cursors[1], 's', 5)}</span>
+          <span>Δt {spoken(cursors[1] - cursors[0], 's', 5)}</span>
+          {cursors[1] !== cursors[0] && <span>1/Δt {spoken(1 / Math.abs(cursors[1] - cursors[0]), 'Hz', 5)}</span>}
+        </p>
+      )}
+      <table className="numbers">
+        <thead>
+          <tr>
+            <th scope="col">signal</th>
+            {cursors ? ['A', 'B', 'Δ'].map((head) => <th key={head} scope="col">{head}</th>) : <th scope="col">at {digits(now, 4)} s</th>}
+            {measuring &&
+              ROWS.map(([name, head, title]) => (
+                <th key={name} scope="col" title={title}>
+                  {head}
+                </th>
+              ))}
+          </tr>
+        </thead>
+        <tbody>
+          {read.map(({ trace, data }) => {
+            const found = measuring ? measures(data, from, to) : undefined
+            const [a, b] = cursors ? [valueAt(data, cursors[0]), valueAt(data, cursors[1])] : [valueAt(data, Math.min(now, data.time.at(-1) ?? 0)), NaN]
+            const largest = Math.max(...[a, b, found?.least, found?.greatest].filter((v) => v !== undefined && Number.isFinite(v)).map((v) => Math.abs(v!)), 0)
+            const { factor, unit } = reading(trace.unit, largest)
+            return (
+              <tr key={trace.key}>
+                <th scope="row">
+                  <i style={{ background: `var(--${trace.tone})` }} />
+                  {trace.label}
+                  {unit && <span className="unit"> {unit}</span>}
+                </th>
+                {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
+                  <td key={k}>{digits(value * factor)}</td>
+                ))}
+                {found &&
+                  ROWS.map(([name]) => (
+                    <td key={name}>
+                      {name === 'riseTime' ? (Number.isNaN(found.riseTime) ? '–' : spoken(found.riseTime, 's')) : name === 'overshoot' ? (Number.isNaN(found.overshoot) ? '–' : `${digits(100 * found.overshoot, 3)} %`) : digits(found[name] * factor)}
+                    </td>
+                  ))}
+              </tr>
+            )
+          })}
+        </tbody>
+      </table>
+    </div>
+  )
+}

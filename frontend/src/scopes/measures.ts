@@ -1,0 +1,93 @@
+import { firstAfter } from '../samples'
+import { valueAt } from './trace'
+
+/** What is measured of one trace in a window of time. `NaN`: it makes no sense there. */
+export interface Measures {
+  least: number
+  greatest: number
+  mean: number
+  rms: number
+  peakToPeak: number
+  /** From 10 to 90 % of the way from the first to the last value, s. */
+  riseTime: number
+  /** How far beyond the last value, as a part of the way. */
+  overshoot: number
+}
+
+const SETTLED_PART = 0.05
+const SETTLED_BAND = 0.02
+
+/**
+ * Measures of the straight lines between the samples, from one instant to another. Mean and RMS weigh by time, so
+ * that uneven samples do not shift them: over a stretch the integral of y² is dt (a² + ab + b²) / 3.
+ */
+export function measures(trace: { time: Float64Array; values: Float64Array }, from: number, to: number): Measures {
+  const { time, values } = cut(trace, from, to)
+  const count = time.length
+  const nothing = { least: NaN, greatest: NaN, mean: NaN, rms: NaN, peakToPeak: NaN, riseTime: NaN, overshoot: NaN }
+  if (!count) return nothing
+  let least = values[0]!
+  let greatest = values[0]!
+  let area = 0
+  let square = 0
+  for (let k = 1; k < count; k++) {
+    const a = values[k - 1]!
+    const b = values[k]!
+    const dt = time[k]! - time[k - 1]!
+    if (b < least) least = b
+    if (b > greatest) greatest = b
+    area += (dt * (a + b)) / 2
+    square += (dt * (a * a + a * b + b * b)) / 3
+  }
+  const span = time[count - 1]! - time[0]!
+  return {
+    least,
+    greatest,
+    mean: span > 0 ? area / span : values[0]!,
+    rms: span > 0 ? Math.sqrt(square / span) : Math.abs(values[0]!),
+    peakToPeak: greatest - least,
+    ...step(time, values, least, greatest),
+  }
+}
+
+/** Rise time and overshoot, where the trace ends settled elsewhere than it began. */
+function step(time: Float64Array, values: Float64Array, least: number, greatest: number): { riseTime: number; overshoot: number } {
+  const count = values.length
+  const first = values[0]!
+  const last = values[count - 1]!
+  const way = last - first
+  const band = SETTLED_BAND * Math.abs(way)
+  const late = time[count - 1]! - SETTLED_PART * (time[count - 1]! - time[0]!)
+  for (let k = count - 1; k >= 0 && time[k]! >= late; k--) if (!(Math.abs(values[k]! - last) <= band)) return { riseTime: NaN, overshoot: NaN }
+  if (!(Math.abs(way) > 1e-9 * Math.max(Math.abs(first), Math.abs(last))) || way === 0) return { riseTime: NaN, overshoot: NaN }
+  const peak = way > 0 ? greatest - last : last - least
+  return { riseTime: crossing(time, values, first + 0.9 * way, way) - crossing(time, values, first + 0.1 * way, way), overshoot: peak / Math.abs(way) }
+}
+
+/** When the trace first reaches a level, going the way it goes as a whole. */
+function crossing(time: Float64Array, values: Float64Array, level: number, way: number): number {
+  for (let k = 1; k < values.length; k++) {
+    const a = values[k - 1]!
+    const b = values[k]!
+    if (way > 0 ? a < level && b >= level : a > level && b <= level) return time[k - 1]! + ((level - a) / (b - a)) * (time[k]! - time[k - 1]!)
+  }
+  return NaN
+}
+
+/** The part of a trace between two instants, its ends on the lines between samples. */
+function cut(trace: { time: Float64Array; values: Float64Array }, from: number, to: number) {
+  const { time, values } = trace
+  const begin = Math.max(from, time[0] ?? Infinity)
+  const end = Math.min(to, time[time.length - 1] ?? -Infinity)
+  if (!(end >= begin)) return { time: new Float64Array(0), values: new Float64Array(0) }
+  const first = firstAfter(time, begin)
+  const last = firstAfter(time, end)
+  const ended = (column: Float64Array, before: number, after: number) => {
+    const made = new Float64Array(last - first + 2)
+    made[0] = before
+    made.set(column.subarray(first, last), 1)
+    made[made.length - 1] = after
+    return made
+  }
+  return { time: ended(time, begin, end), values: ended(values, valueAt(trace, begin), valueAt(trace, end)) }
+}

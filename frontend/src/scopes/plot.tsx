@@ -1,0 +1,271 @@
+import { useComputedColorScheme } from '@mantine/core'
+import { useEffect, useRef } from 'react'
+import uPlot from 'uplot'
+import 'uplot/dist/uPlot.min.css'
+import { shownTime, useCursor } from '../run/cursor'
+import { useRuns } from '../run/runs'
+import { samples } from '../samples'
+import { aired, type Figure } from './figure'
+import { digits, reading, useUnits, type Reading } from './quantity'
+import { extremes, within, type Drawn, type Trace } from './trace'
+import { pan, shownWindow, useWindow, zoomBy, zoomTo } from './window'
+
+const FONT = '11px Inter Variable'
+const GRIP_PX = 6
+const CLICK_PX = 3
+/** From so many samples in a pixel on only the least and the greatest are drawn. */
+const DENSE = 3
+const colour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()
+
+/** What a plot shows now, for those beside it: measures and exports. */
+export interface PlotHandle {
+  figure: () => Figure
+}
+
+interface Props {
+  traces: Trace[]
+  hidden: ReadonlySet<string>
+  title: string
+  handle?: React.RefObject<PlotHandle | null>
+  /** A band about zero: the tolerance of a difference. */
+  band?: number
+}
+
+/** Unit and factor of the vertical axis: shared by all traces, or none. */
+function axisReading(traces: Trace[], drawn: Drawn): Reading {
+  const [first, ...others] = traces
+  if (!first || others.some(({ unit }) => unit !== first.unit)) return { factor: 1, unit: '' }
+  let largest = 0
+  for (const column of drawn.slice(1)) for (const value of column) if (typeof value === 'number' && Math.abs(value) > largest) largest = Math.abs(value)
+  return reading(first.unit, largest)
+}
+
+/** What there is to draw in a window: raw samples while few, else the extremes of each pixel. */
+function drawnOf(traces: Trace[], from: number, to: number, width: number): Drawn {
+  const found = traces.map(({ read }) => read() ?? { time: new Float64Array(0), values: new Float64Array(0) })
+  const parts = found.map((one) => within(one, from, to))
+  if (parts.some(({ time }) => time.length > DENSE * width)) return extremes(found, from, to, width)
+  const [first, ...others] = parts
+  if (!first) return [new Float64Array(0)]
+  if (others.every(({ time }) => time.buffer === first.time.buffer && time.length === first.time.length && time.byteOffset === first.time.byteOffset))
+    return [first.time, ...parts.map(({ values }) => values)]
+  return uPlot.join(parts.map(({ time, values }) => [time, values] as uPlot.AlignedData)) as unknown as Drawn
+}
+
+function scaled(drawn: Drawn, factor: number): Drawn {
+  if (factor === 1) return drawn
+  const [time, ...columns] = drawn
+  return [time, ...columns.map((column) => (column instanceof Float64Array ? column.map((v) => v * factor) : column.map((v) => (typeof v === 'number' ? v * factor : v))))]
+}
+
+/** Traces over time. All such plots share zoom, measuring cursors and the instant that is shown. */
+export function Plot({ traces, hidden, title, handle, band }: Props) {
+  const box = useRef<HTMLDivElement>(null)
+  const scheme = useComputedColorScheme('light')
+  const shown = traces.filter(({ key }) => !hidden.has(key))
+  const identity = shown.map(({ key, tone, dash }) => `${key} ${tone} ${dash.join()}`).join('\n')
+  useEffect(() => {
+    const element = box.current
+    if (!element) return
+    let unit = ''
+    let drawn: Drawn = [new Float64Array(0)]
+    const axis = { stroke: colour('muted'), grid: { stroke: colour('grid'), width: 1 }, ticks: { stroke: colour('grid'), width: 1 }, font: FONT, labelFont: FONT, labelSize: 16, labelGap: 0 }
+    const plot = new uPlot(
+      {
+        width: Math.max(element.clientWidth, 60),
+        height: Math.max(element.clientHeight, 60),
+        legend: { show: false },
+        cursor: { points: { show: false }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => (useWindow.setState({ range: null }), null), mousedown: (u, _, handler) => (event) => (gripOf(u, event) !== null || event.button || event.shiftKey ? null : handler(event)) } },
+        scales: { x: { time: false, auto: false }, y: { auto: false } },
+        axes: [
+          { ...axis, size: 32, label: 'time, s', values: (_, splits) => splits.map((value) => tick(value, splits)) },
+          { ...axis, size: 54, label: () => unit, values: (_, splits) => splits.map((value) => tick(value, splits)) },
+        ],
+        series: [{}, ...shown.map(({ label, tone, dash }) => ({ label, stroke: colour(tone), width: 1.5, dash, spanGaps: true, points: { show: false } }))],
+        hooks: {
+          drawClear: [(u) => band !== undefined && drawBand(u, band)],
+          draw: [(u) => drawLines(u)],
+          setSelect: [
+            (u) => {
+              if (u.select.width < CLICK_PX) return
+              zoomTo(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'))
+              u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false)
+            },
+          ],
+        },
+      },
+      [[], ...shown.map(() => [])] as uPlot.AlignedData,
+      element,
+    )
+    const leave = listen(plot)
+    let seen = ''
+    let lines = ''
+    let frameHandle = 0
+    const frame = () => {
+      frameHandle = requestAnimationFrame(frame)
+      const [from, to] = shownWindow()
+      const width = Math.max(Math.floor(plot.bbox.width / devicePixelRatio), 10)
+      const now = `${samples.version} ${from} ${to} ${width} ${useUnits.getState().radians}`
+      const marks = `${useCursor.getState().time} ${String(useWindow.getState().cursors)} ${useRuns.getState().runs.at(-1)?.tunings.length}`
+      if (now !== seen) {
+        seen = now
+        const raw = drawnOf(shown, from, to, width)
+        const found = axisReading(shown, raw)
+        unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
+        drawn = scaled(raw, found.factor)
+        const [low, high] = rangeOf(drawn, from, to)
+        plot.batch(() => {
+          plot.setData(drawn as unknown as uPlot.AlignedData, false)
+          plot.setScale('x', { min: from, max: to })
+          plot.setScale('y', { min: low, max: high })
+        })
+      } else if (marks !== lines) plot.redraw(false, false)
+      lines = marks
+    }
+    frame()
+    if (handle)
+      handle.current = {
+        figure: () => {
+          const [min, max] = [plot.scales['y']?.min ?? 0, plot.scales['y']?.max ?? 1]
+          const [from, to] = shownWindow()
+          const [x, ...columns] = drawn
+          return {
+            title,
+            width: 760,
+            height: 360,
+            x: { min: from, max: to, label: 'time, s' },
+            y: { min, max, label: unit },
+            lines: shown.map(({ tone, dash, label }, k) => ({ tone, dash, label, x, y: columns[k] ?? [] })),
+          }
+        },
+      }
+    const sized = new ResizeObserver(() => plot.setSize({ width: Math.max(element.clientWidth, 60), height: Math.max(element.clientHeight, 60) }))
+    sized.observe(element)
+    return () => {
+      cancelAnimationFrame(frameHandle)
+      sized.disconnect()
+      leave()
+      plot.destroy()
+    }
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [identity, scheme, title, band])
+  return <div ref={box} className="plot" role="img" aria-label={`${title}: ${shown.map(({ label }) => label).join(', ')}`} />
+}
+
+function tick(value: number, splits: number[]): string {
+  const step = Math.abs((splits[1] ?? 1) - (splits[0] ?? 0))
+  if (Math.abs(value) >= 1e6 || step < 1e-6) return digits(value, 3)
+  return value.toFixed((String(Number(step.toPrecision(3))).split('.')[1] ?? '').length).replace('-', '−')
+}
+
+/** Least and greatest value that is seen, with air around them. */
+function rangeOf([time, ...columns]: Drawn, from: number, to: number): [number, number] {
+  let low = Infinity
+  let high = -Infinity
+  for (const column of columns)
+    for (let k = 0; k < time.length; k++) {
+      const value = column[k]
+      if (typeof value !== 'number' || !(time[k]! >= from && time[k]! <= to)) continue
+      if (value < low) low = value
+      if (value > high) high = value
+    }
+  return aired(low, high)
+}
+
+/** Which measuring cursor is under the pointer. */
+function gripOf(plot: uPlot, event: MouseEvent): 0 | 1 | null {
+  const { cursors } = useWindow.getState()
+  if (!cursors) return null
+  const x = event.clientX - plot.over.getBoundingClientRect().left
+  const far = cursors.map((time) => Math.abs(plot.valToPos(time, 'x') - x))
+  const nearest = far[0]! <= far[1]! ? 0 : 1
+  return far[nearest]! <= GRIP_PX ? nearest : null
+}
+
+/** Wheel zooms, Shift or the middle button pans, a click shows an instant, measuring cursors are dragged. */
+function listen(plot: uPlot): () => void {
+  const { over } = plot
+  const timeOf = (event: MouseEvent) => plot.posToVal(event.clientX - over.getBoundingClientRect().left, 'x')
+  const wheel = (event: WheelEvent) => {
+    event.preventDefault()
+    const [from, to] = shownWindow()
+    if (event.shiftKey || event.deltaX) pan(((to - from) * (event.deltaX || event.deltaY)) / over.clientWidth)
+    else zoomBy(event.deltaY > 0 ? 1.25 : 0.8, timeOf(event))
+  }
+  const down = (event: PointerEvent) => {
+    const grip = gripOf(plot, event)
+    const panning = event.button === 1 || event.shiftKey
+    const from = event.clientX
+    let last = event.clientX
+    const move = (moved: PointerEvent) => {
+      const { cursors } = useWindow.getState()
+      if (grip !== null && cursors) {
+        const [first, end] = shownWindow()
+        const time = Math.min(Math.max(timeOf(moved), first), end)
+        useWindow.setState({ cursors: grip ? [cursors[0], time] : [time, cursors[1]] })
+      } else if (panning) {
+        const [first, end] = shownWindow()
+        pan(((end - first) * (last - moved.clientX)) / over.clientWidth)
+        last = moved.clientX
+      }
+    }
+    const up = (ended: PointerEvent) => {
+      removeEventListener('pointermove', move)
+      removeEventListener('pointerup', up)
+      if (grip === null && !panning && Math.abs(ended.clientX - from) < CLICK_PX) useCursor.setState({ time: Math.max(timeOf(ended), 0), playing: false })
+    }
+    if (panning || grip !== null) event.preventDefault()
+    addEventListener('pointermove', move)
+    addEventListener('pointerup', up)
+  }
+  const hover = (event: PointerEvent) => {
+    over.style.cursor = gripOf(plot, event) === null ? '' : 'ew-resize'
+  }
+  over.addEventListener('wheel', wheel, { passive: false })
+  over.addEventListener('pointerdown', down)
+  over.addEventListener('pointermove', hover)
+  return () => {
+    over.removeEventListener('wheel', wheel)
+    over.removeEventListener('pointerdown', down)
+    over.removeEventListener('pointermove', hover)
+  }
+}
+
+function drawBand(plot: uPlot, tolerance: number): void {
+  const { left, width } = plot.bbox
+  const top = plot.valToPos(tolerance, 'y', true)
+  const bottom = plot.valToPos(-tolerance, 'y', true)
+  plot.ctx.save()
+  plot.ctx.fillStyle = colour('sunken')
+  plot.ctx.fillRect(left, top, width, bottom - top)
+  plot.ctx.restore()
+}
+
+/** Upright lines: the instant that every view shows, the measuring cursors, and where a parameter was tuned. */
+function drawLines(plot: uPlot): void {
+  const { ctx, bbox } = plot
+  const { left, top, width, height } = bbox
+  const line = (time: number, tone: string, dash: number[], label: string) => {
+    const x = plot.valToPos(time, 'x', true)
+    if (x < left || x > left + width) return
+    ctx.strokeStyle = colour(tone)
+    ctx.lineWidth = devicePixelRatio
+    ctx.setLineDash(dash.map((part) => part * devicePixelRatio))
+    ctx.beginPath()
+    ctx.moveTo(x, top)
+    ctx.lineTo(x, top + height)
+    ctx.stroke()
+    if (!label) return
+    ctx.font = `${11 * devicePixelRatio}px Inter Variable`
+    ctx.fillStyle = colour(tone)
+    ctx.textAlign = 'left'
+    ctx.fillText(label, x + 3 * devicePixelRatio, top + 10 * devicePixelRatio)
+  }
+  ctx.save()
+  const current = useRuns.getState().runs.find(({ key }) => key === samples.run)
+  for (const { time } of current?.tunings ?? []) line(time, 'muted', [2, 3], '')
+  const { cursors } = useWindow.getState()
+  cursors?.forEach((time, k) => line(time, 'ink', [5, 3], 'AB'[k]!))
+  if (useCursor.getState().time !== null) line(shownTime(), 'accent', [], '')
+  ctx.restore()
+}

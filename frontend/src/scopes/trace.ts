@@ -1,0 +1,104 @@
+import { firstAfter, type RunSamples } from '../samples'
+
+/** One line of a plot. The arrays are asked for at each frame, because a run that goes on has longer ones. */
+export interface Trace {
+  /** The same for the same line whatever else is shown. */
+  key: string
+  label: string
+  unit: string
+  /** Name of a custom property, `trace-0`. */
+  tone: string
+  dash: number[]
+  read: () => { time: Float64Array; values: Float64Array } | undefined
+}
+
+const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]]
+export const MOST_TRACES = 32
+
+/**
+ * The traces of some signals of a run. An element of a vector has the colour of its number in every view, so a
+ * joint is known by its colour; scalars are told apart by theirs. What would look alike is dashed.
+ */
+export function tracesOf(samples: RunSamples, paths: { path: string; label: string }[]): Trace[] {
+  const taken = new Map<string, number>()
+  let scalars = 0
+  return paths
+    .flatMap(({ path, label }) => {
+      const found = samples.signal(path)
+      if (!found) return []
+      const name = label || found.channel.name
+      return found.columns.map((_, element): Trace => {
+        const single = found.columns.length === 1
+        const tone = `trace-${(single ? scalars++ : element) % 8}`
+        const alike = taken.get(tone) ?? 0
+        taken.set(tone, alike + 1)
+        return {
+          key: `${path} ${element}`,
+          label: single ? name : `${name} ${element + 1}`,
+          unit: found.channel.unit,
+          tone,
+          dash: DASHES[alike % DASHES.length]!,
+          read: () => {
+            const signal = samples.signal(path)
+            const values = signal?.columns[element]
+            return signal && values && { time: signal.time, values }
+          },
+        }
+      })
+    })
+    .slice(0, MOST_TRACES)
+}
+
+/** The columns that a plot draws: a common row of instants, and for each trace its values there. */
+export type Drawn = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
+
+/**
+ * The least and the greatest value of each trace in each of `width` stretches of a window of time: no more points
+ * than can be seen, and no peak is lost.
+ */
+export function extremes(traces: { time: Float64Array; values: Float64Array }[], from: number, to: number, width: number): Drawn {
+  const span = (to - from) / width
+  const time = new Float64Array(2 * width)
+  for (let k = 0; k < width; k++) {
+    time[2 * k] = from + (k + 0.25) * span
+    time[2 * k + 1] = from + (k + 0.75) * span
+  }
+  const columns = traces.map(({ time: at, values }) => {
+    const column: (number | undefined)[] = new Array<number | undefined>(2 * width).fill(undefined)
+    // One sample beyond each side, so that a line leaves the window where it should.
+    let row = Math.max(firstAfter(at, from) - 1, 0)
+    const end = Math.min(firstAfter(at, to) + 1, at.length)
+    while (row < end) {
+      const k = Math.min(Math.max(Math.floor((at[row]! - from) / span), 0), width - 1)
+      const until = k === width - 1 ? Infinity : from + (k + 1) * span
+      let low = row
+      let high = row
+      do {
+        if (values[row]! < values[low]!) low = row
+        if (values[row]! > values[high]!) high = row
+        row++
+      } while (row < end && at[row]! < until)
+      column[2 * k] = values[Math.min(low, high)]
+      column[2 * k + 1] = values[Math.max(low, high)]
+    }
+    return column
+  })
+  return [time, ...columns]
+}
+
+/** Samples of a trace in a window of time, as they were recorded, with one beyond each side. */
+export function within({ time, values }: { time: Float64Array; values: Float64Array }, from: number, to: number) {
+  const begin = Math.max(firstAfter(time, from) - 1, 0)
+  const end = Math.min(firstAfter(time, to) + 1, time.length)
+  return { time: time.subarray(begin, end), values: values.subarray(begin, end) }
+}
+
+/** The value at an instant, on the straight line between two samples; NaN outside of them. */
+export function valueAt({ time, values }: { time: Float64Array; values: Float64Array }, at: number): number {
+  const after = firstAfter(time, at)
+  if (after === 0 || (after === time.length && time[after - 1] !== at)) return NaN
+  const t0 = time[after - 1]!
+  const y0 = values[after - 1]!
+  if (t0 === at || after === time.length) return y0
+  return y0 + ((values[after]! - y0) * (at - t0)) / (time[after]! - t0)
+}

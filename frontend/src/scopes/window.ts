@@ -1,0 +1,54 @@
+import { create } from 'zustand'
+import { samples } from '../samples'
+import { useStudio } from '../store'
+
+interface Window {
+  /** The stretch of time (s) that every time plot shows; null is the whole run. */
+  range: [number, number] | null
+  /** Two instants (s) to measure between; null where nobody measures. */
+  cursors: [number, number] | null
+  /** Whether the tables of measures stand beside the plots. */
+  measuring: boolean
+}
+
+/** Zoom and measuring cursors: the same for all time plots. */
+export const useWindow = create<Window>(() => ({ range: null, cursors: null, measuring: false }))
+
+/** The whole run: to its stop time while it goes on, and to where it came when it has ended. */
+export function wholeRun(): [number, number] {
+  const { run } = useStudio.getState()
+  const reached = samples.time[samples.count - 1] ?? 0
+  if (!run || run.state === 'running' || run.state === 'paused') return [0, run?.stopTime || reached || 1]
+  return [Math.min(samples.time[0] ?? 0, reached), reached || 1]
+}
+
+/** What is shown now. */
+export function shownWindow(): [number, number] {
+  return useWindow.getState().range ?? wholeRun()
+}
+
+const LEAST_SPAN = 1e-9
+
+export function zoomTo(from: number, to: number): void {
+  if (to - from > LEAST_SPAN * Math.max(1, Math.abs(to))) useWindow.setState({ range: [from, to] })
+}
+
+/** Zoom about an instant that stays where it is. */
+export function zoomBy(factor: number, about: number): void {
+  const [from, to] = shownWindow()
+  const [first, last] = wholeRun()
+  const span = (to - from) * factor
+  if (span >= last - first) useWindow.setState({ range: null })
+  else zoomTo(about - ((about - from) / (to - from)) * span, about + ((to - about) / (to - from)) * span)
+}
+
+export function pan(by: number): void {
+  const [from, to] = shownWindow()
+  useWindow.setState({ range: [from + by, to + by] })
+}
+
+/** Two cursors, at a third and two thirds of what is shown; or none. */
+export function toggleCursors(): void {
+  const [from, to] = shownWindow()
+  useWindow.setState((s) => ({ cursors: s.cursors ? null : [from + (to - from) / 3, from + (2 * (to - from)) / 3] }))
+}
