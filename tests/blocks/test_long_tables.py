@@ -6,9 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 from block_evaluation import evaluate
+from scipy.interpolate import RegularGridInterpolator
 
 import armblocks as ab
-from armblocks.blocks import Clock, FromTable, Integrator, LookupTable1D
+from armblocks.blocks import (
+    Clock,
+    DirectLookup,
+    FromTable,
+    Integrator,
+    InterpolationUsingPrelookup,
+    LookupTable1D,
+    LookupTable2D,
+    LookupTableND,
+    Prelookup,
+)
 from armblocks.blocks.long_tables import SHORT
 from armblocks.errors import DiagramError, InputError
 
@@ -37,6 +48,57 @@ def test_a_long_curve_is_that_of_numpy(method: str, beyond: str, zero_crossing: 
         positions=X, table=Y, method=method, extrapolation=beyond, zero_crossing=zero_crossing
     )
     np.testing.assert_allclose(evaluate(table, U)["y"], reference(U, method, beyond), rtol=1e-12, atol=1e-13)
+
+
+def test_a_long_curve_takes_the_nearest_point() -> None:
+    middle = (X[1:] + X[:-1]) / 2
+    u = np.concatenate([U[:20], np.nextafter(middle[::5], -np.inf), middle[::5]])
+    expected = Y[np.searchsorted(middle, u, side="right")]
+    for zero_crossing in (True, False):
+        table = LookupTable1D(positions=X, table=Y, method="nearest", zero_crossing=zero_crossing)
+        np.testing.assert_array_equal(evaluate(table, u)["y"], expected)
+
+
+@pytest.mark.parametrize("zero_crossing", [True, False])
+@pytest.mark.parametrize("method", ["linear", "nearest"])
+@pytest.mark.parametrize("sizes", [(30, 3), (9, 10), (5, 6, 7), (3, 3, 3, 20)])
+def test_a_large_table_of_several_axes_is_that_of_scipy(
+    sizes: tuple[int, ...], method: str, zero_crossing: bool
+) -> None:
+    axes = [np.cumsum(RANDOM.uniform(0.2, 1, n)) for n in sizes]
+    table = RANDOM.normal(size=sizes)
+    points = [np.concatenate([RANDOM.uniform(axis[0], axis[-1], 6), axis[[0, -1, 1]]]) for axis in axes]
+    expected = RegularGridInterpolator(axes, table, method=method)(np.column_stack(points))
+    kind: dict[str, Any] = {"table": table, "method": method, "zero_crossing": zero_crossing}
+    block = LookupTableND(positions=np.concatenate(axes), **kind)
+    np.testing.assert_allclose(evaluate(block, *points)["y"], expected, rtol=1e-11, atol=1e-13)
+    if len(sizes) == 2:
+        surface = LookupTable2D(positions1=axes[0], positions2=axes[1], **kind)
+        np.testing.assert_allclose(evaluate(surface, *points)["y"], expected, rtol=1e-11, atol=1e-13)
+    if method == "linear":
+        places = [
+            evaluate(Prelookup(positions=x, zero_crossing=zero_crossing), u) for x, u in zip(axes, points)
+        ]
+        pairs = [place[name] for place in places for name in ("k", "f")]
+        found = evaluate(InterpolationUsingPrelookup(table=table), *pairs)["y"]
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("extrapolation", ["clip", "linear"])
+def test_a_long_prelookup_goes_on_or_holds_beyond_its_ends(extrapolation: str) -> None:
+    k = np.clip(np.searchsorted(X, U, side="right") - 1, 0, COUNT - 2)
+    f = (U - X[k]) / (X[k + 1] - X[k])
+    f = np.clip(f, 0, 1) if extrapolation == "clip" else f
+    found = evaluate(Prelookup(positions=X, extrapolation=extrapolation), U)
+    np.testing.assert_array_equal(found["k"], k)
+    np.testing.assert_allclose(found["f"], f, rtol=1e-12, atol=1e-13)
+
+
+def test_entries_of_large_tables_are_read_directly() -> None:
+    table = RANDOM.normal(size=(20, 30))
+    rows, columns = [0.0, 19.9, -4.0, 7.5], [29.0, 3.2, 2.0, 99.0]
+    found = evaluate(DirectLookup(table=table), rows, columns)["y"]
+    assert found.tolist() == [table[0, 29], table[19, 3], table[0, 2], table[7, 29]]
 
 
 @pytest.mark.parametrize("method", ["linear", "flat"])
@@ -86,6 +148,9 @@ def test_ten_thousand_points_compile_in_a_moment() -> None:
     course = builder.add("course", FromTable(times=np.linspace(0, 1, n), values=np.arange(n) / n))
     curve = LookupTable1D(positions=np.arange(n) / n, table=np.sin(np.arange(n) / n), zero_crossing=False)
     builder.add("curve", curve, course)
+    rows = np.linspace(0, 1, 100)
+    surface = LookupTable2D(positions1=rows, positions2=rows, table=np.outer(rows, rows))
+    builder.add("surface", surface, course, course)
     diagram = builder.build()
     begin = perf_counter()
     ab.compile_diagram(diagram).compiled  # noqa: B018 - compiles

@@ -3,6 +3,7 @@
 from types import ModuleType
 
 from armblocks.blocks import (
+    angles,
     arithmetic,
     arm_plant,
     branching,
@@ -36,11 +37,13 @@ from armblocks.blocks import (
     periodic,
     pid,
     poses,
+    prelookup,
     python_function,
     rate_limits,
     reductions,
     repeating,
     robots,
+    rounding,
     routing,
     second_order,
     selection,
@@ -51,19 +54,19 @@ from armblocks.blocks import (
     waveforms,
     zero_poles,
 )
-from armblocks.blocks.arithmetic import (
-    Abs,
+from armblocks.blocks.angles import (
     AngleDifference,
-    Bias,
     CartesianToPolar,
     DegreesToRadians,
+    PolarToCartesian,
+    RadiansToDegrees,
+)
+from armblocks.blocks.arithmetic import (
+    Abs,
+    Bias,
     Divide,
     Hypot,
-    Modulo,
-    PolarToCartesian,
     Polynomial,
-    RadiansToDegrees,
-    Rounding,
     Sign,
     Sqrt,
     UnaryMinus,
@@ -152,15 +155,7 @@ from armblocks.blocks.logic import (
     RelationalOperator,
     TruthTable,
 )
-from armblocks.blocks.lookup import (
-    DirectLookup,
-    InterpolationUsingPrelookup,
-    LookupTable1D,
-    LookupTable2D,
-    LookupTableDynamic,
-    LookupTableND,
-    Prelookup,
-)
+from armblocks.blocks.lookup import LookupTable1D, LookupTable2D, LookupTableDynamic, LookupTableND
 from armblocks.blocks.maths import (
     Atan2,
     Gain,
@@ -215,6 +210,7 @@ from armblocks.blocks.poses import (
     TransformPoint,
     TransformTwist,
 )
+from armblocks.blocks.prelookup import DirectLookup, InterpolationUsingPrelookup, Prelookup
 from armblocks.blocks.python_function import PythonFunction
 from armblocks.blocks.rate_limits import RateLimiterContinuous, RateLimiterDynamic
 from armblocks.blocks.reductions import (
@@ -244,6 +240,7 @@ from armblocks.blocks.robots import (
     Rne,
     RobotPlot,
 )
+from armblocks.blocks.rounding import Modulo, Rounding
 from armblocks.blocks.routing import Demux, Mux
 from armblocks.blocks.second_order import SecondOrderIntegrator, SecondOrderIntegratorLimited
 from armblocks.blocks.selection import (
@@ -305,6 +302,8 @@ BLOCKS = BlockLibrary(
         sinks,
         ending,
         arithmetic,
+        rounding,
+        angles,
         constraints,
         gains,
         reductions,
@@ -312,6 +311,7 @@ BLOCKS = BlockLibrary(
         selection,
         logic,
         lookup,
+        prelookup,
         waveforms,
         from_file,
         repeating,

@@ -26,12 +26,14 @@ Point = float | SX
 
 def weights(
     u: SX,
-    points: Sequence[float],
+    points: Sequence[Point],
     method: str = "linear",
     extrapolation: str = "clip",
     cell: SX | None = None,
 ) -> list[SX]:
     """The weight of each of n >= 2 rising break points at position ``u``, a scalar.
+
+    Break points may be symbols where the method is not ``cubic``.
 
     ``cell``, if given, says which of :func:`borders` are at or below u: the equations that hold.
     """
@@ -50,16 +52,17 @@ def weights(
         found = [at == float(k) for k in range(1, len(points))]
     if method == "linear":
         return linear_weights(inside, points, found)
-    weighted = _cubic_weights(inside, points)
+    fixed = [float(point) for point in points]  # a spline through positions that move is not offered
+    weighted = _cubic_weights(inside, fixed)
     if extrapolation == "linear":
-        slopes = spline_slopes(points)
+        slopes = spline_slopes(fixed)
         for k in range(len(points)):
             rate = if_else(u < points[0], float(slopes[0, k]), float(slopes[-1, k]))
             weighted[k] = weighted[k] + rate * (u - inside)
     return weighted
 
 
-def borders(points: Sequence[float], method: str, extrapolation: str) -> list[float]:
+def borders(points: Sequence[Point], method: str, extrapolation: str) -> list[Point]:
     """The positions, rising, at which curve or slope jumps; a spline has none but where it is held."""
     if method == "flat":
         return list(points[1:])

@@ -16,8 +16,8 @@ from casadi import SX, dot, floor, fmax, if_else, sin, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.interpolation import cells, weights
-from armblocks.blocks.lookup import rising
 from armblocks.blocks.switching import JUST
+from armblocks.blocks.table_axes import rising
 from armblocks.diagram import (
     Block,
     Guard,

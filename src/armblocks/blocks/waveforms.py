@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.interpolation import weights
 from armblocks.blocks.long_tables import interval_of, is_long, line, with_positions
-from armblocks.blocks.lookup import rising
+from armblocks.blocks.table_axes import rising
 from armblocks.diagram import (
     Block,
     Parameter,
@@ -156,7 +156,7 @@ class FromTable(Block):
         return tuple(SX(time) for time in self._times())
 
     def _is_long(self) -> bool:
-        return is_long(shape_of(self.times)[0], self.method)
+        return is_long(shape_of(self.times), self.method)
 
     def _read(self, t: SX, p: Signals) -> SX:
         """The course, from the two rows around t."""

@@ -1,0 +1,285 @@
+"""The axes of a lookup table: where a position lies on each, and the events at which it enters another cell.
+
+Along each axis the *borders* are the positions at which the value or its slope jumps; *cell* k lies above k
+borders. Of a located axis the cell is a mode, so that a step meets one smooth piece of the table. Tables of
+few points stand in the equations; those of many are read by index (see :mod:`.long_tables`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Protocol, cast
+
+import numpy as np
+from casadi import SX, fmax, fmin, if_else, reshape, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.interpolation import borders, contract, weights
+from armblocks.blocks.switching import JUST
+from armblocks.diagram import Block, Guard, Shapes, Signals, State
+from armblocks.equations import Shape, flatten, last_at_or_below, read_entry
+from armblocks.errors import InputError
+
+
+def rising(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
+    """Break points as floats; raises ``InputError`` unless they rise and are as many as the table is long."""
+    values = [float(value) for value in np.ravel(cast("Any", points))]
+    if len(values) < 2 or any(right <= left for left, right in pairwise(values)):
+        raise InputError(
+            f"{name} is {values}"[:90],
+            where=where,
+            allowed="at least two numbers, each greater than the one before",
+            fix="sort them and drop repeated ones",
+        )
+    if len(values) != count:
+        raise InputError(
+            f"{name} has {len(values)} break points for {count} entries of the table",
+            where=where,
+            allowed="as many as the table has entries along that axis",
+            fix="correct the table or the break points",
+        )
+    return values
+
+
+def numbers_of(block: Block, name: str) -> list[float]:
+    """The entries of an array parameter."""
+    return [float(value) for value in np.ravel(cast("Any", block.parameter_value(name)))]
+
+
+def by_element(inputs: Sequence[SX], function: Callable[..., SX]) -> SX:
+    """A function of scalars applied to all elements; scalars spread."""
+    largest = max(inputs, key=lambda value: value.numel())
+    size = largest.numel()
+    columns = [[value[k if value.numel() > 1 else 0] for k in range(size)] for value in inputs]
+    return reshape(vertcat(*[function(*elements) for elements in zip(*columns)]), *largest.shape)
+
+
+class Axis(Protocol):
+    """One axis, for scalar positions u and cells."""
+
+    @property
+    def has_borders(self) -> bool:
+        """Whether anything happens along it."""
+        ...
+
+    def cell(self, u: SX) -> SX:
+        """How many borders are at or below u."""
+        ...
+
+    def to_next(self, u: SX, cell: SX) -> SX:
+        """How far u is beyond the border above its cell; -inf where there is none."""
+        ...
+
+    def to_last(self, u: SX, cell: SX) -> SX:
+        """How far u is beyond the border below its cell; inf where there is none."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ShortAxis:
+    """An axis whose points stand in the equations, as numbers or as signals."""
+
+    points: Sequence[float | SX]
+    method: str
+    extrapolation: str
+
+    @property
+    def borders(self) -> list[float | SX]:
+        """Where they are, rising."""
+        return list(borders(self.points, self.method, self.extrapolation))
+
+    @property
+    def has_borders(self) -> bool:
+        return bool(self.borders)
+
+    def cell(self, u: SX) -> SX:
+        return sum((u >= border for border in self.borders), SX(0.0))
+
+    def weights(self, u: SX, cell: SX | None = None) -> list[SX]:
+        """The weight of every point."""
+        return weights(u, self.points, self.method, self.extrapolation, cell)
+
+    def to_next(self, u: SX, cell: SX) -> SX:
+        return self._beyond([*self.borders, math.inf], u, cell)
+
+    def to_last(self, u: SX, cell: SX) -> SX:
+        return self._beyond([-math.inf, *self.borders], u, cell)
+
+    def _beyond(self, ends: Sequence[float | SX], u: SX, cell: SX) -> SX:
+        return sum((if_else(cell == float(k), u - end, 0.0) for k, end in enumerate(ends)), SX(0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class LongAxis:
+    """An axis whose points are searched and read by index, as inputs of the run."""
+
+    points: SX
+    method: str
+    extrapolation: str
+
+    @property
+    def has_borders(self) -> bool:
+        return True
+
+    @property
+    def _held(self) -> bool:
+        return self.method == "linear" and self.extrapolation == "clip"
+
+    @property
+    def _count(self) -> int:
+        """How many borders there are."""
+        n = self.points.numel()
+        return n if self._held else n - 2 if self.method == "linear" else n - 1
+
+    def cell(self, u: SX) -> SX:
+        last = last_at_or_below(self.points, u)
+        if self.method == "nearest":
+            here = fmin(fmax(last, 0.0), self._count - 1.0)
+            return if_else(last >= self._count, float(self._count), here + (u >= self._border(here)))
+        return fmin(fmax(last + (1.0 if self._held else 0.0), 0.0), float(self._count))
+
+    def to_next(self, u: SX, cell: SX) -> SX:
+        return if_else(cell < float(self._count), u - self._border(cell), -math.inf)
+
+    def to_last(self, u: SX, cell: SX) -> SX:
+        return if_else(cell > 0.0, u - self._border(cell - 1.0), math.inf)
+
+    def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
+        """Index and weight of the points that count in a cell."""
+        if self.method != "linear":
+            return [(cell, SX(1.0))]
+        n = self.points.numel()
+        interval = fmin(fmax(cell, 1.0), n - 1.0) - 1.0 if self._held else cell
+        begin, end = read_entry(self.points, interval), read_entry(self.points, interval + 1.0)
+        if self._held:
+            u = if_else(cell == 0.0, self.points[0], if_else(cell == float(n), self.points[n - 1], u))
+        share = (u - begin) / (end - begin)
+        return [(interval, 1.0 - share), (interval + 1.0, share)]
+
+    def _border(self, number: SX) -> SX:
+        """The position of a border, counted from 0 and held between the first and the last."""
+        k = fmin(fmax(number, 0.0), self._count - 1.0)
+        if self.method == "nearest":
+            return (read_entry(self.points, k) + read_entry(self.points, k + 1.0)) / 2.0
+        return read_entry(self.points, k if self._held else k + 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """The axes of a table by the input port that gives the position along each.
+
+    ``located``: whether the cells are modes; then the states of the block have ``cell`` or ``cell1``, ….
+    """
+
+    axes: Mapping[str, Axis]
+    located: bool
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        """The cells."""
+        doc = "how many borders are at or below"
+        return tuple(State(f"cell{k}", inputs[port], f"{doc} {port}") for port, k, _ in self._moving())
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        """Both ends of each cell."""
+        return tuple(
+            guard
+            for port, k, _ in self._moving()
+            for guard in (
+                Guard(f"up{k}", inputs[port], f"{port} reaches the next border", 1),
+                Guard(f"down{k}", inputs[port], f"{port} falls below the border", -1),
+            )
+        )
+
+    def guard_values(self, x: Signals, u: Signals) -> Signals:
+        """The distances to both ends."""
+        found = dict[str, SX]()
+        for port, k, axis in self._moving():
+            place = [u[port], x[f"cell{k}"]]
+            found[f"up{k}"] = by_element(place, axis.to_next) + JUST
+            found[f"down{k}"] = by_element(place, axis.to_last) + JUST
+        return found
+
+    def mode_values(self, u: Signals) -> Signals:
+        """The cells by the values of the moment."""
+        return {f"cell{k}": by_element([u[port]], axis.cell) for port, k, axis in self._moving()}
+
+    def cell(self, port: str, x: Signals, u: Signals) -> SX:
+        """The cell along one axis: the mode, or by the values of the moment."""
+        modes = {moving: x[f"cell{k}"] for moving, k, _ in self._moving()}
+        return modes[port] if port in modes else by_element([u[port]], self.axes[port].cell)
+
+    def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
+        """The cells after events: the next one, or as far as u has jumped."""
+        found = dict[str, SX]()
+        for port, k, axis in self._moving():
+            here, cell = by_element([u[port]], axis.cell), x[f"cell{k}"]
+            down = if_else(e[f"down{k}"] < 0.0, fmin(here, cell - 1.0), cell)
+            found[f"cell{k}"] = if_else(e[f"up{k}"] > 0.0, fmax(here, cell + 1.0), down)
+        return found
+
+    def value(self, table: SX, shape: Shape, x: Signals, u: Signals) -> SX:
+        """What a table of this shape gives, by element."""
+        cells = {port: x[f"cell{k}"] for port, k, _ in self._moving()}
+        for port, axis in self.axes.items():
+            if isinstance(axis, LongAxis) and port not in cells:
+                cells[port] = by_element([u[port]], axis.cell)
+        entries = flatten(table, shape)
+
+        def at(*places: SX) -> SX:
+            positions, known = dict(zip(self.axes, places)), dict(zip(cells, places[len(self.axes) :]))
+            corners = list[list[tuple[SX, SX]]]()
+            weights_by_axis = list[list[SX]]()
+            for port, axis in self.axes.items():
+                if isinstance(axis, LongAxis):
+                    corners.append(axis.corners(positions[port], known[port]))
+                elif isinstance(axis, ShortAxis):
+                    weights_by_axis.append(axis.weights(positions[port], known.get(port)))
+            return read(entries, shape, corners) if corners else contract(table, shape, weights_by_axis)
+
+        return by_element([*(u[port] for port in self.axes), *cells.values()], at)
+
+    def _moving(self) -> list[tuple[str, str, Axis]]:
+        """Port, mark of its names and axis, of those whose cells are modes."""
+        many = len(self.axes) > 1
+        numbered = (
+            (port, str(k) if many else "", axis) for k, (port, axis) in enumerate(self.axes.items(), 1)
+        )
+        return [entry for entry in numbered if self.located and entry[2].has_borders]
+
+
+def axis(points: SX | Sequence[float | SX], method: str, extrapolation: str) -> Axis:
+    """An axis: long where its points are one column of symbols, an input of the run."""
+    if isinstance(points, SX):
+        return LongAxis(points, method, extrapolation)
+    return ShortAxis(points, method, extrapolation)
+
+
+def table_axes(block: Block, named: Mapping[str, str], p: Signals | None) -> Axes:
+    """The axes of a block by input port; ``named`` says which parameter has the positions of each.
+
+    With ``p`` they are read by index.
+    """
+    method, extrapolation, located = (
+        block.parameter_value(name) for name in ("method", "extrapolation", "zero_crossing")
+    )
+    found = {
+        port: axis(p[name] if p else numbers_of(block, name), str(method), str(extrapolation))
+        for port, name in named.items()
+    }
+    return Axes(found, bool(located))
+
+
+def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) -> SX:
+    """The weighted sum of those entries of a flat table that lie at the corners of a cell, read by index."""
+    strides = [math.prod(shape[k + 1 :]) for k in range(len(shape))]
+    found = SX(0.0)
+    for corner in itertools.product(*corners):
+        index = sum((float(stride) * place for stride, (place, _) in zip(strides, corner)), SX(0.0))
+        found = found + math.prod((weight for _, weight in corner), start=SX(1.0)) * read_entry(
+            entries, index
+        )
+    return found
