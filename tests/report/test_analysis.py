@@ -126,3 +126,17 @@ def test_a_sliding_joint_is_told_in_metres() -> None:
     robot = Robot(name="slide", links=(Link(name="z", joint=joint, mass=1.0),))
     (finding,) = limit_findings(robot, np.array([0.0, 1.0]), np.array([[0.0], [1.25]]))
     assert "(0 … 1 m)" in finding.text and "1.25 m" in finding.text
+
+
+def test_more_rows_where_nothing_new_happens_change_no_average() -> None:
+    """Rows of a logged run stand at uneven times: a row on the line between two others says nothing new."""
+    time = np.array([0.0, 1.0, 3.0, 3.5, 7.0])
+    values = np.array([0.0, 2.0, -1.0, 4.0, 0.5])
+    random = np.random.default_rng(7)
+    more = np.unique(np.concatenate([time, random.uniform(0.0, 1.0, 40), random.uniform(3.5, 7.0, 3)]))
+    there = np.interp(more, time, values)
+    assert root_mean_square(more, there) == pytest.approx(root_mean_square(time, values), rel=1e-13)
+    assert signed_integrals(more, there) == pytest.approx(signed_integrals(time, values), rel=1e-13)
+    # By hand: the integral of the square over 0..1 is 4/3, over 1..3 it is 2, and so on.
+    square = 4 / 3 + 2.0 + (1 - 4 + 16) / 6 + 3.5 * (16 + 2 + 0.25) / 3
+    assert root_mean_square(time, values) == pytest.approx(math.sqrt(square / 7.0), rel=1e-14)

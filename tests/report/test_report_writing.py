@@ -12,13 +12,18 @@ import armblocks as ab
 from armblocks.blocks import (
     Constant,
     Display,
+    FirstOrderLag,
     Fkine,
+    Gain,
+    Inport,
     Integrator,
     JTraj,
+    Outport,
     Rne,
     RobotPlot,
     Scope,
     SineWave,
+    Subsystem,
     T2xyz,
     XYGraph,
 )
@@ -261,3 +266,41 @@ def test_quantities_are_shown_in_peoples_units(
 ) -> None:
     values, found = for_people(np.array([value]), unit)
     assert (values[0], found) == (pytest.approx(shown, rel=1e-3), shown_unit)
+
+
+def nested_run() -> tuple[ab.Diagram, ab.SimulationResult]:
+    """Two axes that are the same inside, and one that differs."""
+    filtered = DiagramBuilder("axis")
+    entering = filtered.add("u", Inport(port=1))
+    filtered.add("y", Outport(port=1), filtered.add("first-order <lag>", FirstOrderLag(), entering))
+    scaled = DiagramBuilder("axis")
+    scaled.add("y", Outport(port=1), scaled.add("twice", Gain(gain=2.0), scaled.add("u", Inport(port=1))))
+    builder = DiagramBuilder("cell", settings=SimulationOptions(stop_time=1.0, sample_time=0.1))
+    wave = builder.add("wave", SineWave())
+    axes = [
+        builder.add(f"axis {number}", Subsystem(diagram=part.build()), wave)
+        for number, part in enumerate((filtered, filtered, scaled), start=1)
+    ]
+    builder.add("scope", Scope(inputs=3), *axes)
+    diagram = builder.build()
+    return diagram, ab.simulate(diagram)
+
+
+def test_every_sheet_is_in_the_report(tmp_path: Path) -> None:
+    write_report(tmp_path, *nested_run())
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r"<summary>(.*?)</summary>", text) == ["axis 1", "axis 3"]
+    assert "The same is inside axis 2." in text
+    assert "first-order &lt;lag&gt;" in text and "twice (Gain)" in text
+    assert not outline(tmp_path / "report.html").mistakes
+
+
+def test_a_report_of_some_rows_of_a_log_says_so(tmp_path: Path) -> None:
+    builder = DiagramBuilder("long", settings=SimulationOptions(stop_time=40.0, sample_time=1e-3))
+    builder.add("scope", Scope(), builder.add("wave", SineWave()))
+    diagram = builder.build()
+    result = ab.simulate(diagram, log=tmp_path / "all.parquet")
+    assert result.time.size < 40_001
+    write_report(tmp_path, diagram, result, formats=(), data=())
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "of 40 001 instants are shown here" in text.replace("\u202f", " ").replace("\u00a0", " ")

@@ -74,6 +74,15 @@ def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *,
     return picture
 
 
+def sheets(diagram: Diagram) -> dict[str, tuple[str, ...]]:
+    """The subsystems of a diagram by path, in order, each with the others that are the same inside."""
+    found: dict[Diagram, list[str]] = {}
+    for path, level in sorted(levels_of(diagram).items(), key=lambda entry: entry[0].split("/")):
+        if path:
+            found.setdefault(level, []).append(path)
+    return {paths[0]: tuple(paths[1:]) for paths in found.values()}
+
+
 def diagram_svg(
     diagram: Diagram, result: SimulationResult | None = None, *, theme: Theme | None = None
 ) -> str:

@@ -22,12 +22,24 @@ from armblocks.simulation.result import SimulationResult
 # Nothing may be loaded or run; styles stand in the page, pictures in data: addresses.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 
+_OPEN_SHEETS = 6
+"""Up to so many subsystems are shown at once; of more, the reader opens one by one."""
+
 _ICONS = {
     "error": '<path d="M7.9 2.5h4.2L17.5 7.9v4.2L12.1 17.5H7.9L2.5 12.1V7.9z" fill="none" '
     'stroke="currentColor" stroke-width="1.6" stroke-linejoin="round"/>',
     "warning": '<path d="M10 2.8 18 16.8H2z" fill="none" stroke="currentColor" stroke-width="1.6" '
     'stroke-linejoin="round"/>',
 }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sheet:
+    """The drawing of a subsystem, and the paths of those that are the same inside."""
+
+    path: str
+    same: tuple[str, ...]
+    picture: Picture
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,6 +52,7 @@ class ReportContents:
     summaries: Sequence[MotionSummary]
     figures: Sequence[Figure]
     drawing: Picture
+    sheets: Sequence[Sheet] = ()
     files: Sequence[str]
 
 
@@ -122,6 +135,16 @@ def _notices(contents: ReportContents) -> str:
         notices.append(("warning", run.message))
     for summary in contents.summaries:
         notices += [("error", f"Limit broken: {finding.text}.") for finding in summary.findings]
+    log = contents.result.log
+    if log is not None and log.rows > contents.result.time.size:
+        notices.append(
+            (
+                "warning",
+                f"{axis_number(contents.result.time.size)} of {axis_number(log.rows)} instants are shown "
+                "here, with all extremes of the logged signals. Averages over the time, work, path lengths "
+                f"and spectra follow from them, coarser than from all, which {log.path.name} holds.",
+            )
+        )
     seen: set[str] = set()
     for motion in contents.motions:
         for finding in inertia_findings(motion.robot):
@@ -189,13 +212,29 @@ def _displays(contents: ReportContents) -> str:
 
 
 def _diagram(contents: ReportContents) -> str:
-    picture = contents.drawing
-    wide = f' style="max-width:{max(round(picture.width * 1.25), 320)}px;margin-inline:auto"'
-    return (
-        f'<figure class="wide"{wide}>{svg_inline(picture, "fig-diagram")}'
-        "<figcaption>The model. Thin wires carry scalars, heavy ones vectors, double ones matrices."
-        "</figcaption></figure>"
+    """The top, then each subsystem in a part that opens and closes, open where there are few."""
+    state = " open" if len(contents.sheets) <= _OPEN_SHEETS else ""
+    inner = "".join(
+        f'<details class="sheet"{state}><summary>{escape(sheet.path)}</summary>'
+        + _drawing(sheet.picture, f"fig-sheet-{number}", _same(sheet))
+        + "</details>"
+        for number, sheet in enumerate(contents.sheets, start=1)
     )
+    heading = "<h3>Inside the subsystems</h3>" if inner else ""
+    kinds = (
+        "The model. Thin wires carry scalars, heavy ones vectors, double ones matrices, triple ones buses."
+    )
+    return _drawing(contents.drawing, "fig-diagram", kinds) + heading + inner
+
+
+def _drawing(picture: Picture, identifier: str, caption: str) -> str:
+    wide = f' style="max-width:{max(round(picture.width * 1.25), 320)}px;margin-inline:auto"'
+    said = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f'<figure class="wide"{wide}>{svg_inline(picture, identifier)}{said}</figure>'
+
+
+def _same(sheet: Sheet) -> str:
+    return f"The same is inside {', '.join(sheet.same)}." if sheet.same else ""
 
 
 def _run(contents: ReportContents) -> str:

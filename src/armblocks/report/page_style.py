@@ -66,6 +66,9 @@ td.bad small{display:block;font-weight:600}
 .notes .warning{color:var(--warning);background:var(--warning-wash)}
 .matrix{font-family:MONO;font-size:.88rem;border-collapse:collapse;width:auto;margin:0}
 .matrix td{border:0;padding:1px 10px 1px 0;text-align:right}
+.sheet{border-top:1px solid var(--grid);padding:10px 0}
+.sheet summary{cursor:pointer;font-weight:600}
+.sheet figure{margin-top:10px}
 code{font-family:MONO;font-size:.9em}
 footer{color:var(--muted);font-size:.86rem;padding:4px 0 40px}
 @media (max-width:640px){main,header.top{padding-left:14px;padding-right:14px}section{padding:16px 14px}
@@ -73,7 +76,9 @@ footer{color:var(--muted);font-size:.86rem;padding:4px 0 40px}
 @media (min-width:1900px){html{font-size:17px}main,header.top{max-width:1500px}}
 @media print{@page{size:A4;margin:14mm}html{font-size:9.5pt;background:#fff}
  main,header.top{max-width:none;padding:0}
- section{border:0;padding:0;margin:14pt 0}nav,.screen{display:none}figure,tr,.notes li{break-inside:avoid}
+ section{border:0;padding:0;margin:14pt 0}nav,.screen{display:none}
+ .sheet::details-content{content-visibility:visible;block-size:auto}.sheet{break-inside:avoid}
+ figure,tr,.notes li{break-inside:avoid}
  h2,h3{break-after:avoid}.scroll{overflow:visible}table{font-size:8pt}th,td{padding:3px 5px}
  .pair{grid-template-columns:1fr 1fr 1fr}.scroll{break-inside:avoid}}
 """

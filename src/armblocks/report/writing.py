@@ -5,21 +5,24 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from armblocks.diagram import Diagram
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import write_atomically
 from armblocks.report.analysis import MotionSummary, summarise
-from armblocks.report.diagram_drawing import diagram_picture
+from armblocks.report.diagram_drawing import diagram_picture, sheets
 from armblocks.report.figures import Figure, file_name, motion_figures, view_figures
 from armblocks.report.motion import Motion, motions
-from armblocks.report.page import ReportContents, report_page
+from armblocks.report.page import ReportContents, Sheet, report_page
 from armblocks.report.sink_files import DATA_FORMATS, REPORT_DATA, sink_files, write_files
 from armblocks.report.svg import svg_file
 from armblocks.simulation.result import SimulationResult
 
 FIGURE_FORMATS = ("svg", "png")
+MOST_SHEETS = 60
+"""How many subsystems the page draws; ``armblocks diagram --sheet`` draws any."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +83,7 @@ def write_report(
         summaries=summaries,
         figures=tuple(figures),
         drawing=drawing,
+        sheets=_sheets(diagram, result),
         files=tuple(path.relative_to(place).as_posix() for path in (diagram_path, *data_paths, *written)),
     )
     page = place / "report.html"
@@ -89,6 +93,13 @@ def write_report(
 
 def _summary(motion: Motion) -> MotionSummary:
     return summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
+
+
+def _sheets(diagram: Diagram, result: SimulationResult) -> tuple[Sheet, ...]:
+    return tuple(
+        Sheet(path=path, same=same, picture=diagram_picture(diagram, result, sheet=path))
+        for path, same in islice(sheets(diagram).items(), MOST_SHEETS)
+    )
 
 
 def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]) -> list[Figure]:
