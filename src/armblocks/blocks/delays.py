@@ -58,6 +58,9 @@ class UnitDelay(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
+
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
 
@@ -107,6 +110,9 @@ class Memory(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
+
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
 
@@ -149,6 +155,9 @@ class Delay(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)
+
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
@@ -210,6 +219,9 @@ class ResettableDelay(Block):
         enable = Port("enable", "not 0 where the block works", shape=())
         further = reset_ports(self.external_reset, self.initial_condition_source)
         return (INPUT, *((enable,) if self.enable_port else ()), *further)
+
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
@@ -330,6 +342,9 @@ class ZeroOrderHold(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
+
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
 
@@ -359,6 +374,9 @@ class RateTransition(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)
+
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)

@@ -258,6 +258,9 @@ class Switch(Block):
             Port("u3", "given elsewhere"),
         )
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u1", "u3")
+
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "one of the two"),)
 

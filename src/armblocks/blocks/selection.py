@@ -267,6 +267,9 @@ class MultiportSwitch(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("index", "which input", shape=()), *numbered_ports("u", self.inputs, "candidate"))
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return tuple(f"u{k}" for k in range(1, self.inputs + 1))
+
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the chosen input"),)
 
@@ -314,6 +317,9 @@ class ManualSwitch(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", 2, "candidate")
+
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u1", "u2")
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the chosen input"),)

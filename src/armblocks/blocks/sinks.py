@@ -217,5 +217,8 @@ class Terminator(Block):
         shown=("u",),
     )
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "what is not needed"),)

@@ -3,6 +3,7 @@
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.block_equations import BlockEquations, SlotKind, block_equations
 from armblocks.diagram.builder import BlockHandle, DiagramBuilder
+from armblocks.diagram.bus import Bus, Carried
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.conditional import (
     ActionSubsystem,
@@ -16,8 +17,6 @@ from armblocks.diagram.content_key import content_key
 from armblocks.diagram.diagram import Connection, Diagram, Placement
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.hierarchy import (
-    Bus,
-    Carried,
     FlatForm,
     diagram_views,
     flat_diagram,

@@ -184,6 +184,13 @@ class Block(ABC):
         """Outputs, in order."""
         return ()
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        """Inputs that may be buses, all with the same elements: what passes a signal on unchanged has some.
+
+        There is then a block for each signal, and every output is a bus of what they give.
+        """
+        return ()
+
     def record_ports(self) -> tuple[Port, ...]:
         """Signals that a run records as ``block/name`` but that nothing can be connected to.
 

@@ -167,6 +167,9 @@ class HeldOutput(Block):
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "what leaves"), Port("works", "1 while or when the subsystem works", "", ()))
 
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
+
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "what is held"),)
 
@@ -212,6 +215,9 @@ class MergedOutput(Block):
             *(Port(f"u{number}", "an output") for number in numbers),
             *(Port(f"works{number}", "1 while or when its subsystem works", "", ()) for number in numbers),
         )
+
+    def bus_inputs(self) -> tuple[str, ...]:
+        return tuple(f"u{number}" for number in range(1, self.inputs + 1))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the output of the one that worked last"),)

@@ -89,6 +89,8 @@ class Diagram:
     mask: tuple[Parameter, ...] = ()
     mask_values: Mapping[str, Value] = field(default_factory=dict[str, Value])
     link: str = ""
+    shares: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Of a flat diagram: blocks that have their parameters in common under another name, which is given."""
     _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
 
     def __post_init__(self) -> None:
@@ -124,6 +126,10 @@ class Diagram:
     def clocked(self, name: str) -> bool:
         """Whether a block works at the ticks of a clock: a sampled one, unless a trigger tells it when."""
         return self.blocks[name].sampled and "?fire" not in self.gates.get(name, {})
+
+    def owner(self, name: str) -> str:
+        """The name before the parameters of a block: its own, or the one that it shares."""
+        return self.shares.get(name, name)
 
     def source(self, name: str, port: str) -> PortRef:
         """The output port that feeds an input port of a flat diagram, a hidden one included."""

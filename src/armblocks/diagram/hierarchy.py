@@ -8,10 +8,12 @@ virtual blocks is its own flat form.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from armblocks.diagram.block import Block
+from armblocks.diagram.bus import Bus, Carried
+from armblocks.diagram.bus_spreading import SpreadBlock, spread_blocks
 from armblocks.diagram.conditional import (
     ActionSubsystem,
     EnabledSubsystem,
@@ -48,49 +50,6 @@ DEEPEST = 100
 """Subsystems inside each other."""
 MOST_LISTED = 20
 """How many offenders one message lists."""
-
-
-@dataclass(frozen=True)
-class Bus:
-    """What a wire carries that has several named signals on it, in order; a bus may hold buses."""
-
-    elements: Mapping[str, Carried]
-
-    def leaves(self) -> Iterator[tuple[str, PortRef]]:
-        """Path and source of every signal: ``("motor.speed", …)``."""
-        for name, carried in self.elements.items():
-            if isinstance(carried, Bus):
-                yield from ((f"{name}.{path}", source) for path, source in carried.leaves())
-            else:
-                yield name, carried
-
-    def paths(self) -> tuple[str, ...]:
-        """The paths of all elements, buses within this bus included."""
-        found: list[str] = []
-        for name, carried in self.elements.items():
-            found.append(name)
-            if isinstance(carried, Bus):
-                found += [f"{name}.{path}" for path in carried.paths()]
-        return tuple(found)
-
-    def element(self, path: str) -> Carried | None:
-        """The element of this path, if there is one."""
-        name, _, rest = path.partition(".")
-        found = self.elements.get(name)
-        if not rest or found is None:
-            return found
-        return found.element(rest) if isinstance(found, Bus) else None
-
-    def replaced(self, path: str, carried: Carried) -> Bus:
-        """The same bus with another element at a path that exists."""
-        name, _, rest = path.partition(".")
-        inner = self.elements[name]
-        new = inner.replaced(rest, carried) if rest and isinstance(inner, Bus) else carried
-        return Bus({**self.elements, name: new})
-
-
-Carried = PortRef | Bus
-"""What a wire carries: the signal of an output of the flat diagram, or a bus of such."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,6 +186,10 @@ class _Flattening:
             if isinstance(block, Merge):
                 self.blocks[path] = MergedOutput(inputs=block.inputs, initial=block.initial)
                 self.controls.add(path)
+        self.spread: dict[str, SpreadBlock] = {}
+        self.elements: dict[PortRef, tuple[SpreadBlock, str]] = {}
+        if any(isinstance(block, BusCreator) for block in self.blocks.values()):
+            spread_blocks(self.blocks, self.at, self._spread_over)
 
     def form(self) -> FlatForm:
         """The flat diagram and its relation to the hierarchy."""
@@ -257,6 +220,9 @@ class _Flattening:
             gates=self._gates(real),
             mask=(),
             mask_values={},
+            shares={
+                found.copy(element): path for path, found in self.spread.items() for element in found.elements
+            },
         )
         return FlatForm(
             diagram=flat,
@@ -389,7 +355,34 @@ class _Flattening:
 
     def at(self, path: str, port: str) -> Carried:
         """What an input port is given."""
-        return self.carry(self.drivers[PortRef(path, port)])
+        target = PortRef(path, port)
+        carried = self.carry(self.drivers[target])
+        if target in self.elements:
+            found, element = self.elements[target]
+            return found.element(port, carried, element)
+        return carried
+
+    def _spread_over(self, found: SpreadBlock) -> None:
+        """Put a copy of a block for each signal of a bus into its place."""
+        path, block = found.path, self.blocks.pop(found.path)
+        self.spread[path] = found
+        alone = set(block.bus_inputs())
+        drivers = {ref.port: source for ref, source in self.drivers.items() if ref.block == path}
+        for element in found.elements:
+            copy = found.copy(element)
+            self.blocks[copy], self.level_of[copy] = block, self.level_of[path]
+            if path in self.controls:
+                self.controls.add(copy)
+            for port, source in drivers.items():
+                self.drivers[PortRef(copy, port)] = source
+                if port in alone:
+                    self.elements[PortRef(copy, port)] = (found, element)
+        # What was followed before may have ended at the one block.
+        self.carried = {
+            PortRef(entry.path, port.name): entry.carried(port.name)
+            for entry in self.spread.values()
+            for port in entry.block.output_ports()
+        }
 
     def _needed(self, ref: PortRef) -> list[PortRef]:
         """The output ports that an output port of a virtual block takes its signal from."""
@@ -501,11 +494,13 @@ class _Flattening:
             else:
                 aliases.update({f"{name}.{path}": source for path, source in carried.leaves()})
 
-        for path, block in self.blocks.items():
+        spread = {path: found.block for path, found in self.spread.items()}
+        for path, block in (*self.blocks.items(), *spread.items()):
             for port in block.input_ports():
-                add(f"{path}/{port.name}", self.at(path, port.name))
+                if PortRef(path, port.name) in self.drivers:  # some are of the copies of a spread block only
+                    add(f"{path}/{port.name}", self.at(path, port.name))
             outputs = block.output_ports()
-            if not self.vanishes(path):
+            if path not in spread and not self.vanishes(path):
                 continue
             for port in outputs:
                 add(f"{path}/{port.name}", self.carried[PortRef(path, port.name)])

@@ -325,7 +325,7 @@ def _signal_values(
 
 def _parameter_values(diagram: Diagram) -> dict[str, Any]:
     return {
-        f"{name}.{rule.name}": block.parameter_value(rule.name)
+        f"{diagram.owner(name)}.{rule.name}": block.parameter_value(rule.name)
         for name, block in diagram.blocks.items()
         for rule in block.inputs_of_the_run()
     }

@@ -36,9 +36,11 @@ class Symbols:
     def __init__(self, model: Model) -> None:
         equations, blocks = model.flow.equations, model.flow.diagram.blocks
         self.tunables = {name: tunable_slots(block) for name, block in blocks.items()}
+        owner = model.flow.diagram.owner
+        owned = {owner(name): slots for name, slots in self.tunables.items()}
         self.parameter_slots = [
             Slot(f"{name}.{slot.name}", slot.shape, slot.unit)
-            for name, slots in self.tunables.items()
+            for name, slots in owned.items()
             for slot in slots
         ]
         self.state_slots = [
@@ -63,9 +65,10 @@ class Symbols:
         self.z, self.discrete = _named_symbols("z", self.discrete_slots)
         self.e, self.events = _named_symbols("e", guard_slots)
         self.m = SX.sym("m", len(model.sampling.clocks))
-        sizes = [sum(slot.size for slot in slots) for slots in self.tunables.values()]
+        sizes = [sum(slot.size for slot in slots) for slots in owned.values()]
         self.p, parts = _symbols("p", sizes)
-        self.parameters = dict(zip(self.tunables, parts))
+        of_owner = dict(zip(owned, parts))
+        self.parameters = {name: of_owner[owner(name)] for name in blocks}
 
     def parameters_of(self, block: str) -> Signals:
         """The symbols of a block's tunable parameters, in their natural shapes."""

@@ -112,7 +112,8 @@ class DiagramRun:
 
 def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None:
     """The tunable parameters, ``block.parameter``, that differ; ``None`` where the equations differ too."""
-    blocks, others = flat_diagram(before).blocks, flat_diagram(after).blocks
+    flat = flat_diagram(before)
+    blocks, others = flat.blocks, flat_diagram(after).blocks
     if list(blocks) != list(others):
         return None
     tuned: dict[str, Array] = {}
@@ -133,5 +134,5 @@ def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None
             if numbers[0].shape != numbers[1].shape:
                 return None
             if numbers[0].tobytes() != numbers[1].tobytes():
-                tuned[f"{name}.{rule.name}"] = numbers[1]
+                tuned[f"{flat.owner(name)}.{rule.name}"] = numbers[1]
     return tuned

@@ -16,6 +16,9 @@ LONGEST = 64
 
 def tunables(diagram: Diagram) -> list[Tunable]:
     """The tunable parameters of all blocks, by ``block.parameter``, with the values that they have now."""
+    flat = flat_diagram(diagram)
+    # Blocks that share their parameters say the same under one name.
+    blocks = {flat.owner(name): block for name, block in flat.blocks.items()}
     return [
         Tunable(
             path=f"{name}.{rule.name}",
@@ -25,7 +28,7 @@ def tunables(diagram: Diagram) -> list[Tunable]:
             low=_bound(rule.minimum if rule.above is None else rule.above),
             high=_bound(rule.maximum),
         )
-        for name, block in flat_diagram(diagram).blocks.items()
+        for name, block in blocks.items()
         for rule in block.inputs_of_the_run()
         if rule.tunable and np.size(np.asarray(value := block.parameter_value(rule.name))) <= LONGEST
     ]

@@ -1,0 +1,51 @@
+"""Several named signals on one wire."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from armblocks.diagram.port import PortRef
+
+
+@dataclass(frozen=True)
+class Bus:
+    """What a wire carries that has several named signals on it, in order; a bus may hold buses."""
+
+    elements: Mapping[str, Carried]
+
+    def leaves(self) -> Iterator[tuple[str, PortRef]]:
+        """Path and source of every signal: ``("motor.speed", …)``."""
+        for name, carried in self.elements.items():
+            if isinstance(carried, Bus):
+                yield from ((f"{name}.{path}", source) for path, source in carried.leaves())
+            else:
+                yield name, carried
+
+    def paths(self) -> tuple[str, ...]:
+        """The paths of all elements, buses within this bus included."""
+        found: list[str] = []
+        for name, carried in self.elements.items():
+            found.append(name)
+            if isinstance(carried, Bus):
+                found += [f"{name}.{path}" for path in carried.paths()]
+        return tuple(found)
+
+    def element(self, path: str) -> Carried | None:
+        """The element of this path, if there is one."""
+        name, _, rest = path.partition(".")
+        found = self.elements.get(name)
+        if not rest or found is None:
+            return found
+        return found.element(rest) if isinstance(found, Bus) else None
+
+    def replaced(self, path: str, carried: Carried) -> Bus:
+        """The same bus with another element at a path that exists."""
+        name, _, rest = path.partition(".")
+        inner = self.elements[name]
+        new = inner.replaced(rest, carried) if rest and isinstance(inner, Bus) else carried
+        return Bus({**self.elements, name: new})
+
+
+Carried = PortRef | Bus
+"""What a wire carries: the signal of an output of the flat diagram, or a bus of such."""

@@ -1,0 +1,235 @@
+"""Buses through blocks that pass signals on: the same as the diagram written signal by signal."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    ActionSubsystem,
+    BusCreator,
+    BusSelector,
+    Constant,
+    Delay,
+    EnabledSubsystem,
+    From,
+    Gain,
+    Goto,
+    If,
+    ManualSwitch,
+    Memory,
+    Merge,
+    MultiportSwitch,
+    PulseGenerator,
+    Ramp,
+    RateTransition,
+    Scope,
+    SineWave,
+    Step,
+    Switch,
+    Terminator,
+    ToWorkspace,
+    UnitDelay,
+    ZeroOrderHold,
+)
+from armblocks.diagram import Block, BlockHandle, Diagram, DiagramBuilder, Inport, Outport, Subsystem
+from armblocks.equations import SimulationOptions
+from armblocks.errors import DiagramError, UnknownNameError
+
+NAMES = ("speed", "inner.angle", "inner.pair")
+OPTIONS = SimulationOptions(stop_time=3.0, sample_time=0.05)
+Way = Callable[[DiagramBuilder, list[BlockHandle]], BlockHandle]
+
+
+def signals(builder: DiagramBuilder, mark: str, factor: float) -> list[BlockHandle]:
+    """Two scalars and a vector."""
+    return [
+        builder.add(f"{mark} speed", SineWave(amplitude=factor, frequency=2.0)),
+        builder.add(f"{mark} angle", Ramp(slope=factor)),
+        builder.add(f"{mark} pair", SineWave(amplitude=(factor, 2.0 * factor), phase=0.3)),
+    ]
+
+
+def bus_of(builder: DiagramBuilder, mark: str, parts: list[BlockHandle]) -> BlockHandle:
+    inner = builder.add(f"{mark} inner", BusCreator(names="angle, pair"), *parts[1:])
+    return builder.add(f"{mark} bus", BusCreator(names="speed, inner"), parts[0], inner)
+
+
+def pass_through(kind: str) -> Diagram:
+    builder = DiagramBuilder(kind)
+    entering = builder.add("u", Inport())
+    builder.add("y", Outport(), entering)
+    return builder.build()
+
+
+BLOCKS: dict[str, tuple[Block, tuple[str, ...]]] = {
+    "unit delay": (UnitDelay(sample_time=0.2, initial=0.5), ("a",)),
+    "memory": (Memory(sample_time=0.2), ("a",)),
+    "delay": (Delay(length=3, sample_time=0.1), ("a",)),
+    "hold": (ZeroOrderHold(sample_time=0.25), ("a",)),
+    "rates": (RateTransition(sample_time=0.25), ("a",)),
+    "switch": (Switch(threshold=0.5), ("a", "control", "b")),
+    "manual": (ManualSwitch(position=2.0), ("a", "b")),
+    "multiport": (MultiportSwitch(inputs=2), ("index", "a", "b")),
+    "enabled": (EnabledSubsystem(diagram=pass_through("enabled")), ("a", "control")),
+    "plain": (Subsystem(diagram=pass_through("plain")), ("a",)),
+}
+
+
+def with_bus(block: Block, inputs: tuple[str, ...]) -> Diagram:
+    builder = DiagramBuilder("bus", settings=OPTIONS)
+    wires = controls(builder)
+    for mark, factor in (("a", 1.0), ("b", -3.0)):
+        if mark in inputs:
+            wires[mark] = bus_of(builder, mark, signals(builder, mark, factor))
+    through = builder.add("block", block, *(wires[name] for name in inputs))
+    taken = builder.add("taken", BusSelector(elements=", ".join(NAMES)), through)
+    builder.add("scope", Scope(inputs=3), *(taken[name.rpartition(".")[2]] for name in NAMES))
+    return builder.build()
+
+
+def signal_by_signal(block: Block, inputs: tuple[str, ...]) -> Diagram:
+    builder = DiagramBuilder("single", settings=OPTIONS)
+    wires = controls(builder)
+    parts = {
+        mark: signals(builder, mark, factor) for mark, factor in (("a", 1.0), ("b", -3.0)) if mark in inputs
+    }
+    outputs = [
+        builder.add(
+            f"block {k}", block, *(parts[name][k] if name in parts else wires[name] for name in inputs)
+        )
+        for k in range(3)
+    ]
+    builder.add("scope", Scope(inputs=3), *outputs)
+    return builder.build()
+
+
+def controls(builder: DiagramBuilder) -> dict[str, BlockHandle]:
+    control = builder.add("control", PulseGenerator(period=0.7, width=40.0))
+    return {"control": control, "index": builder.add("index", Step(time=1.3, initial=1.0, final=2.0))}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_bus_is_all_of_its_signals(name: str) -> None:
+    together, apart = with_bus(*BLOCKS[name]), signal_by_signal(*BLOCKS[name])
+    one, each = ab.simulate(together), ab.simulate(apart)
+    for port in ("u1", "u2", "u3"):
+        np.testing.assert_array_equal(one[f"scope/{port}"], each[f"scope/{port}"])
+    # The signals are found under the block's own name, and its ports'.
+    output = together.blocks["block"].output_ports()[0].name
+    for element, port in zip(NAMES, ("u1", "u2", "u3")):
+        np.testing.assert_array_equal(one[f"block/{output}.{element}"], one[f"scope/{port}"])
+    assert float(np.ptp(one["scope/u1"])) > 0.5, "something moves"
+
+
+def test_merged_action_subsystems_give_the_bus_of_the_one_that_works() -> None:
+    builder = DiagramBuilder("merge", settings=OPTIONS)
+    chosen = builder.add("if", If(), builder.add("sign", SineWave(frequency=3.0)))
+    ends: list[BlockHandle] = []
+    for mark, factor, port in (("a", 1.0, "if1"), ("b", -3.0, "else")):
+        parts = signals(builder, mark, factor)
+        part = ActionSubsystem(diagram=pass_through(mark))
+        ends.append(builder.add(f"{mark} action", part, bus_of(builder, mark, parts), chosen[port]))
+        ends += [builder.add(f"{mark} action {k}", part, parts[k], chosen[port]) for k in range(3)]
+    together = builder.add("together", Merge(), ends[0], ends[4])
+    apart = [builder.add(f"apart {k}", Merge(), ends[k], ends[k + 4]) for k in (1, 2, 3)]
+    builder.add("shown", Scope(inputs=4), together, *apart)
+    result = ab.simulate(builder.build())
+    for element, k in zip(NAMES, (1, 2, 3)):
+        np.testing.assert_array_equal(result[f"together/y.{element}"], result[f"apart {k}/y"])
+
+
+def test_a_bus_goes_round_a_loop_through_a_delay() -> None:
+    """The counter of each signal: y(k) = x until the reset falls, then y(k-1)."""
+    builder = DiagramBuilder("loop", settings=OPTIONS)
+    bus = bus_of(builder, "a", signals(builder, "a", 1.0))
+    fresh = builder.add("fresh", PulseGenerator(period=1.0, width=50.0))
+    held = builder.add("held", Switch(threshold=0.5))
+    builder.connect(bus, held["u1"])
+    builder.connect(fresh, held["u2"])
+    builder.connect(builder.add("before", UnitDelay(sample_time=0.1), held), held["u3"])
+    builder.add("sent", Goto(tag="kept"), held)
+    builder.add("kept", ToWorkspace(), builder.add("received", From(tag="kept")))
+    result = ab.simulate(builder.build())
+    speed, source, on = (result[name] for name in ("held/y.speed", "a speed/y", "fresh/y"))
+    at = np.rint(result.time / 0.05).astype(int)
+    assert np.array_equal(speed[on > 0.5], source[on > 0.5])
+    # In the second half of each period the value of the last tick within the first half stands.
+    held_at = int(np.flatnonzero(at == 10)[0])
+    assert np.all(speed[(at > 11) & (at < 20)] == speed[held_at + 2])
+    assert result.resolve("kept/u.speed") == "held.speed/y"
+
+
+def test_one_parameter_moves_all_signals() -> None:
+    block, inputs = BLOCKS["manual"]
+    compiled = ab.compile_diagram(with_bus(block, inputs))
+    names = [name for name in compiled.system.parameters.names if name.startswith("block")]
+    assert names == ["block.position"]
+    first = compiled.simulate(parameters={"block.position": 1.0})
+    second = compiled.simulate(parameters={"block.position": 2.0})
+    for port, source in (("u1", "speed"), ("u2", "angle"), ("u3", "pair")):
+        np.testing.assert_array_equal(first[f"scope/{port}"], first[f"a {source}/y"])
+        np.testing.assert_array_equal(second[f"scope/{port}"], second[f"b {source}/y"])
+
+
+def test_a_bus_may_end() -> None:
+    builder = DiagramBuilder("end", settings=OPTIONS)
+    builder.add("end", Terminator(), bus_of(builder, "a", signals(builder, "a", 1.0)))
+    assert ab.simulate(builder.build()).run.complete
+
+
+def two_buses(second: str, width: int = 1) -> DiagramBuilder:
+    builder = DiagramBuilder("conflict")
+    one, two = builder.add("one", Constant()), builder.add("two", Constant(value=(1.0,) * width))
+    first = builder.add("first", BusCreator(names="p, q"), one, one)
+    other = builder.add("other", BusCreator(names=second), one, two)
+    builder.add("choose", ManualSwitch(), first, other)
+    return builder
+
+
+def test_conflicts_name_both_ends() -> None:
+    said = "'u1' is a bus with p, q, but input 'u2' is "
+    with pytest.raises(DiagramError, match=f"{said}a bus with p, r") as caught:
+        two_buses("p, r").build()
+    assert "choose" in str(caught.value.where)
+    builder = DiagramBuilder("mixed")
+    one = builder.add("one", Constant())
+    builder.add("choose", ManualSwitch(), builder.add("bus", BusCreator(names="p, q"), one, one), one)
+    with pytest.raises(DiagramError, match=f"{said}the single signal 'one/y'"):
+        builder.build()
+    assert two_buses("p, q", width=3).build()  # a scalar beside a vector is spread, as without buses
+
+
+def test_dimensions_that_do_not_fit_are_told_at_both_ends() -> None:
+    builder = DiagramBuilder("wide")
+    two, three = (
+        builder.add("two", Constant(value=(1.0, 2.0))),
+        builder.add("three", Constant(value=(1.0,) * 3)),
+    )
+    buses = [builder.add(f"bus {k}", BusCreator(names="p"), wire) for k, wire in enumerate((two, three))]
+    builder.add("choose", ManualSwitch(), *buses)
+    with pytest.raises(DiagramError) as caught:
+        builder.build()
+    assert (
+        "choose.p" in str(caught.value)
+        and "'two/y'" in str(caught.value)
+        and "'three/y'" in str(caught.value)
+    )
+
+
+def test_a_block_that_calculates_takes_no_bus() -> None:
+    builder = DiagramBuilder("gain")
+    one = builder.add("one", Constant())
+    builder.add("gain", Gain(), builder.add("bus", BusCreator(names="p, q"), one, one))
+    with pytest.raises(DiagramError, match="is given a bus with the elements p, q"):
+        builder.build()
+
+
+def test_unknown_elements_behind_a_block_are_refused() -> None:
+    builder = DiagramBuilder("unknown")
+    one = builder.add("one", Constant())
+    bus = builder.add("bus", BusCreator(names="p, q"), one, one)
+    builder.add("pick", BusSelector(elements="r"), builder.add("delay", UnitDelay(sample_time=1.0), bus))
+    with pytest.raises(UnknownNameError, match="there is no bus element named 'r'"):
+        builder.build()
