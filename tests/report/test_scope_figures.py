@@ -1,7 +1,7 @@
 """Which signals of a Scope share a panel, and in which unit they are shown."""
 
 import armblocks as ab
-from armblocks.blocks import Clock, Constant, Integrator, Saturation, Scope, SineWave
+from armblocks.blocks import Clock, Constant, Integrator, Mux, Saturation, Scope, SineWave, Step
 from armblocks.diagram import Diagram, DiagramBuilder
 from armblocks.report.figures import view_figures
 from armblocks.report.picture import text_marks
@@ -32,3 +32,14 @@ def test_a_figure_is_as_wide_as_it_is_asked_to_be() -> None:
     (figure,) = view_figures(model, ab.simulate(model, stop_time=1.0), 500.0)
     assert figure.picture.width == 500.0
     assert all(mark.x <= 500.0 for mark in text_marks(figure.picture))
+
+
+def test_entries_of_a_mux_have_the_names_of_their_blocks() -> None:
+    builder = ab.DiagramBuilder("mux")
+    pair = builder.add("pair", Constant(value=(1.0, 2.0)))
+    both = builder.add("both", Mux(inputs=2), builder.add("wanted", Step()), pair)
+    builder.add("Scope", Scope(), both)
+    diagram = builder.build()
+    (figure,) = view_figures(diagram, ab.simulate(diagram))
+    said = {mark.text for mark in text_marks(figure.picture)}
+    assert {"wanted", "pair[0]", "pair[1]"} <= said

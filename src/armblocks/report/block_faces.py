@@ -14,6 +14,7 @@ from armblocks.diagram import Block
 from armblocks.report.camera import Camera
 from armblocks.report.face_marks import Room, least_room, sign_marks, words
 from armblocks.report.face_symbols import sign_of, value_text
+from armblocks.report.numbers import axis_number
 from armblocks.report.picture import Curve, Disc, Group, Mark, Polyline, Rectangle, Text
 from armblocks.report.sink_faces import Trend, display, scope, xy_graph
 from armblocks.report.structure_faces import (
@@ -209,11 +210,21 @@ def bus_width(block: Block, size: float) -> float:
     return max((text_width(label, size) for label in labels), default=0.0) + BAR + 14
 
 
+def _powered(gain: object) -> str:
+    """A long number with a power of ten, such as 2.5e4; nothing where that is long as well."""
+    array = np.asarray(gain, dtype=np.float64)
+    if array.size != 1:
+        return ""
+    digits, _, power = f"{float(array.reshape(-1)[0]):.2e}".partition("e")
+    text = f"{axis_number(float(digits))}e{axis_number(int(power))}"
+    return text if len(text) <= 6 else ""
+
+
 def _gain(gain: object, room: Room, *, flipped: bool) -> list[Mark]:
     text = value_text(gain)
     size = 12.0 if text_width(text, 12.0) < 0.52 * room.width else 9.5
     if text_width(text, size) > 0.56 * room.width:
-        text = "K"
+        text = _powered(gain) or "K"
     share = 0.64 if flipped else 0.36
     return [Text(room.x + share * room.width, room.middle[1] + 0.36 * size, text, size, Tone.INK, "middle")]
 

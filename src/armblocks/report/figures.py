@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.spectrum import SignalSpectrum, signal_spectrum
-from armblocks.diagram import Diagram, SpectrumSettings, View, ViewKind, diagram_views
+from armblocks.blocks import Mux
+from armblocks.diagram import Diagram, SpectrumSettings, View, ViewKind, diagram_views, flat_diagram
 from armblocks.errors import InputError
 from armblocks.report.arm_picture import moments_picture
 from armblocks.report.charts import Panel, Trace, fits_beside, time_chart
@@ -80,7 +81,7 @@ def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGU
                 name=f"scope-{file_name(block)}",
                 section="scopes",
                 caption=view.title or block,
-                picture=_scope(block, view, result, width),
+                picture=_scope(diagram, block, view, result, width),
             )
         elif view.kind is ViewKind.PATH:
             yield Figure(
@@ -200,7 +201,7 @@ def _factor(unit: str, shown_unit: str, values: _Array) -> float:
     return si_prefix(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)))[0]
 
 
-def _scope(block: str, view: View, result: SimulationResult, width: float) -> Picture:
+def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, width: float) -> Picture:
     panels: list[Panel] = []
     for numbers in _compared(block, view, result):
         names: list[str] = []
@@ -212,10 +213,14 @@ def _scope(block: str, view: View, result: SimulationResult, width: float) -> Pi
             path = result.resolve(f"{block}/{view.signals[number]}")
             slot = result.signals_layout[path]
             unit = slot.unit
-            name = label or path
-            names.append(name)
             entries = list(np.ndindex(*slot.shape))[:_FIRST_ENTRIES]
             columns.append(result[path].reshape(len(result.time), -1)[:, : len(entries)])
+            joined = () if label else _joined(diagram, path, result)[: len(entries)]
+            name = label or (", ".join(joined) if 0 < len(joined) <= 3 else path)
+            names.append(name)
+            if joined:
+                labels += joined
+                continue
             short = name if len(numbers) > 1 and fits_beside(name) else name.rpartition("/")[2]
             labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
         # One prefix for all of a panel, so that they can be compared.
@@ -233,6 +238,23 @@ def _scope(block: str, view: View, result: SimulationResult, width: float) -> Pi
         height=128.0,
         width=width,
     )
+
+
+def _joined(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str, ...]:
+    """What a Mux puts together, by entry: the blocks that the entries come from; nothing for other blocks."""
+    flat = flat_diagram(diagram)
+    name = path.rpartition("/")[0]
+    block = flat.blocks.get(name)
+    if not isinstance(block, Mux):
+        return ()
+    names: list[str] = []
+    for port in block.input_ports():
+        source = flat.source(name, port.name)
+        several = len(flat.blocks[source.block].output_ports()) > 1
+        said = source.block.rpartition("/")[2] + (f" {source.port}" if several else "")
+        shape = result.signals_layout[result.resolve(str(source))].shape
+        names += [f"{said}[{','.join(map(str, index))}]" if index else said for index in np.ndindex(*shape)]
+    return tuple(names)
 
 
 def _compared(block: str, view: View, result: SimulationResult) -> list[list[int]]:

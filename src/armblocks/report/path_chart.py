@@ -15,6 +15,7 @@ from armblocks.report.style import SMALL_SIZE, TEXT_SIZE, Tone, trace_tone
 from armblocks.report.text_width import text_width
 
 _Array = NDArray[np.float64]
+_Frame = tuple[float, float, float, float]
 
 
 def path_chart(
@@ -61,7 +62,8 @@ def path_chart(
         Text(4, 14, y_label, size=TEXT_SIZE),
     )
     points = np.column_stack([across.array(x), up.array(y)])
-    picture.extend(_path_with_direction(points, trace_tone(index)))
+    frame = (room_left, room_top, room_left + inner_width, room_top + inner_height)
+    picture.extend(_path_with_direction(points, trace_tone(index), frame))
     return picture
 
 
@@ -88,7 +90,7 @@ def _equalised(
     return about(x, per_px * width), about(y, per_px * height)
 
 
-def _path_with_direction(points: _Array, tone: Tone) -> list[Mark]:
+def _path_with_direction(points: _Array, tone: Tone, frame: _Frame) -> list[Mark]:
     good = points[np.isfinite(points).all(axis=1)]
     if len(good) == 0:
         return []
@@ -112,19 +114,28 @@ def _path_with_direction(points: _Array, tone: Tone) -> list[Mark]:
     marks.append(Disc(x1, y1, 4.2, fill=tone, stroke=Tone.SURFACE, stroke_width=1.0))
     if math.hypot(x1 - x0, y1 - y0) > 30:
         for (x, y), word in (((x0, y0), "start"), ((x1, y1), "end")):
-            marks.append(_beside(points, x, y, word))
+            marks += _beside(points, x, y, word, frame)
     return marks
 
 
-def _beside(points: _Array, x: float, y: float, word: str) -> Text:
-    """The word next to a point, on the side where it keeps farthest from the line."""
+def _beside(points: _Array, x: float, y: float, word: str, frame: _Frame) -> tuple[Mark, Mark]:
+    """The word next to a point within the frame, where it keeps farthest from the line, on a pale ground."""
     width = text_width(word, SMALL_SIZE)
-    places = (
+    places = [
         (x - width / 2, y - 10),
         (x - width / 2, y + 18),
         (x + 9, y + 4),
         (x - 9 - width, y + 4),
-    )
+        (x + 8, y - 8),
+        (x + 8, y + 16),
+        (x - 8 - width, y - 8),
+        (x - 8 - width, y + 16),
+    ]
+    left_end, top, right_end, bottom = frame
+
+    def inside(place: tuple[float, float]) -> bool:
+        left, base = place
+        return left_end + 2 <= left <= right_end - width - 2 and top + SMALL_SIZE + 2 <= base <= bottom - 3
 
     def clearance(place: tuple[float, float]) -> float:
         left, base = place
@@ -133,5 +144,8 @@ def _beside(points: _Array, x: float, y: float, word: str) -> Text:
         return float(np.nanmin(np.hypot(dx, dy)))
 
     # Ahead of the others stands above; a clearance beyond a few px makes no difference.
-    left, base = max(places, key=lambda place: min(clearance(place), 7.0))
-    return Text(left, base, word, SMALL_SIZE, Tone.MUTED)
+    left, base = max(places, key=lambda place: (inside(place), min(clearance(place), 7.0)))
+    ground = Rectangle(
+        left - 2, base - SMALL_SIZE + 1, width + 4, SMALL_SIZE + 2, 2, fill=Tone.SURFACE, opacity=0.8
+    )
+    return ground, Text(left, base, word, SMALL_SIZE, Tone.MUTED)
