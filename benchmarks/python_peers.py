@@ -11,6 +11,10 @@ states. Every time the model is built anew; graphics and progress are off.
 - `van_der_pol`: the van der Pol oscillator under PI control with velocity feedback, 100 s, rtol 1e-6, atol
   1e-9, Runge-Kutta 5(4).
 - `five_blocks`: step, sum, gain, second-order plant of two integrators, 10 s; fixed steps of 1 ms, RK4.
+- `multirate`: the first 0.1 s of the shipped `puma560_multirate`: computed torque at 1 kHz (KP 900, KD 60)
+  around PI control of the currents at 10 kHz, windings of six motors, the arm with viscous friction;
+  Runge-Kutta 5(4), rtol 1e-6, atol 1e-9. A sampled block of bdsim shows at a tick what it was given at the
+  one before, so that the P part takes back what the integral has already of this tick.
 """
 
 from __future__ import annotations
@@ -49,7 +53,7 @@ class _MendedSource(importlib.machinery.SourceFileLoader):
         return super().get_data(path).replace(b'dict["type"].get', b'dict.get("type", {}).get')
 
 
-def quintic(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def quintic(t: float, T: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     u = min(max(t / T, 0.0), 1.0)
     return (
         QF * (u**3 * (10 + u * (-15 + 6 * u))),
@@ -124,10 +128,60 @@ def _bdsim_five_blocks(bd: Any) -> dict[str, Any]:
     return {"T": 10.0, "max_step": 1e-3, "solver_args": {"rtol": 1.0, "atol": 1.0, "first_step": 1e-3}}
 
 
+def _bdsim_multirate(bd: Any) -> dict[str, Any]:
+    import roboticstoolbox as rtb
+
+    robot = rtb.models.DH.Puma560().nofriction(coulomb=True, viscous=False)
+    R = np.array([2.1, 2.1, 2.1, 6.7, 6.7, 6.7])
+    L, k = R / 1000, np.array([0.19, 0.22, 0.2, 0.075, 0.066, 0.066])
+    G = np.array([link.G for link in robot.links])
+    tick, integral_gain, gain, zero = 1e-4, 3000 * R, 3000 * L, np.zeros(6)
+    rest = robot.rne(zero, zero, zero)
+    position, current = bd.clock(1e-3), bd.clock(tick)
+    now, path = bd.TIME(), bd.FUNCTION(lambda t: quintic(t, 4.0), nin=1, nout=3)
+    arm, inverse = bd.FDYN(robot, q0=zero), bd.IDYN(robot)
+    e, ed, kp, kd, total = bd.SUM("+-"), bd.SUM("+-"), bd.GAIN(900.0), bd.GAIN(60.0), bd.SUM("+++")
+    torque, wanted = bd.ZOH(position, x0=rest), bd.FUNCTION(lambda tau: tau / (k * G), nin=1, nout=1)
+    missing, held = bd.SUM("+-"), bd.ZOH(current, x0=zero)
+    scaled = bd.FUNCTION(lambda u: integral_gain * u, nin=1, nout=1)
+    integral = bd.INTEGRATOR_S(current, x0=R * rest / (k * G))
+    proportional = bd.FUNCTION(lambda u: (gain - tick * integral_gain) * u, nin=1, nout=1)
+    voltage, limited = bd.SUM("++"), bd.CLIP(-40.0, 40.0)
+    rate = bd.FUNCTION(lambda v, i, w: (v - R * i - k * G * w) / L, nin=3, nout=1)
+    winding, drive = bd.INTEGRATOR(x0=rest / (k * G)), bd.FUNCTION(lambda i: G * k * i, nin=1, nout=1)
+    bd.connect(now, path)
+    bd.connect(path[0], e[0])
+    bd.connect(arm[0], e[1], inverse[0])
+    bd.connect(path[1], ed[0])
+    bd.connect(arm[1], ed[1], inverse[1], rate[2])
+    bd.connect(e, kp)
+    bd.connect(ed, kd)
+    bd.connect(path[2], total[0])
+    bd.connect(kp, total[1])
+    bd.connect(kd, total[2])
+    bd.connect(total, inverse[2])
+    bd.connect(inverse, torque)
+    bd.connect(torque, wanted)
+    bd.connect(wanted, missing[0])
+    bd.connect(winding, missing[1], rate[1], drive)
+    bd.connect(missing, held, scaled)
+    bd.connect(scaled, integral)
+    bd.connect(held, proportional)
+    bd.connect(proportional, voltage[0])
+    bd.connect(integral, voltage[1])
+    bd.connect(voltage, limited)
+    bd.connect(limited, rate[0])
+    bd.connect(rate, winding)
+    bd.connect(drive, arm)
+    bd.connect(arm[2], bd.NULL(nin=1))
+    return {"T": 0.1, "solver_args": {"rtol": 1e-6, "atol": 1e-9}}
+
+
 BDSIM: dict[str, Callable[[Any], dict[str, Any]]] = {
     "computed_torque": _bdsim_computed_torque,
     "van_der_pol": _bdsim_van_der_pol,
     "five_blocks": _bdsim_five_blocks,
+    "multirate": _bdsim_multirate,
 }
 
 

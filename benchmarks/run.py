@@ -1,10 +1,10 @@
 """Run every measure beside the peers and write RESULTS.md.
 
-    python benchmarks/run.py [--quick] [--only dynamics,diagram,simulations,startup,stiff]
+    python benchmarks/run.py [--quick] [--only dynamics,diagram,simulations,multirate,growth,stiff,startup]
 
 Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake, bdsim, PathSim; the latter two in an
 environment of their own if you like, see `python_peers.py`). Peers and armblocks run in turn, in one run.
-With ``--only`` the sections of the other parts stay as they are.
+With ``--only`` the sections of the other parts stay as they are; the new ones say their own date and load.
 """
 
 from __future__ import annotations
@@ -107,34 +107,41 @@ def diagram_part(repeats: int) -> list[str]:
     ]
 
 
-def simulations_part(repeats: int) -> list[str]:
+def compared_table(group: str, repeats: int) -> list[str]:
     compared = [
         [
             row.what,
             row.peer,
-            f"{row.theirs.median * 1e3:.1f} ms",
+            f"{row.theirs.median * 1e3:,.1f} ms",
             f"{row.ours.median * 1e3:.3f} ms",
-            f"{row.ratio:.0f} x",
+            f"{row.ratio:,.0f} x",
             f"{row.target:g} x" if row.target else "",
             "" if not row.target else "met" if row.ratio >= row.target else "missed",
             f"{row.difference:.0e}",
         ]
-        for row in simulations.rows(repeats)
+        for row in simulations.rows(group, repeats)
     ]
-    lines = [
-        "## Whole simulations",
-        "",
-        *table(
-            ["what", "peer", "peer's time", "armblocks", "faster", "target", "", "ends differ by"], compared
-        ),
-        "",
-        *(simulations.__doc__ or "").strip().splitlines()[2:],
-        "",
-    ]
+    head = ["what", "peer", "peer's time", "armblocks", "faster", "target", "", "ends differ by"]
+    return table(head, compared)
+
+
+def simulations_part(repeats: int) -> list[str]:
+    told = (simulations.__doc__ or "").split("Multirate: ")[0].strip().splitlines()[2:]
+    return ["## Whole simulations", "", *compared_table("simulations", repeats), "", *told]
+
+
+def multirate_part(repeats: int) -> list[str]:
+    told = "Multirate: " + (simulations.__doc__ or "").split("Multirate: ")[1].strip()
+    compared = compared_table("multirate", max(1, repeats // 3))
+    return ["## A multirate simulation", "", *compared, "", *told.splitlines()]
+
+
+def growth_part(repeats: int) -> list[str]:
     grown = simulations.growth(max(1, repeats // 3))
     head = ["chain", "build", "trace", "compile", "run 10 s", "all, s", "median of turns, s"]
     return [
-        *lines,
+        "## Diagrams of many blocks",
+        "",
         *table(head, grown),
         "",
         "Seconds, each in a new process without a cache, the best of the turns. `mixed`: gains, first-order "
@@ -172,6 +179,8 @@ PARTS = {
     "dynamics": dynamics_part,
     "diagram": diagram_part,
     "simulations": simulations_part,
+    "multirate": multirate_part,
+    "growth": growth_part,
     "stiff": stiff.stiff_part,
     "startup": startup_part,
 }

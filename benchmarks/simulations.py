@@ -6,6 +6,9 @@ Van der Pol: the shipped `van_der_pol_pid`, 100 s; in Drake the plant is a Symbo
 adaptive, of order 5, at rtol 1e-6 (Drake: accuracy 1e-6), without compile; ours record 1001 and 2001 instants
 of all signals. Five blocks: step, sum, gain and two integrators, 10 s in steps of 1 ms; RK4 but for bdsim,
 which has only SciPy's adaptive methods and is held to steps of 1 ms of 5(4), and Drake (runge_kutta3, fixed).
+Multirate: the shipped `puma560_multirate`, 10 s, 100 000 ticks; bdsim would take minutes, so it runs the
+first 0.1 s, 1000 ticks, and its time is multiplied by 100. Ends are compared at 0.1 s; where both clocks
+tick, bdsim's current loop sees the new torque one tick later.
 """
 
 from __future__ import annotations
@@ -233,62 +236,103 @@ def five_blocks() -> ab.Diagram:
 FIXED = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
 
 
-def rows(repeats: int) -> list[Row]:
-    """Every comparison, turn by turn: A B C A B C …"""
+@dataclass(frozen=True)
+class Peer:
+    """Another tool's run of the same model. ``ends``: which of its values are compared; ``times``: how many
+    times its run is as long as what it stands for."""
+
+    name: str
+    run: Callable[[], Run]
+    target: float
+    ends: Any
+    times: float = 1.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model: our run, signals whose ends are compared, the peers; ``compared``: the run to compare, if
+    not the one that is timed."""
+
+    what: str
+    ours: Callable[[], ab.SimulationResult]
+    signals: Sequence[str]
+    peers: Sequence[Peer]
+    compared: Callable[[], ab.SimulationResult] | None = None
+
+
+def cases(peers: PythonPeers) -> dict[str, list[Case]]:
+    """The models by group."""
+    torque, oscillator = ab.load_diagram("puma560_computed_torque"), ab.load_diagram("van_der_pol_pid")
+    multirate, five = ab.load_diagram("puma560_multirate"), five_blocks()
+
+    def of(tool: str, model: str) -> Callable[[], Run]:
+        return lambda: peers.run(tool, model)
+
+    return {
+        "simulations": [
+            Case(
+                "computed torque Puma 560, 10 s",
+                lambda: ab.simulate(torque),
+                ("arm/q",),
+                [
+                    Peer("Drake, native systems", drake_computed_torque, 40.0, slice(0, 6)),
+                    Peer("bdsim", of("bdsim", "computed_torque"), 400.0, slice(0, 6)),
+                ],
+            ),
+            Case(
+                "van der Pol and PID, 100 s",
+                lambda: ab.simulate(oscillator),
+                ("x1",),
+                [
+                    Peer("Drake, native systems", drake_van_der_pol, 80.0, slice(0, 1)),
+                    Peer("bdsim", of("bdsim", "van_der_pol"), 1500.0, slice(2, 3)),
+                    Peer("PathSim", of("pathsim", "van_der_pol"), 1500.0, slice(0, 1)),
+                ],
+            ),
+            Case(
+                "five blocks, 10 s in 10 000 steps",
+                lambda: ab.simulate(five, **FIXED),
+                ("place", "speed"),
+                [
+                    Peer("PathSim", of("pathsim", "five_blocks"), 0.0, [0, 1]),
+                    Peer("bdsim", of("bdsim", "five_blocks"), 0.0, [1, 0]),
+                    Peer("Drake", drake_five_blocks, 0.0, [0, 1]),
+                ],
+            ),
+        ],
+        "multirate": [
+            Case(
+                "multirate Puma 560, 1 and 10 kHz, 10 s",
+                lambda: ab.simulate(multirate),
+                ("arm/q", "arm/qd"),
+                [Peer("bdsim, 0.1 s times 100", of("bdsim", "multirate"), 200.0, slice(0, 12), times=100.0)],
+                compared=lambda: ab.simulate(multirate, stop_time=0.1),
+            )
+        ],
+    }
+
+
+def rows(group: str, repeats: int) -> list[Row]:
+    """Every comparison of a group, turn by turn: A B C A B C …"""
     logging.getLogger("drake").setLevel(logging.ERROR)
     peers = PythonPeers()
-    torque, oscillator, five = (
-        ab.load_diagram("puma560_computed_torque"),
-        ab.load_diagram("van_der_pol_pid"),
-        five_blocks(),
-    )
-    cases: list[tuple[str, Callable[[], ab.SimulationResult], Sequence[str], list[Any]]] = [
-        (
-            "computed torque Puma 560, 10 s",
-            lambda: ab.simulate(torque),
-            ("arm/q",),
-            [
-                ("Drake, native systems", drake_computed_torque, 40.0, slice(0, 6)),
-                ("bdsim", lambda: peers.run("bdsim", "computed_torque"), 400.0, slice(0, 6)),
-            ],
-        ),
-        (
-            "van der Pol and PID, 100 s",
-            lambda: ab.simulate(oscillator),
-            ("x1",),
-            [
-                ("Drake, native systems", drake_van_der_pol, 80.0, slice(0, 1)),
-                ("bdsim", lambda: peers.run("bdsim", "van_der_pol"), 1500.0, slice(2, 3)),
-                ("PathSim", lambda: peers.run("pathsim", "van_der_pol"), 1500.0, slice(0, 1)),
-            ],
-        ),
-        (
-            "five blocks, 10 s in 10 000 steps",
-            lambda: ab.simulate(five, **FIXED),
-            ("place", "speed"),
-            [
-                ("PathSim", lambda: peers.run("pathsim", "five_blocks"), 0.0, [0, 1]),
-                ("bdsim", lambda: peers.run("bdsim", "five_blocks"), 0.0, [1, 0]),
-                ("Drake", drake_five_blocks, 0.0, [0, 1]),
-            ],
-        ),
-    ]
     found: list[Row] = []
-    for what, ours, names, others in cases:
-        result = ours()
-        end = np.concatenate([np.ravel(result[name][-1]) for name in names])
-        times: list[list[float]] = [[] for _ in others]
+    for case in cases(peers)[group]:
+        case.ours()
+        result = (case.compared or case.ours)()
+        end = np.concatenate([np.ravel(result[name][-1]) for name in case.signals])
+        times: list[list[float]] = [[] for _ in case.peers]
         mine: list[float] = []
-        worst = [0.0] * len(others)
+        worst = [0.0] * len(case.peers)
         for _ in range(repeats):
-            for k, (_, peer, _, part) in enumerate(others):
-                run = peer()
-                times[k].append(run.seconds)
-                worst[k] = max(worst[k], float(np.abs(np.asarray(run.final)[part] - end).max()))
-            mine += in_turn([ours], 1)[0].turns
+            for k, peer in enumerate(case.peers):
+                run = peer.run()
+                times[k].append(run.seconds * peer.times)
+                worst[k] = max(worst[k], float(np.abs(np.asarray(run.final)[peer.ends] - end).max()))
+            mine += in_turn([case.ours], 1)[0].turns
         found += [
-            Row(what, peer, Timing(tuple(times[k])), Timing(tuple(mine)), target, worst[k])
-            for k, (peer, _, target, _) in enumerate(others)
+            Row(case.what, peer.name, Timing(tuple(times[k])), Timing(tuple(mine)), peer.target, worst[k])
+            for k, peer in enumerate(case.peers)
         ]
     peers.close()
     return found
