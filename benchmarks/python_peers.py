@@ -17,6 +17,8 @@ states. Every time the model is built anew; graphics and progress are off.
   one before, so that the P part takes back what the integral has already of this tick.
 """
 
+# The peers have no types.
+# pyright: basic, reportMissingImports=false
 from __future__ import annotations
 
 import importlib.machinery

@@ -7,6 +7,7 @@ environment of their own if you like, see `python_peers.py`). Peers and armblock
 With ``--only`` the sections of the other parts stay as they are; the new ones say their own date and load.
 """
 
+# pyright: basic
 from __future__ import annotations
 
 import argparse

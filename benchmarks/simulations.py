@@ -11,6 +11,9 @@ first 0.1 s, 1000 ticks, and its time is multiplied by 100. Ends are compared at
 tick, bdsim's current loop sees the new torque one tick later.
 """
 
+# Drake's stubs do not fit what its functions take.
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportArgumentType=false
+# pyright: reportCallIssue=false, reportOptionalMemberAccess=false
 from __future__ import annotations
 
 import json
