@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
 
 
-@pytest.fixture(params=LAW_ROBOTS.values(), ids=LAW_ROBOTS.keys())
+@pytest.fixture(params=LAW_ROBOTS.values(), ids=list(LAW_ROBOTS))
 def robot(request: pytest.FixtureRequest) -> Robot:
     """Each robot of the law tests in turn: every shipped one, and random trees."""
     return request.param
@@ -24,3 +26,11 @@ def puma560() -> Robot:
 def kr180() -> Robot:
     """The paper's arm, written out in Python."""
     return build_kr180()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def state_of_nobody(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What the studio keeps for its user lies in a folder of the tests, never in the user's own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield

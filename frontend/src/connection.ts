@@ -16,6 +16,9 @@ export class Refusal extends Error {
   }
 }
 
+/** `up`; `down`: nothing answers; `stranger`: the server answers and does not know this page. */
+export type Line = 'up' | 'down' | 'stranger'
+
 interface Waiting {
   request: Request
   resolve: (value: unknown) => void
@@ -23,23 +26,33 @@ interface Waiting {
 }
 
 const FIRST_DELAY_MS = 250
-const LONGEST_DELAY_MS = 4000
+const LONGEST_DELAY_MS = 2000
+/** How often the page asks whether somebody is there, and how long it waits before it says that nobody is. */
+const PING_MS = 1000
+const SILENCE_MS = 2500
+/** After this long without an answer the line is given up and made anew. */
+const DEAD_MS = 10_000
 
 /**
- * The websocket to the server. Requests that were not answered when the line broke are sent again when it is back:
- * edits carry keys, so the server does each once.
+ * The websocket to the server. What was not answered when the line broke, and what is asked while it is down, is sent
+ * when it is back and the page has its document again (`resend`): edits carry keys, so the server does each once.
  */
 export class Connection {
   private socket: WebSocket | null = null
   private number = 0
   private readonly waiting = new Map<number, Waiting>()
   private delay = FIRST_DELAY_MS
+  /** Whether requests may go out: not before the server knows again what this page shows. */
+  private flowing = false
+  private asked = 0
 
   constructor(
     private readonly onEvent: (event: ServerEvent) => void,
     private readonly onFrame: (frame: ArrayBuffer) => void,
-    private readonly onLine: (connected: boolean) => void,
-  ) {}
+    private readonly onLine: (line: Line) => void,
+  ) {
+    setInterval(() => this.listen(), PING_MS)
+  }
 
   open(): void {
     const url = new URL('ws', location.href)
@@ -49,17 +62,45 @@ export class Connection {
     this.socket = socket
     socket.onopen = () => {
       this.delay = FIRST_DELAY_MS
-      this.onLine(true)
+      this.asked = 0
+      this.onLine('up')
     }
     socket.onmessage = ({ data }: MessageEvent<string | ArrayBuffer>) => {
+      if (this.silent()) this.onLine('up')
+      this.asked = 0
       if (typeof data === 'string') this.receive(JSON.parse(data) as ServerEvent)
       else this.onFrame(data)
     }
     socket.onclose = () => {
-      this.onLine(false)
+      if (this.socket !== socket) return
+      this.flowing = false
+      this.forget('attach')
+      void strange().then((stranger) => this.onLine(stranger ? 'stranger' : 'down'))
       setTimeout(() => this.open(), this.delay)
       this.delay = Math.min(2 * this.delay, LONGEST_DELAY_MS)
     }
+  }
+
+  /** Ask whether somebody is there; say so where nobody answers, and in the end make the line anew. */
+  private listen(): void {
+    const { socket } = this
+    if (socket?.readyState !== WebSocket.OPEN) return
+    if (this.silent()) this.onLine('down')
+    if (this.asked && performance.now() - this.asked > DEAD_MS) {
+      socket.close()
+      socket.onclose?.(new CloseEvent('close'))
+      return
+    }
+    if (!this.asked) this.asked = performance.now()
+    socket.send(JSON.stringify({ number: 0, request: { kind: 'ping' } }))
+  }
+
+  private silent(): boolean {
+    return this.asked > 0 && performance.now() - this.asked > SILENCE_MS
+  }
+
+  private forget(kind: Request['kind']): void {
+    for (const [number, { request }] of this.waiting) if (request.kind === kind) this.waiting.delete(number)
   }
 
   /** Ask the server for something; the promise fails with a Refusal. */
@@ -67,12 +108,13 @@ export class Connection {
     const number = ++this.number
     return new Promise<T>((resolve, reject) => {
       this.waiting.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
-      this.send(number, request)
+      if (this.flowing || request.kind === 'attach') this.send(number, request)
     })
   }
 
-  /** Send again what has no answer yet: called once the documents are attached again. */
+  /** Let requests flow, first those that have no answer yet: called once the page has its document again. */
   resend(): void {
+    this.flowing = true
     for (const [number, { request }] of this.waiting) this.send(number, request)
   }
 
@@ -91,5 +133,15 @@ export class Connection {
     const { fault } = event
     if (fault) waiting.reject(new Refusal(fault.what, fault.where, fault.allowed, fault.fix))
     else waiting.resolve(event.value)
+  }
+}
+
+/** Whether the server is there and does not know this page: it was started anew, and the login is another. */
+async function strange(): Promise<boolean> {
+  try {
+    const answer = await fetch(new URL('index.html', location.href), { method: 'HEAD', cache: 'no-store' })
+    return answer.status === 401
+  } catch {
+    return false
   }
 }

@@ -5,14 +5,19 @@ import { useStudio } from './store'
 /** What the server refused, and that the line is down: in words, with what to do. */
 export function Notices() {
   const notices = useStudio((s) => s.notices)
-  const connected = useStudio((s) => s.connected)
+  const line = useStudio((s) => s.line)
   const started = useStudio((s) => s.welcome !== null)
   const dismiss = useStudio((s) => s.dismiss)
   return (
     <Stack className="notices" gap="xs" role="status" aria-live="polite">
-      {started && !connected && (
+      {started && line === 'down' && (
         <Alert color="orange" icon={<IconAlertTriangle />} title="The studio does not answer">
-          What you do is kept here and sent when it is back.
+          What you do is kept here and sent when it is back. If it was ended, start it again in the same folder.
+        </Alert>
+      )}
+      {started && line === 'stranger' && (
+        <Alert color="orange" icon={<IconAlertTriangle />} title="The studio was started again and does not know this page">
+          Open the link that it printed in another tab: this one then goes on by itself, with what you did meanwhile.
         </Alert>
       )}
       {notices.map(({ id, what, fix }) => (

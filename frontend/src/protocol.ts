@@ -17,8 +17,14 @@ export interface Envelope {
     | Change
     | Undo
     | Redo
-    | Save
     | ArrangeBlocks
+    | Reload
+    | KeepMine
+    | Save
+    | Ping
+    | Files
+    | Close
+    | Recover
     | Run
     | Control
     | SetSpeed
@@ -57,11 +63,17 @@ export interface New {
   kind: "new";
 }
 /**
- * Show a document that is open already: after a reload, or in a second page.
+ * Show a document again: after a reload, after the line was down, or in a second page.
+ *
+ * Where the server was started anew and does not know it, it comes from its journal, or else from the file
+ * or the example of these names, under the same key: edits that wait to be sent again find it.
  */
 export interface Attach {
   kind: "attach";
   document: string;
+  inside?: string[];
+  path?: string | null;
+  example?: string;
 }
 /**
  * Look at the sheet inside a subsystem; the empty path is the whole model.
@@ -72,12 +84,14 @@ export interface Look {
   inside: string[];
 }
 /**
- * Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once.
+ * Carry out an edit.
  */
 export interface Change {
-  kind: "change";
   document: string;
-  key: string;
+  key?: string;
+  base?: number | null;
+  author?: string;
+  kind: "change";
   inside?: string[];
   edit:
     | AddBlocks
@@ -207,14 +221,48 @@ export interface Describe {
  * Take the last edit back.
  */
 export interface Undo {
-  kind: "undo";
   document: string;
+  key?: string;
+  base?: number | null;
+  author?: string;
+  kind: "undo";
 }
 /**
  * Do again what was undone.
  */
 export interface Redo {
+  document: string;
+  key?: string;
+  base?: number | null;
+  author?: string;
   kind: "redo";
+}
+/**
+ * Lay the blocks out anew, from left to right.
+ */
+export interface ArrangeBlocks {
+  document: string;
+  key?: string;
+  base?: number | null;
+  author?: string;
+  kind: "arrange";
+  inside?: string[];
+}
+/**
+ * Take what the file holds now, as one step that can be undone.
+ */
+export interface Reload {
+  document: string;
+  key?: string;
+  base?: number | null;
+  author?: string;
+  kind: "reload";
+}
+/**
+ * Leave the file that has changed on the disk as it is until the next save, which overwrites it.
+ */
+export interface KeepMine {
+  kind: "keep_mine";
   document: string;
 }
 /**
@@ -227,12 +275,35 @@ export interface Save {
   overwrite?: boolean;
 }
 /**
- * Lay the blocks out anew, from left to right.
+ * Ask for nothing but an answer: the page thereby knows that the line is up.
  */
-export interface ArrangeBlocks {
-  kind: "arrange";
+export interface Ping {
+  kind: "ping";
+}
+/**
+ * Ask for the files of the project folder as they are now, those used last first among ``recent``.
+ */
+export interface Files {
+  kind: "files";
+}
+/**
+ * Put a document away; ``discard`` where it has edits that no file holds.
+ */
+export interface Close {
+  kind: "close";
   document: string;
-  inside?: string[];
+  discard?: boolean;
+}
+/**
+ * Say what becomes of a drawing that a journal gives back.
+ *
+ * ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
+ * from and opens that; ``discard`` deletes the journal.
+ */
+export interface Recover {
+  kind: "recover";
+  document: string;
+  action: "open" | "keep_both" | "discard";
 }
 /**
  * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
@@ -495,7 +566,18 @@ export interface Drop {
  * Only for the page's types: everything that the server sends as text.
  */
 export interface ServerMessage {
-  event: Reply | Welcome | Opened | Changed | Checked | RunStarted | RunTuned | RunRewound | RunProgress | RobotShown;
+  event:
+    | Reply
+    | Welcome
+    | Documents
+    | Opened
+    | Changed
+    | Checked
+    | RunStarted
+    | RunTuned
+    | RunRewound
+    | RunProgress
+    | RobotShown;
   values?: Opening | RobotTables | Readings | null;
 }
 /**
@@ -532,7 +614,9 @@ export interface Welcome {
     [k: string]: string;
   };
   files: string[];
+  recent: string[];
   documents: DocumentState[];
+  recoveries: Recovery[];
 }
 /**
  * A type of block in the library palette. ``face`` is the drawing of one with the default parameters.
@@ -582,15 +666,47 @@ export interface SettingRule {
 }
 /**
  * Where a document stands.
+ *
+ * ``disk`` says how the file is now, compared with what was opened or saved. ``journaled`` is false where
+ * the journal cannot be written: then only a save keeps what is drawn.
  */
 export interface DocumentState {
   document: string;
   version: number;
   title: string;
   path: string | null;
+  example: string;
   dirty: boolean;
   undo: string;
   redo: string;
+  disk?: "same" | "changed" | "gone";
+  journaled?: boolean;
+}
+/**
+ * A drawing that was not saved when the studio ended, as its journal gives it back.
+ *
+ * ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
+ * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are.
+ * ``disk`` says whether the file is still the one that was edited. ``missing`` says what could not be read.
+ */
+export interface Recovery {
+  document: string;
+  title: string;
+  path: string | null;
+  began: number;
+  last: number;
+  edits: number;
+  blocks: number;
+  disk: "same" | "changed" | "gone";
+  missing: string;
+}
+/**
+ * The documents that are open and those that wait to be recovered, whenever either has changed.
+ */
+export interface Documents {
+  kind: "documents";
+  documents: DocumentState[];
+  recoveries: Recovery[];
 }
 /**
  * A whole document, for a page that shows it from now on.

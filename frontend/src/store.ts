@@ -1,5 +1,6 @@
 import { create } from 'zustand'
-import { Connection, Refusal, type EventOf, type Request, type ServerEvent } from './connection'
+import { Connection, Refusal, type EventOf, type Line, type Request, type ServerEvent } from './connection'
+import { lastShown, remember } from './documents/last_shown'
 import type {
   BlockType,
   Channel,
@@ -8,6 +9,7 @@ import type {
   Envelope,
   Fault,
   Finding,
+  Recovery,
   Sheet,
   SheetBlock,
   Tunable,
@@ -58,7 +60,10 @@ export interface Notice {
 }
 
 interface Studio {
-  connected: boolean
+  line: Line
+  /** What the server has open, and what it offers to recover. */
+  documents: DocumentState[]
+  recoveries: Recovery[]
   welcome: EventOf<'welcome'> | null
   library: Map<string, BlockType>
   document: OpenDocument | null
@@ -72,7 +77,9 @@ interface Studio {
 }
 
 export const useStudio = create<Studio>((set) => ({
-  connected: false,
+  line: 'down',
+  documents: [],
+  recoveries: [],
   welcome: null,
   library: new Map(),
   document: null,
@@ -120,11 +127,15 @@ function receive(event: ServerEvent): void {
       useStudio.setState({
         welcome: event,
         library: new Map(event.library.map((kind) => [kind.type, kind])),
+        documents: event.documents,
+        recoveries: event.recoveries,
       })
-      if (document) void ask({ kind: 'look', document: document.state.document, inside: document.inside }).then(() => line.resend())
-      else openFromAddress(event)
+      void showAgain(event)
       break
     }
+    case 'documents':
+      useStudio.setState({ documents: event.documents, recoveries: event.recoveries })
+      break
     case 'opened': {
       const { state, sheet, inside } = event
       const same = document?.state.document === state.document
@@ -141,13 +152,17 @@ function receive(event: ServerEvent): void {
         ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
       })
       if (!same) runs.forget()
+      remember(state, inside)
       break
     }
     case 'changed':
       if (document?.state.document !== event.state.document) break
       if (event.before !== document.state.version && event.state.version !== document.state.version)
         void ask({ kind: 'look', document: event.state.document, inside: document.inside })
-      else useStudio.setState({ document: changed(document, event) })
+      else {
+        useStudio.setState({ document: changed(document, event) })
+        remember(event.state, document.inside)
+      }
       break
     case 'checked':
       if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
@@ -200,18 +215,36 @@ function receive(event: ServerEvent): void {
   }
 }
 
-function openFromAddress(welcome: EventOf<'welcome'>): void {
+/** Show the document that this page showed before, or else what its address names; then let requests flow. */
+async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
+  const shown = useStudio.getState().document
+  const last = shown ? { ...shown.state, inside: shown.inside } : lastShown()
+  if (last) {
+    const { document, inside, path, example } = last
+    const found = await ask<string>({ kind: 'attach', document, inside, path, example })
+    if (found !== undefined) {
+      line.resend()
+      return
+    }
+  }
+  line.resend()
+  if (!shown) await openFromAddress(welcome)
+}
+
+async function openFromAddress(welcome: EventOf<'welcome'>): Promise<void> {
   const wanted = decodeURIComponent(location.hash.slice(1))
-  if (wanted && wanted in welcome.examples) void ask({ kind: 'open', example: wanted })
-  else if (wanted) void ask({ kind: 'open', path: wanted })
-  else if (welcome.documents[0]) void ask({ kind: 'attach', document: welcome.documents[0].document })
-  else void ask({ kind: 'open', example: 'kr180model' })
+  if (wanted) {
+    const found = await ask(wanted in welcome.examples ? { kind: 'open', example: wanted } : { kind: 'open', path: wanted })
+    if (found !== undefined) return
+  }
+  const open = welcome.documents[0]
+  await ask(open ? { kind: 'attach', document: open.document } : { kind: 'open', example: 'kr180model' })
 }
 
 export const line = new Connection(
   receive,
   (frame) => samples.receive(frame),
-  (connected) => useStudio.setState({ connected }),
+  (state) => useStudio.setState({ line: state }),
 )
 
 let notices = 0
@@ -233,12 +266,30 @@ export async function ask<T = unknown>(request: Request): Promise<T | undefined>
   }
 }
 
-/** Carry out an edit of the document on the screen. */
-export function change(edit: Edit): Promise<unknown> {
-  const document = useStudio.getState().document
-  if (!document) return Promise.resolve(undefined)
-  const { state, inside } = document
-  return ask({ kind: 'change', document: state.document, key: crypto.randomUUID(), inside, edit })
+/** By what the server tells the edits of this page from those of others. */
+const author = crypto.randomUUID()
+
+/** What goes with everything that changes a drawing: which, what of it this page saw, and a key to do it once. */
+function alteration(document: OpenDocument) {
+  return { document: document.state.document, key: crypto.randomUUID(), base: document.state.version, author }
+}
+
+/** Carry out an edit of the document on the screen; where it is refused the sheet is shown as it is. */
+export async function change(edit: Edit): Promise<unknown> {
+  const { document } = useStudio.getState()
+  if (!document) return undefined
+  const { inside } = document
+  const version = await ask({ kind: 'change', ...alteration(document), inside, edit })
+  if (version === undefined) look(inside)
+  return version
+}
+
+/** Take the last step back, do it again, or lay the blocks of this sheet out anew. */
+export function alter(kind: 'undo' | 'redo' | 'arrange'): void {
+  const { document } = useStudio.getState()
+  if (!document) return
+  const common = alteration(document)
+  void ask(kind === 'arrange' ? { kind, ...common, inside: document.inside } : { kind, ...common })
 }
 
 /** Look at the sheet inside a subsystem; the empty path is the whole model. */

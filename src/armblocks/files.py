@@ -11,8 +11,11 @@ from typing import BinaryIO
 from armblocks.errors import FormatError
 
 
-def write_atomically(path: str | Path, data: bytes) -> None:
+def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.stat_result:
     """Replace the file at ``path`` by ``data``, so that a reader or a crash sees the old file or the new one.
+
+    Returns what the disk says of the new file: who finds another size, time or number there later knows that
+    somebody else has written. ``mode``: the permissions of a file that is new, less the user's umask.
 
     The bytes go to a new file in the same folder, reach the disk (``fsync``), and take the name in one step;
     then the folder's entry reaches the disk too. A symbolic link stays a link: its target is replaced. The
@@ -28,11 +31,12 @@ def write_atomically(path: str | Path, data: bytes) -> None:
     folder = target.parent
     temporary = folder / f".{target.name[:64]}.{secrets.token_hex(6)}.tmp"
     try:
-        _write_through(temporary, data)
+        written = _write_through(temporary, data, mode)
         if target.exists():
             temporary.chmod(target.stat().st_mode & 0o7777)
         temporary.replace(target)
-        _sync_folder(folder)
+        sync_folder(folder)
+        return written
     except OSError as error:
         raise _cannot_write(str(path), error) from error
     finally:
@@ -66,7 +70,7 @@ class GrowingFile:
             if self._target.exists():
                 self._temporary.chmod(self._target.stat().st_mode & 0o7777)
             self._temporary.replace(self._target)
-            _sync_folder(self._target.parent)
+            sync_folder(self._target.parent)
         except OSError as error:
             self.abandon()
             raise _cannot_write(self._shown, error) from error
@@ -107,16 +111,17 @@ def read_bounded(path: str | Path, limit: int) -> bytes:
     return data
 
 
-def _write_through(path: Path, data: bytes) -> None:
-    """Create ``path`` with the permissions of the user's umask, and return when the disk has the bytes."""
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+def _write_through(path: Path, data: bytes, mode: int) -> os.stat_result:
+    """Create ``path`` with the permissions that the user's umask leaves, and return when the disk has it."""
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
     with os.fdopen(descriptor, "wb") as stream:
         stream.write(data)
         stream.flush()
         os.fsync(stream.fileno())
+        return os.fstat(stream.fileno())
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Bring a folder's entries to the disk. Windows has no such call and orders its renames itself."""
     if os.name == "nt":
         return

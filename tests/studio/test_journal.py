@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
 from armblocks.errors import FormatError
-from armblocks.studio.journal import Journal, read_journal
+from armblocks.studio import journal as journal_module
+from armblocks.studio.journal import Journal, in_use, read_journal
 
 RECORDS = [{"edit": k, "text": "ä\n" * k} for k in range(6)]
 
 
 def written(path: Path) -> bytes:
-    journal = Journal(path, {"document": "d"})
+    journal = Journal(path)
+    journal.append({"document": "d"})
     for record in RECORDS:
         journal.append(record)
     assert journal.waiting
@@ -24,7 +27,7 @@ def written(path: Path) -> bytes:
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     path = tmp_path / "folder" / "a.journal"
     written(path)
-    assert read_journal(path) == [{"document": "d"}, *RECORDS]
+    assert read_journal(path) == ([{"document": "d"}, *RECORDS], path.stat().st_size)
     assert path.stat().st_mode & 0o077 == 0
 
 
@@ -36,7 +39,8 @@ def test_every_torn_end_leaves_the_records_before_it(tmp_path: Path) -> None:
     counts: set[int] = set()
     for end in range(first, len(data)):
         path.write_bytes(data[:end])
-        found = read_journal(path)
+        found, whole = read_journal(path)
+        assert whole <= end
         assert found == known[: len(found)]
         counts.add(len(found))
     assert counts == set(range(1, len(known)))
@@ -47,7 +51,7 @@ def test_a_changed_byte_ends_the_journal_there(tmp_path: Path) -> None:
     data = bytearray(written(path))
     data[-3] ^= 1
     path.write_bytes(data)
-    assert read_journal(path) == [{"document": "d"}, *RECORDS[:-1]]
+    assert read_journal(path)[0] == [{"document": "d"}, *RECORDS[:-1]]
 
 
 def test_a_journal_without_a_whole_record_is_refused(tmp_path: Path) -> None:
@@ -61,5 +65,58 @@ def test_a_journal_without_a_whole_record_is_refused(tmp_path: Path) -> None:
 
 def test_a_journal_that_is_not_kept_is_gone(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
-    Journal(path, {}).close(keep=False)
+    Journal(path).close(keep=False)
     assert not path.exists()
+
+
+def test_a_journal_goes_on_behind_its_last_whole_record(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    data = written(path)
+    path.write_bytes(data[:-5])
+    records, whole = read_journal(path)
+    journal = Journal(path, whole=whole)
+    journal.append({"more": 1})
+    journal.close(keep=True)
+    assert read_journal(path)[0] == [*records, {"more": 1}]
+
+
+def test_a_full_disk_leaves_the_records_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.journal"
+    journal = Journal(path)
+    journal.append({"first": 1})
+    real, calls = os.write, [0]
+
+    def half(descriptor: int, data: bytes) -> int:
+        calls[0] += 1
+        if calls[0] > 1:
+            raise OSError(28, "No space left on device")
+        return real(descriptor, data[: len(data) // 2])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", half)
+        with pytest.raises(OSError, match="No space left"):
+            journal.append({"second": "x" * 100})
+    journal.append({"third": 3})
+    journal.close(keep=True)
+    assert read_journal(path)[0] == [{"first": 1}, {"third": 3}]
+
+
+def test_a_journal_that_another_studio_writes_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    journal = Journal(path)
+    journal.append({"first": 1})
+    assert in_use(path)
+    with pytest.raises(BlockingIOError, match="is the journal of another studio"):
+        Journal(path)
+    journal.close(keep=True)
+    assert not in_use(path)
+    assert not in_use(tmp_path / "nowhere")
+    assert read_journal(path)[0] == [{"first": 1}]
+
+
+def test_a_journal_without_end_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.journal"
+    written(path)
+    monkeypatch.setattr(journal_module, "MOST_BYTES", 10)
+    with pytest.raises(FormatError, match="the journal is too large"):
+        read_journal(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -29,11 +30,61 @@ def folder(tmp_path: Path) -> ProjectFolder:
 def test_files_inside_are_listed_read_and_written(folder: ProjectFolder) -> None:
     assert folder.files() == ["arms/arm.m", "inside.json", "link.json"]
     assert folder.read("arms/arm.m") == b"x = 1;"
-    before = folder.state("new/model.json")
-    folder.write("new/model.json", b"{}")
-    assert before is None
-    assert folder.read("new/model.json") == b"{}"
-    assert folder.state("new/model.json") is not None
+    assert not folder.exists("new/model.json")
+    written = folder.write("new/model.json", b"{}")
+    assert folder.read_known("new/model.json") == (b"{}", written)
+    assert folder.exists("new/model.json")
+
+
+def test_a_file_that_somebody_else_has_written_is_noticed(folder: ProjectFolder) -> None:
+    known = folder.write("a.json", b"one")
+    assert folder.compared("a.json", known) == ("same", known)
+    path = folder.root / "a.json"
+    os.utime(path, ns=(0, 0))
+    disk, touched = folder.compared("a.json", known)
+    assert disk == "same"
+    assert touched != known
+    (folder.root / "b.json").write_bytes(b"two")
+    os.utime(folder.root / "b.json", ns=(known.modified, known.modified))
+    (folder.root / "b.json").rename(path)  # of the same size and time
+    assert folder.compared("a.json", known) == ("changed", known)
+    path.unlink()
+    assert folder.compared("a.json", known) == ("gone", known)
+    path.mkdir()
+    assert folder.compared("a.json", known) == ("changed", known)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        (".hidden.json", "begins with a dot"),
+        ("a/ b.json", "begins with a dot or space"),
+        ("a//b.json", "is empty"),
+        ("what?.json", "holds a character that not every system stores"),
+        ("line\nbreak.json", "holds a character"),
+        ("NUL.json", "is the name of a device"),
+        ("x" * 130 + ".json", "has 135 characters"),
+    ],
+)
+def test_names_that_no_system_stores_are_refused(folder: ProjectFolder, name: str, words: str) -> None:
+    with pytest.raises(ArmblocksError, match=f"cannot be a file's name: it .*{words}"):
+        folder.write(name, b"{}")
+
+
+def test_a_folder_that_cannot_be_made_is_said(folder: ProjectFolder) -> None:
+    with pytest.raises(ArmblocksError, match=r"the folder '.*inside.json' cannot be made"):
+        folder.write("inside.json/a.json", b"{}")
+
+
+def test_what_a_killed_save_left_is_swept_away(folder: ProjectFolder) -> None:
+    old, fresh = folder.root / "arms" / ".a.json.0123456789ab.tmp", folder.root / ".b.json.0123456789ab.tmp"
+    mine = folder.root / ".notes.tmp"
+    for path in (old, fresh, mine):
+        path.write_bytes(b"")
+    os.utime(old, (0, 0))
+    os.utime(mine, (0, 0))
+    folder.sweep(["arms/a.json", "../elsewhere.json"])
+    assert [path.exists() for path in (old, fresh, mine)] == [False, True, True]
 
 
 @pytest.mark.parametrize(

@@ -109,7 +109,7 @@ def test_a_drawing_that_cannot_run_yet_is_saved_and_opened_again(tmp_path: Path)
         key = await ask("new")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         await ask("save", document=key, path="open.json")
-        hub.documents.clear()
+        await ask("close", document=key)
         await ask("open", path="open.json")
 
     told = talk(tmp_path, talking)
@@ -179,7 +179,8 @@ def test_a_run_without_memory_fails_in_words(monkeypatch: pytest.MonkeyPatch) ->
     def exhausted(_: object) -> None:
         raise MemoryError
 
-    job = {"run": "r", "document": "d", "speed": None, "folder": ".", "diagram": "", "tuned": {}}
+    job: dict[str, Any] = {"run": "r", "document": "d", "speed": None, "folder": "."}
+    job |= {"diagram": "", "tuned": {}}
     run = run_worker._Run(Pipe(), job)  # pyright: ignore
     monkeypatch.setattr(run, "_go", lambda: exhausted(None))
     run.run()

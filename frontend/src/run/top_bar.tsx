@@ -15,7 +15,7 @@ import {
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
 import { openQuickInsert } from '../library/quick_insert'
-import { ask, change, useStudio } from '../store'
+import { alter, ask, change, useStudio } from '../store'
 import { openConfiguration } from './configuration'
 import { stepCursor, useCursor } from './cursor'
 import { useRuns } from './runs'
@@ -48,7 +48,6 @@ export function TopBar() {
   const state = useStudio((s) => s.run?.state)
   const runKey = useStudio((s) => s.run?.run)
   const busy = state === 'running' || state === 'paused'
-  const key = document?.state.document ?? ''
   const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') => runKey && void ask({ kind: 'control', run: runKey, action })
   const goBack = () => {
     useCursor.setState({ time: null, playing: false })
@@ -63,8 +62,8 @@ export function TopBar() {
       if (pressed === 'enter') start()
       else if (pressed === 'e') openConfiguration()
       else if (pressed === 's') void save()
-      else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) void ask({ kind: 'undo', document: key })
-      else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) void ask({ kind: 'redo', document: key })
+      else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) alter('undo')
+      else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) alter('redo')
       else if (pressed === 'k') openQuickInsert('')
       else return
       event.preventDefault()
@@ -81,11 +80,11 @@ export function TopBar() {
         {document?.state.dirty && <span aria-label="changed"> •</span>}
       </Text>
       <Group gap={2} role="group" aria-label="Edit">
-        <Tool label={document?.state.undo ? `Undo ${document.state.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!document?.state.undo} onClick={() => void ask({ kind: 'undo', document: key })} />
-        <Tool label={document?.state.redo ? `Redo ${document.state.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!document?.state.redo} onClick={() => void ask({ kind: 'redo', document: key })} />
+        <Tool label={document?.state.undo ? `Undo ${document.state.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!document?.state.undo} onClick={() => alter('undo')} />
+        <Tool label={document?.state.redo ? `Redo ${document.state.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!document?.state.redo} onClick={() => alter('redo')} />
         <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!document} onClick={() => void save()} />
         <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!document} onClick={() => openQuickInsert('')} />
-        <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!document} onClick={() => void ask({ kind: 'arrange', document: key, inside: document?.inside ?? [] })} />
+        <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!document} onClick={() => alter('arrange')} />
       </Group>
       <Group gap={4} role="group" aria-label="Run" className="run-controls">
         <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!document || state === 'running'} onClick={start}>

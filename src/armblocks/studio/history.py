@@ -29,13 +29,14 @@ class History(Generic[Value]):
     Forms share their parts, so the past costs next to nothing.
 
     ``version`` grows with every change, undo and redo included, and never returns: two pages that show the
-    same version show the same value. ``saved`` is the form that the file holds.
+    same version show the same value. ``saved`` is the form that the file holds, ``None`` where no file holds
+    one of these.
     """
 
-    def __init__(self, value: Value) -> None:
+    def __init__(self, value: Value, *, version: int = 0) -> None:
         self.value = value
-        self.saved = value
-        self.version = 0
+        self.saved: Value | None = value
+        self.version = version
         self._past: list[Step[Value]] = []
         self._future: list[Step[Value]] = []
 
@@ -67,9 +68,17 @@ class History(Generic[Value]):
 
     def rewrite(self, change: Callable[[Value], Value]) -> None:
         """Change the value and all that it was and could become again: what no undo should take back."""
-        self._past = [replace(step, before=change(step.before)) for step in self._past]
-        self._future = [replace(step, before=change(step.before)) for step in self._future]
-        self._become(change(self.value))
+        changed: dict[int, Value] = {}  # the same form stays the same, so that the saved one is recognised
+
+        def once(value: Value) -> Value:
+            if id(value) not in changed:
+                changed[id(value)] = change(value)
+            return changed[id(value)]
+
+        self._past = [replace(step, before=once(step.before)) for step in self._past]
+        self._future = [replace(step, before=once(step.before)) for step in self._future]
+        self.saved = None if self.saved is None else once(self.saved)
+        self._become(once(self.value))
 
     def undo(self) -> None:
         """Take the last edit back; raises ``InputError`` if there is none."""

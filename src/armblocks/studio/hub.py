@@ -7,11 +7,9 @@ import contextlib
 import dataclasses
 import secrets
 import warnings
-from collections import deque
 from collections.abc import Awaitable, Callable, Sequence
 from functools import lru_cache
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from starlette.websockets import WebSocketDisconnect
@@ -19,24 +17,22 @@ from starlette.websockets import WebSocketDisconnect
 from armblocks import formats
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram
-from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputError, UnknownNameError
+from armblocks.errors import ArmblocksError, InertiaWarning, InputError, UnknownNameError
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
-from armblocks.studio.document import Document
-from armblocks.studio.nesting import inside, with_inside, with_robot
+from armblocks.studio.document_journal import Performed
+from armblocks.studio.nesting import inside, with_robot
+from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.parameter_values import parameter_json, parameter_value
-from armblocks.studio.project_folder import FileState, ProjectFolder
+from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
 from armblocks.studio.run_process import RunProcess, Worker
 from armblocks.studio.run_settings import setting_rules, solver_choices
-from armblocks.studio.sheet import arranged, library, placed, sheet, sheet_change
+from armblocks.studio.sheet import library, sheet, sheet_change
+from armblocks.studio.state_folder import StateFolder
 from armblocks.studio.typed_settings import setting_faults
-
-MOST_DOCUMENTS = 100
-MOST_KEYS = 1000
-"""Keys of edits that are remembered, so that one sent twice is done once."""
 
 GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
 """What sending to a page raises that has left."""
@@ -60,45 +56,23 @@ class Page:
             await self.send_text(text)
 
 
-@dataclasses.dataclass(eq=False, kw_only=True)
-class OpenDocument:
-    """A document with its file and the background check that looks at it."""
-
-    key: str
-    document: Document
-    path: str | None
-    on_disk: FileState | None
-    seen: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
-    checking: asyncio.Task[None] | None = None
-
-    def state(self) -> say.DocumentState:
-        """Where it stands, for pages."""
-        document = self.document
-        return say.DocumentState(
-            document=self.key,
-            version=document.version,
-            title=document.diagram.name,
-            path=self.path,
-            dirty=document.dirty,
-            undo=document.undo_title,
-            redo=document.redo_title,
-        )
-
-
 class Hub:
     """Carries out what pages ask, and tells every page that shows a document what became of it."""
 
     def __init__(self, folder: ProjectFolder) -> None:
         self.folder = folder
         self.pages: set[Page] = set()
-        self.documents: dict[str, OpenDocument] = {}
+        self.documents = OpenDocuments(folder, StateFolder(folder.root), self.resolve_robot)
         self.runs: dict[str, RunProcess] = {}
         self.robots = RobotDesk(folder, self)
         self._spare: Worker | None = None
+        self._watching: asyncio.Task[None] | None = None
 
     def prepare(self) -> None:
-        """Have a process ready for the first run."""
+        """Have a process ready for the first run, and look after the files from now on."""
         self._spare = Worker()
+        self.folder.sweep(self.documents.kept.recent())
+        self._watching = asyncio.get_running_loop().create_task(self.documents.watch(self._tell_state))
 
     # -- pages -----------------------------------------------------------------------------------------------
 
@@ -114,7 +88,9 @@ class Hub:
                 settings=setting_rules(),
                 examples=_examples(),
                 files=self.folder.files(),
-                documents=[document.state() for document in self.documents.values()],
+                recent=self._recent(),
+                documents=[document.state() for document in self.documents],
+                recoveries=self.documents.recoveries(),
             )
         )
 
@@ -138,22 +114,20 @@ class Hub:
         match request:
             case say.Open(path=path) if path and self._is_robot_file(path):
                 return await self.robots.open_file(page, path)
-            case say.Open():
-                return await self._show(page, self._open(request))
-            case say.New():
-                return await self._show(page, self._add(Diagram(name="untitled", blocks={}), None))
-            case say.Attach():
-                return await self._show(page, self._known(request.document))
-            case say.Look():
-                return await self._show(page, self._known(request.document), tuple(request.inside))
-            case say.Change() | say.Undo() | say.Redo() | say.ArrangeBlocks():
+            case say.Open() | say.New() | say.Attach() | say.Look():
+                return await self._open(page, request)
+            case say.Change() | say.Undo() | say.Redo() | say.ArrangeBlocks() | say.Reload():
                 return await self._change(request)
-            case say.Save():
-                return await self._save(request)
+            case say.Save() | say.KeepMine() | say.Close() | say.Recover():
+                return await self._keep(page, request)
+            case say.Ping():
+                return None
+            case say.Files():
+                return {"files": self.folder.files(), "recent": self._recent()}
             case say.TypedValue():
                 return self._typed(request)
             case say.TypedSettings():
-                options = self._known(request.document).document.diagram.settings
+                options = self.documents[request.document].document.diagram.settings
                 return setting_faults(options, request.values)
             case say.Scene():
                 return scene_of(self.block_robot(request.document, request.inside, request.block))
@@ -173,72 +147,93 @@ class Hub:
 
     # -- documents -------------------------------------------------------------------------------------------
 
-    def _known(self, key: str) -> OpenDocument:
-        if key not in self.documents:
-            raise UnknownNameError("open document", key, self.documents)
-        return self.documents[key]
-
-    def _add(self, diagram: Diagram, path: str | None) -> OpenDocument:
-        if len(self.documents) >= MOST_DOCUMENTS:
-            raise InputError(
-                f"{len(self.documents)} documents are open",
-                allowed=f"at most {MOST_DOCUMENTS}",
-                fix="restart the studio",
-            )
-        key = secrets.token_hex(8)
-        found = OpenDocument(
-            key=key,
-            document=Document(placed(diagram), self.resolve_robot),
-            path=path,
-            on_disk=self.folder.state(path) if path else None,
-        )
-        self.documents[key] = found
-        return found
-
-    def _open(self, request: say.Open) -> OpenDocument:
-        if request.example:
-            known = formats.list_examples()
-            if request.example not in known:
-                raise UnknownNameError("example", request.example, known)
-            return self._add(formats.load_diagram(request.example, BLOCKS), None)
-        for open_document in self.documents.values():
-            if open_document.path == request.path:
-                return open_document
-        data = self.folder.read(request.path)
-        place = self.folder.path(request.path)
-        diagram = formats.diagram_from_bytes(
-            data, place.name, BLOCKS, self.resolve_robot, folder=place.parent, draft=True
-        )
-        return self._add(diagram, request.path)
+    async def _open(self, page: Page, request: say.Open | say.New | say.Attach | say.Look) -> str:
+        documents = self.documents
+        match request:
+            case say.Open():
+                path, example = request.path, request.example
+                found = documents.open_example(example) if example else documents.open_path(path)
+                return await self._show(page, found)
+            case say.New():
+                return await self._show(page, documents.new())
+            case say.Attach():
+                return await self._show(page, documents.attach(request), tuple(request.inside))
+            case say.Look():
+                return await self._show(page, documents[request.document], tuple(request.inside))
 
     async def _show(self, page: Page, found: OpenDocument, path: tuple[str, ...] = ()) -> str:
-        shown = inside(found.document.diagram, path)
+        try:
+            shown = inside(found.document.diagram, path)
+        except UnknownNameError:
+            if found.key in page.shows:
+                raise
+            path, shown = (), found.document.diagram  # what the page looked at before is gone
         page.shows[found.key] = path
         await page.tell(say.Opened(state=found.state(), inside=list(path), sheet=sheet(shown)))
+        await self._tell_documents()
         self._check_later(found)
         return found.key
 
-    async def _change(self, request: say.Change | say.Undo | say.Redo | say.ArrangeBlocks) -> int:
-        found = self._known(request.document)
-        document = found.document
-        before, version_before = document.diagram, document.version
-        match request:
-            case say.Change():
-                if request.key in found.seen:
-                    return document.version
-                document.edit(request.edit, request.inside)
-                found.seen.append(request.key)
-            case say.Undo():
-                document.undo()
-            case say.Redo():
-                document.redo()
-            case say.ArrangeBlocks():
-                inner = arranged(inside(document.diagram, request.inside))
-                document.replace("arrange", with_inside(document.diagram, request.inside, inner))
+    async def _change(self, request: Performed | say.Reload) -> int:
+        found = self.documents[request.document]
+        before, version_before = found.document.diagram, found.document.version
+        if isinstance(request, say.Reload):
+            self.documents.reload(found)
+        elif not self.documents.perform(found, request):
+            return found.document.version
         for page in [page for page in self.pages if found.key in page.shows]:
             await self._tell_change(page, found, before, version_before)
         self._check_later(found)
-        return document.version
+        return found.document.version
+
+    async def _keep(self, page: Page, request: say.Save | say.KeepMine | say.Close | say.Recover) -> Any:
+        """What is between a document and its file."""
+        documents = self.documents
+        if isinstance(request, say.Recover):
+            opened = await documents.recover(request)
+            key = await self._show(page, opened) if opened is not None else None
+            await self._tell_documents()
+            return key
+        found = documents[request.document]
+        answer: Any = None
+        try:
+            match request:
+                case say.Save():
+                    answer = await documents.save(found, request.path, overwrite=request.overwrite)
+                case say.KeepMine():
+                    documents.keep_mine(found)
+                case say.Close():
+                    documents.close(found, discard=request.discard)
+                    await self._tell_documents()
+                    return None
+        finally:
+            await self._tell_state(found)
+        await self._tell_documents()
+        return answer
+
+    async def _tell_state(self, found: OpenDocument) -> None:
+        """Tell the pages that show a document where it stands; the drawing is as it was."""
+        diagram = found.document.diagram
+        event = say.Changed(
+            state=found.state(), before=found.document.version, change=sheet_change(diagram, diagram)
+        )
+        await self.tell_all(found.key, event)
+
+    async def _tell_documents(self) -> None:
+        """Tell every page what is open."""
+        event = say.Documents(
+            documents=[document.state() for document in self.documents],
+            recoveries=self.documents.recoveries(),
+        )
+        await asyncio.gather(*(page.tell(event) for page in self.pages))
+
+    def _recent(self) -> list[str]:
+        return [path for path in self.documents.kept.recent() if self._is_there(path)]
+
+    def _is_there(self, path: str) -> bool:
+        with contextlib.suppress(ArmblocksError):
+            return self.folder.exists(path)
+        return False
 
     async def _tell_change(
         self, page: Page, found: OpenDocument, before: Diagram, version_before: int
@@ -253,37 +248,6 @@ class Hub:
         change = sheet_change(old, new)
         await page.tell(say.Changed(state=found.state(), before=version_before, change=change))
 
-    async def _save(self, request: say.Save) -> str:
-        found = self._known(request.document)
-        path = request.path or found.path
-        if not path:
-            raise FormatError("the drawing has no file yet", allowed="a path", fix="save it under a name")
-        now = self.folder.state(path)
-        if now != found.on_disk and path == found.path and not request.overwrite:
-            raise FormatError(
-                "the file has changed on the disk since it was opened",
-                where=path,
-                allowed="to overwrite it, or to save under another name",
-                fix="choose one of the two",
-            )
-        if path != found.path and now is not None and not request.overwrite:
-            raise FormatError(
-                "there is such a file already", where=path, fix="overwrite it, or choose another"
-            )
-        diagram = found.document.diagram
-        if path != found.path:
-            diagram = dataclasses.replace(diagram, name=Path(path).stem)
-            found.document.rename(diagram.name)
-            diagram = found.document.diagram
-        target = self.folder.path(path)
-        self.folder.write(path, formats.diagram_to_bytes(diagram, self.resolve_robot, folder=target.parent))
-        found.path, found.on_disk = path, self.folder.state(path)
-        found.document.saved = diagram
-        version_now = found.document.version
-        event = say.Changed(state=found.state(), before=version_now, change=sheet_change(diagram, diagram))
-        await self.tell_all(found.key, event)
-        return path
-
     def resolve_robot(self, name: str) -> Robot:
         """A shipped robot or a robot file of the project."""
         with warnings.catch_warnings():  # the robot editor marks them
@@ -297,7 +261,7 @@ class Hub:
 
     def block_robot(self, document: str, path: Sequence[str], block: str) -> Robot:
         """The robot that a block of an open diagram uses."""
-        level = inside(self._known(document).document.diagram, path)
+        level = inside(self.documents[document].document.diagram, path)
         robot = getattr(level.block(block), "robot", None)
         if not isinstance(robot, Robot):
             raise InputError("the block has no robot", where=f"block '{block}'", allowed="a robot block")
@@ -305,20 +269,16 @@ class Hub:
 
     async def show_diagram(self, page: Page, data: bytes, name: str) -> str:
         """Open a diagram that has no file yet; its key."""
-        diagram = formats.diagram_from_bytes(
-            data, name, BLOCKS, self.resolve_robot, folder=self.folder.root, draft=True
-        )
-        return await self._show(page, self._add(diagram, None))
+        return await self._show(page, self.documents.open_bytes(data, name))
 
     async def robot_saved(self, robot: Robot) -> None:
         """The file of a robot has changed: diagrams that use it take it anew, as a step of undo."""
-        for found in self.documents.values():
-            document = found.document
-            before, version_before = document.diagram, document.version
+        for found in self.documents:
+            before, version_before = found.document.diagram, found.document.version
             after = with_robot(before, robot)
             if after is before:
                 continue
-            document.replace(f"new form of {robot.name}", after)
+            self.documents.replace(found, f"new form of {robot.name}", after)
             for page in [page for page in self.pages if found.key in page.shows]:
                 await self._tell_change(page, found, before, version_before)
             self._check_later(found)
@@ -354,7 +314,7 @@ class Hub:
         return self.runs[key]
 
     async def _run(self, request: say.Run) -> str:
-        found = self._known(request.document)
+        found = self.documents[request.document]
 
         async def tell(event: say.Message | bytes) -> None:
             if isinstance(event, bytes):
@@ -383,7 +343,10 @@ class Hub:
         return run.key
 
     def close(self) -> None:
-        """End every run."""
+        """End every run, and leave the documents so that nothing is lost."""
+        if self._watching is not None:
+            self._watching.cancel()
+        self.documents.end()
         for run in self.runs.values():
             run.end()
         if self._spare is not None:

@@ -165,15 +165,41 @@ class Tunable(Message):
 
 
 class DocumentState(Message):
-    """Where a document stands."""
+    """Where a document stands.
+
+    ``disk`` says how the file is now, compared with what was opened or saved. ``journaled`` is false where
+    the journal cannot be written: then only a save keeps what is drawn.
+    """
 
     document: str
     version: int
     title: str
     path: str | None
+    example: str
     dirty: bool
     undo: str
     redo: str
+    disk: Literal["same", "changed", "gone"] = "same"
+    journaled: bool = True
+
+
+class Recovery(Message):
+    """A drawing that was not saved when the studio ended, as its journal gives it back.
+
+    ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
+    the first and the last edit since the save were made (s since 1970), ``edits`` how many there are.
+    ``disk`` says whether the file is still the one that was edited. ``missing`` says what could not be read.
+    """
+
+    document: str
+    title: str
+    path: str | None
+    began: float
+    last: float
+    edits: int
+    blocks: int
+    disk: Literal["same", "changed", "gone"]
+    missing: str
 
 
 # -- requests ------------------------------------------------------------------------------------------------
@@ -194,21 +220,71 @@ class New(Message):
 
 
 class Attach(Message):
-    """Show a document that is open already: after a reload, or in a second page."""
+    """Show a document again: after a reload, after the line was down, or in a second page.
+
+    Where the server was started anew and does not know it, it comes from its journal, or else from the file
+    or the example of these names, under the same key: edits that wait to be sent again find it.
+    """
 
     kind: Literal["attach"] = "attach"
+    document: str = Field(pattern=r"^[0-9a-f]{16}$")
+    inside: list[str] = Field(default_factory=list[str])
+    path: str | None = None
+    example: str = ""
+
+
+class Alteration(Message):
+    """What changes a drawing.
+
+    ``key`` is new for each: sent again after a broken line, it is done once. ``base`` is the version that the
+    page ``author`` saw: where another page has changed the same things since, the request is refused.
+    """
+
     document: str
+    key: str = ""
+    base: int | None = None
+    author: str = ""
 
 
-class Change(Message):
-    """Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once."""
+class Change(Alteration):
+    """Carry out an edit."""
 
     kind: Literal["change"] = "change"
-    document: str
-    key: str
     inside: list[str] = Field(default_factory=list[str])
     """Names of the subsystems on the way to the sheet that is edited."""
     edit: Edit
+
+
+class Undo(Alteration):
+    """Take the last edit back."""
+
+    kind: Literal["undo"] = "undo"
+
+
+class Redo(Alteration):
+    """Do again what was undone."""
+
+    kind: Literal["redo"] = "redo"
+
+
+class ArrangeBlocks(Alteration):
+    """Lay the blocks out anew, from left to right."""
+
+    kind: Literal["arrange"] = "arrange"
+    inside: list[str] = Field(default_factory=list[str])
+
+
+class Reload(Alteration):
+    """Take what the file holds now, as one step that can be undone."""
+
+    kind: Literal["reload"] = "reload"
+
+
+class KeepMine(Message):
+    """Leave the file that has changed on the disk as it is until the next save, which overwrites it."""
+
+    kind: Literal["keep_mine"] = "keep_mine"
+    document: str
 
 
 class Look(Message):
@@ -217,20 +293,6 @@ class Look(Message):
     kind: Literal["look"] = "look"
     document: str
     inside: list[str]
-
-
-class Undo(Message):
-    """Take the last edit back."""
-
-    kind: Literal["undo"] = "undo"
-    document: str
-
-
-class Redo(Message):
-    """Do again what was undone."""
-
-    kind: Literal["redo"] = "redo"
-    document: str
 
 
 class Save(Message):
@@ -242,12 +304,36 @@ class Save(Message):
     overwrite: bool = False
 
 
-class ArrangeBlocks(Message):
-    """Lay the blocks out anew, from left to right."""
+class Ping(Message):
+    """Ask for nothing but an answer: the page thereby knows that the line is up."""
 
-    kind: Literal["arrange"] = "arrange"
+    kind: Literal["ping"] = "ping"
+
+
+class Files(Message):
+    """Ask for the files of the project folder as they are now, those used last first among ``recent``."""
+
+    kind: Literal["files"] = "files"
+
+
+class Close(Message):
+    """Put a document away; ``discard`` where it has edits that no file holds."""
+
+    kind: Literal["close"] = "close"
     document: str
-    inside: list[str] = Field(default_factory=list[str])
+    discard: bool = False
+
+
+class Recover(Message):
+    """Say what becomes of a drawing that a journal gives back.
+
+    ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
+    from and opens that; ``discard`` deletes the journal.
+    """
+
+    kind: Literal["recover"] = "recover"
+    document: str
+    action: Literal["open", "keep_both", "discard"]
 
 
 class Run(Message):
@@ -339,8 +425,14 @@ Request = Annotated[
     | Change
     | Undo
     | Redo
-    | Save
     | ArrangeBlocks
+    | Reload
+    | KeepMine
+    | Save
+    | Ping
+    | Files
+    | Close
+    | Recover
     | Run
     | Control
     | SetSpeed
@@ -394,7 +486,17 @@ class Welcome(Message):
     settings: list[SettingRule]
     examples: dict[str, str]
     files: list[str]
+    recent: list[str]
     documents: list[DocumentState]
+    recoveries: list[Recovery]
+
+
+class Documents(Message):
+    """The documents that are open and those that wait to be recovered, whenever either has changed."""
+
+    kind: Literal["documents"] = "documents"
+    documents: list[DocumentState]
+    recoveries: list[Recovery]
 
 
 class Opened(Message):
@@ -474,7 +576,8 @@ class RunProgress(Message):
 RunEvent = Annotated[RunStarted | RunTuned | RunRewound | RunProgress, Field(discriminator="kind")]
 """What the process of a run has to say, besides its samples."""
 Event = Annotated[
-    Reply | Welcome | Opened | Changed | Checked | RunEvent | RobotShown, Field(discriminator="kind")
+    Reply | Welcome | Documents | Opened | Changed | Checked | RunEvent | RobotShown,
+    Field(discriminator="kind"),
 ]
 
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from time import time
+from typing import Any, Literal
 
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import read_bounded, write_atomically
@@ -16,15 +21,44 @@ WRITABLE = (".json",)
 MOST_BYTES = 16 * 2**20
 MOST_FILES = 2000
 """Files that the list of a folder shows."""
+STRAY_SECONDS = 60.0
+"""A file half written that is older than this was left by a program that was killed."""
 _HIDDEN = ("node_modules", "__pycache__")
+_STRAY = re.compile(r"\..*\.[0-9a-f]{12}\.(tmp|part)")
+_STRANGE = re.compile(r'[\x00-\x1f\x7f<>:"|?*\\]')
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+LONGEST_NAME = 120
+
+Disk = Literal["same", "changed", "gone"]
+"""How a file stands, compared with what is known of it."""
 
 
 @dataclass(frozen=True)
-class FileState:
-    """What tells one form of a file from another without reading it: time of change (ns) and size (bytes)."""
+class Fingerprint:
+    """What tells one form of a file from another.
+
+    Time of change (ns), size (bytes) and number are asked of the disk often; the content's SHA-256 decides
+    where they differ, so that a file that was only touched or written again as it was is the same.
+    """
 
     modified: int
     size: int
+    number: int
+    digest: str
+
+    @classmethod
+    def of(cls, status: os.stat_result, data: bytes) -> Fingerprint:
+        """The fingerprint of a file with this content."""
+        digest = hashlib.sha256(data).hexdigest()
+        return cls(status.st_mtime_ns, status.st_size, status.st_ino, digest)
+
+    def matches(self, status: os.stat_result) -> bool:
+        """Whether the disk says nothing that is other than it was."""
+        return (self.modified, self.size, self.number) == (status.st_mtime_ns, status.st_size, status.st_ino)
+
+    def said(self) -> dict[str, Any]:
+        """As the arguments that make it again."""
+        return asdict(self)
 
 
 class ProjectFolder:
@@ -58,19 +92,56 @@ class ProjectFolder:
         """The content of a file."""
         return read_bounded(self.path(relative), MOST_BYTES)
 
-    def write(self, relative: str, data: bytes) -> None:
+    def read_known(self, relative: str) -> tuple[bytes, Fingerprint]:
+        """The content of a file, and by what it is told from what may stand there later."""
+        path = self.path(relative)
+        # Asked before the reading: who writes in between is noticed once too often rather than never.
+        status = path.stat() if path.is_file() else None
+        data = read_bounded(path, MOST_BYTES)
+        return data, Fingerprint.of(status or path.stat(), data)
+
+    def write(self, relative: str, data: bytes) -> Fingerprint:
         """Replace a file, all or nothing; folders on the way are made."""
         path = self.path(relative, WRITABLE)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, data)
-
-    def state(self, relative: str) -> FileState | None:
-        """How the file stands on the disk now; ``None`` if it is not there."""
+        check_file_name(relative)
         try:
-            found = self.path(relative).stat()
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FormatError(
+                f"the folder '{path.parent}' cannot be made ({error.strerror})",
+                where=relative,
+                fix="choose another folder",
+            ) from error
+        return Fingerprint.of(write_atomically(path, data), data)
+
+    def exists(self, relative: str) -> bool:
+        """Whether there is such a file."""
+        return self.path(relative).exists()
+
+    def compared(self, relative: str, known: Fingerprint | None) -> tuple[Disk, Fingerprint | None]:
+        """How a file stands now, and its fingerprint where it is the known one or has the same content."""
+        path = self.path(relative)
+        try:
+            status = path.stat()
+            if known is not None and known.matches(status):
+                return "same", known
+            now = Fingerprint.of(status, read_bounded(path, MOST_BYTES))
         except FileNotFoundError:
-            return None
-        return FileState(found.st_mtime_ns, found.st_size)
+            return "gone", known
+        except (OSError, FormatError):
+            return "changed", known
+        return ("same", now) if known is not None and known.digest == now.digest else ("changed", known)
+
+    def sweep(self, used: Iterable[str]) -> None:
+        """Remove what a studio that was killed during a save left half written beside these files."""
+        folders = {self.root, *((self.root / name).resolve().parent for name in used)}
+        for folder in folders:
+            if not (folder.is_relative_to(self.root) and folder.is_dir()):
+                continue
+            for path in folder.iterdir():
+                with contextlib.suppress(OSError):
+                    if _STRAY.fullmatch(path.name) and time() - path.stat().st_mtime > STRAY_SECONDS:
+                        path.unlink()
 
     def files(self) -> list[str]:
         """The files that can be opened, by path, hidden folders left out; at most :data:`MOST_FILES`."""
@@ -95,3 +166,23 @@ class ProjectFolder:
 
 def _first(names: Iterator[str], most: int) -> list[str]:
     return [name for name, _ in zip(names, range(most))]
+
+
+def check_file_name(relative: str) -> None:
+    """Raise ``FormatError`` for a path that some system could not store or would not show."""
+    for part in relative.split("/"):
+        if not part or part != part.strip() or part.startswith(".") or part.endswith("."):
+            reason = "is empty, or begins with a dot or space, or ends with one"
+        elif _STRANGE.search(part):
+            reason = "holds a character that not every system stores"
+        elif _DEVICES.fullmatch(part):
+            reason = "is the name of a device"
+        elif len(part) > LONGEST_NAME:
+            reason = f"has {len(part)} characters"
+        else:
+            continue
+        raise FormatError(
+            f"'{part[:80]}' cannot be a file's name: it {reason}",
+            allowed=f"letters, digits, spaces, - and _, at most {LONGEST_NAME} characters",
+            fix="choose another name",
+        )

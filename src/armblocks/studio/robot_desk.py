@@ -19,7 +19,7 @@ from armblocks.report.arm_picture import arm_picture_svg
 from armblocks.robot import Robot, standard_dh
 from armblocks.studio import robot_messages as say
 from armblocks.studio.history import History
-from armblocks.studio.project_folder import FileState, ProjectFolder
+from armblocks.studio.project_folder import Fingerprint, ProjectFolder
 from armblocks.studio.robot_edits import robot_applied, robot_summary
 from armblocks.studio.robot_readings import readings
 from armblocks.studio.robot_scene import link_frames_of, scene_of
@@ -56,7 +56,7 @@ class OpenRobot:
     key: str
     history: History[Robot]
     path: str | None = None
-    on_disk: FileState | None = None
+    on_disk: Fingerprint | None = None
     shipped: str = ""
     notes: tuple[str, ...] = ()
     seen: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
@@ -161,13 +161,14 @@ class RobotDesk:
         for found in self.robots.values():
             if found.path == path:
                 return await self._show(page, [found])
-        robots, notes = _read(self._folder.read(path), path)
+        data, on_disk = self._folder.read_known(path)
+        robots, notes = _read(data, path)
         kept = path.lower().endswith(".json")  # a script is read, and saved as a file of ours
         opened = [
             self._add(
                 dataclasses.replace(robot, source=str(self._folder.path(path))),
                 path=path if kept else None,
-                on_disk=self._folder.state(path) if kept else None,
+                on_disk=on_disk if kept else None,
                 notes=notes,
             )
             for robot in robots.values()
@@ -233,22 +234,22 @@ class RobotDesk:
         path = request.path or found.path
         if not path:
             raise FormatError("the robot has no file yet", allowed="a path", fix="save it under a name")
-        now = self._folder.state(path)
-        if path == found.path and now != found.on_disk and not request.overwrite:
+        disk, _ = self._folder.compared(path, found.on_disk)
+        if path == found.path and disk == "changed" and not request.overwrite:
             raise FormatError(
                 "the robot's file has changed on the disk since it was opened",
                 where=path,
                 allowed="to overwrite it, or to save under another name",
                 fix="choose one of the two",
             )
-        if path != found.path and now is not None and not request.overwrite:
+        if path != found.path and disk != "gone" and not request.overwrite:
             raise FormatError(
                 "there is a file of this name already", where=path, fix="overwrite it, or choose another"
             )
         place = self._folder.path(path)
-        self._folder.write(path, formats.write_robot(found.robot))
+        on_disk = self._folder.write(path, formats.write_robot(found.robot))
         found.history.saved = found.history.value
-        found.path, found.on_disk, found.shipped = path, self._folder.state(path), ""
+        found.path, found.on_disk, found.shipped = path, on_disk, ""
         await self._tell(found)
         await self._drawings.robot_saved(dataclasses.replace(found.robot, source=str(place)))
         return path

@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse, PlainTextResponse, RedirectResponse,
 from fastapi.staticfiles import StaticFiles
 from pydantic import ValidationError
 
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, UnknownNameError
 from armblocks.report.diagram_drawing import diagram_svg
 from armblocks.studio.guard import Guard, Keys
 from armblocks.studio.hub import Hub, Page
@@ -59,8 +59,9 @@ def studio_app(folder: ProjectFolder, keys: Keys, hosts: frozenset[str], web: Pa
 
     @app.get("/drawing/{document}.svg")
     async def drawing(document: str) -> Response:  # pyright: ignore[reportUnusedFunction]
-        found = hub.documents.get(document)
-        if found is None:
+        try:
+            found = hub.documents[document]
+        except UnknownNameError:
             return PlainTextResponse("there is no such document", 404)
         return Response(diagram_svg(found.document.diagram), media_type="image/svg+xml")
 

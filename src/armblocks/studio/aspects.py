@@ -1,0 +1,60 @@
+"""What an edit touches, so that two edits made at the same time can be told to be about different things.
+
+An aspect is a tuple: the names of subsystems and block on the way, and last what of it was changed: ``""``
+that it is there at all, ``place``, ``u <- wire``, or a parameter's name. For a diagram itself ``/`` stands in
+the place of the block: no block's name holds it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Set
+
+from armblocks.diagram import Block, Diagram
+
+Aspect = tuple[str, ...]
+
+
+def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[Aspect]:
+    """All that is different between two diagrams. What both hold as the same objects is not looked at."""
+    if before is after:
+        return set()
+    found: set[Aspect] = set()
+    for name in before.blocks.keys() | after.blocks.keys():
+        old, new = before.blocks.get(name), after.blocks.get(name)
+        if old is not new:
+            found |= _of_block((*path, name), old, new)
+        if before.layout.get(name) != after.layout.get(name):
+            found.add((*path, name, "place"))
+    if before.connections is not after.connections:
+        for wire in set(before.connections) ^ set(after.connections):
+            found.add((*path, wire.target.block, f"{wire.target.port} <- wire"))
+    for of_whole in ("name", "description", "settings", "extras"):
+        if getattr(before, of_whole) != getattr(after, of_whole):
+            found.add((*path, "/", of_whole))
+    return found
+
+
+def clash(mine: Iterable[Aspect], theirs: Set[Aspect]) -> bool:
+    """Whether both are about one thing. A block that comes or goes is about all that it has and holds."""
+    mine = set(mine)
+    if mine & theirs:
+        return True
+    return _covers(mine, theirs) or _covers(theirs, mine)
+
+
+def _covers(some: Set[Aspect], others: Set[Aspect]) -> bool:
+    whole = {aspect[:-1] for aspect in some if aspect[-1] == ""}
+    return any(other[:k] in whole for other in others for k in range(1, len(other) + 1)) if whole else False
+
+
+def _of_block(path: Aspect, old: Block | None, new: Block | None) -> set[Aspect]:
+    if old is None or new is None or type(old) is not type(new):
+        return {(*path, "")}
+    found: set[Aspect] = set()
+    for rule in new.parameters():
+        was, now = old.parameter_value(rule.name), new.parameter_value(rule.name)
+        if isinstance(was, Diagram) and isinstance(now, Diagram):
+            found |= changed_aspects(was, now, path)
+        elif was != now:
+            found.add((*path, rule.name))
+    return found

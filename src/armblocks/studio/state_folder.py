@@ -1,0 +1,114 @@
+"""What the studio keeps for itself, outside of the project folder and readable by its user alone.
+
+One folder for each project folder holds the journals of what is drawn, the files used last, and the secret by
+which a page is known again after the server was started anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import secrets
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import time
+from typing import Any
+
+from armblocks.errors import FormatError
+from armblocks.files import read_bounded, write_atomically
+
+MOST_RECENT = 12
+MOST_BYTES = 64 * 1024
+SESSION_SECONDS = 12 * 3600.0
+"""A session that was not used for so long is not taken up again."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """By what a page is known again: the port that it speaks to, and the value of its cookie."""
+
+    port: int
+    secret: str
+
+
+class StateFolder:
+    """The studio's own files for one project folder."""
+
+    def __init__(self, project: Path) -> None:
+        name = hashlib.sha256(os.fsencode(project.resolve())).hexdigest()[:24]
+        self.root = state_base() / name
+        self.journals = self.root / "journals"
+
+    def session(self) -> Session | None:
+        """The session of the server that was here last; ``None`` if there was none, or long ago."""
+        try:
+            age = time() - self._session.stat().st_mtime
+            found = json.loads(read_bounded(self._session, MOST_BYTES))
+            session = Session(port=int(found["port"]), secret=str(found["secret"]))
+        except (OSError, FormatError, ValueError, KeyError, TypeError):
+            return None
+        return session if age < SESSION_SECONDS and len(session.secret) >= 32 else None
+
+    def begin_session(self, port: int, *, afresh: bool = False) -> Session:
+        """The session for this port: the last one where it was of this port, unless ``afresh``."""
+        last = self.session()
+        kept = last is not None and last.port == port and not afresh
+        session = last if last is not None and kept else Session(port, secrets.token_urlsafe(32))
+        self._write(self._session, asdict(session))
+        return session
+
+    def recent(self) -> list[str]:
+        """Files of the project that were opened or saved last, the latest first."""
+        try:
+            found: Any = json.loads(read_bounded(self._recent, MOST_BYTES))
+            return [str(name) for name in found["files"]][:MOST_RECENT]
+        except (FormatError, ValueError, KeyError, TypeError):
+            return []
+
+    def use(self, path: str) -> None:
+        """Note that a file was opened or saved."""
+        recent = self.recent()
+        if recent[:1] != [path]:
+            files = [path, *(other for other in recent if other != path)]
+            self._write(self._recent, {"files": files[:MOST_RECENT]})
+
+    @property
+    def _session(self) -> Path:
+        return self.root / "session.json"
+
+    @property
+    def _recent(self) -> Path:
+        return self.root / "recent.json"
+
+    def _write(self, path: Path, value: object) -> None:
+        """Write a small file of this folder; where that cannot be, the studio goes on without."""
+        try:
+            self.root.mkdir(parents=True, exist_ok=True, mode=0o700)
+            write_atomically(path, json.dumps(value).encode(), mode=0o600)
+        except (OSError, FormatError):
+            return
+
+
+def state_base() -> Path:
+    """Where programs of this system keep their state for a user; raises ``FormatError`` if nowhere."""
+    try:
+        return _state_base()
+    except RuntimeError as error:
+        raise FormatError(
+            "the studio has no place for its journals: this user has no home folder",
+            where="armblocks studio",
+            allowed="a home folder, or a folder in XDG_STATE_HOME",
+            fix="set XDG_STATE_HOME to a folder of this user",
+        ) from error
+
+
+def _state_base() -> Path:
+    if sys.platform == "win32":
+        local = os.environ.get("LOCALAPPDATA")
+        return (Path(local) if local else Path.home() / "AppData" / "Local") / "armblocks" / "Studio"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support" / "armblocks" / "studio"
+    base = os.environ.get("XDG_STATE_HOME")
+    return (Path(base) if base else Path.home() / ".local" / "state") / "armblocks" / "studio"

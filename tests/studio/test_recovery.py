@@ -1,0 +1,340 @@
+"""What was drawn comes back after a crash, and never in the place of what somebody else wrote."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import shutil
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armblocks.errors import ArmblocksError, InputError
+from armblocks.formats import diagram_to_bytes, load_robot
+from armblocks.studio import messages as say
+from armblocks.studio.edits import AddBlocks, Edit, MoveBlocks, NewBlock, Place, SetParameters
+from armblocks.studio.open_documents import OpenDocument, OpenDocuments
+from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.state_folder import StateFolder
+
+
+class Disk:
+    """A project folder and what the studio keeps for it, as a studio that starts finds them."""
+
+    def __init__(self, root: Path) -> None:
+        self.project = ProjectFolder(root / "project")
+        self.kept = StateFolder(self.project.root)
+        self.kept.root = root / "state"
+        self.kept.journals = root / "state" / "journals"
+
+    def documents(self) -> OpenDocuments:
+        return OpenDocuments(self.project, self.kept, load_robot)
+
+    def as_after_a_crash(self, root: Path) -> Disk:
+        """The same disk, seen by a studio that starts after the one that writes now was killed."""
+        for name in ("project", "state"):
+            if (self.project.root.parent / name).exists():
+                shutil.copytree(self.project.root.parent / name, root / name)
+        return Disk(root)
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Disk:
+    (tmp_path / "first" / "project").mkdir(parents=True)
+    return Disk(tmp_path / "first")
+
+
+def going(talking: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    asyncio.run(talking())
+
+
+def change(key: str, edit: Edit, **more: Any) -> say.Change:
+    return say.Change(document="", key=key, edit=edit, **more)
+
+
+def add(name: str, kind: str = "Gain") -> AddBlocks:
+    return AddBlocks(blocks=[NewBlock(name=name, type=kind, place=Place(x=0, y=0))])
+
+
+def content(found: OpenDocument) -> bytes:
+    return diagram_to_bytes(found.document.diagram, load_robot)
+
+
+def random_requests(seed: int, count: int) -> list[Any]:
+    """Edits of all kinds with undo and redo between them; some cannot be carried out, and are refused."""
+    random_ = random.Random(seed)
+    requests: list[Any] = []
+    for k in range(count):
+        some = f"b{random_.randrange(8)}"
+        edits: list[Edit] = [
+            add(f"b{random_.randrange(8)}", random_.choice(["Gain", "Integrator", "Sum"])),
+            SetParameters(block=some, values={"gain": random_.random()}),
+            MoveBlocks(places={some: Place(x=float(k), y=1.5)}),
+        ]
+        requests.append(
+            random_.choice(
+                [
+                    change(f"{seed} {k}", random_.choice(edits)),
+                    change(f"{seed} {k}", random_.choice(edits)),
+                    say.Undo(document="", key=f"{seed} {k}"),
+                    say.Redo(document="", key=f"{seed} {k}"),
+                ]
+            )
+        )
+    return requests
+
+
+def carry_out(documents: OpenDocuments, found: OpenDocument, requests: list[Any]) -> None:
+    for request in requests:
+        try:
+            documents.perform(found, request)
+        except ArmblocksError:
+            continue
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_any_edits_come_back_with_their_past_and_future(disk: Disk, tmp_path: Path, seed: int) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        carry_out(documents, found, random_requests(seed, 150))
+        if seed % 3 == 0:
+            await documents.save(found, "saved.json", overwrite=False)
+        carry_out(documents, found, random_requests(seed + 1000, 150))
+        after = disk.as_after_a_crash(tmp_path / "second").documents()
+        back = after.attach(say.Attach(document=found.key))
+        assert content(back) == content(found)
+        assert back.document.version == found.document.version
+        assert back.document.dirty == found.document.dirty
+        assert back.path == found.path
+        while back.document.undo_title:  # as far back as the journal reaches
+            assert back.document.undo_title == found.document.undo_title
+            back.document.undo()
+            found.document.undo()
+            assert content(back) == content(found)
+        while found.document.redo_title:
+            back.document.redo()
+            found.document.redo()
+        assert content(back) == content(found)
+
+    going(talking)
+
+
+def test_a_long_journal_is_read_from_its_last_snapshot(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        documents.perform(found, change("0", add("gain")))
+        for k in range(1, 450):
+            documents.perform(found, change(str(k), SetParameters(block="gain", values={"gain": float(k)})))
+            await asyncio.sleep(0.002 if k % 200 < 2 else 0)
+        for _ in range(100):
+            await asyncio.sleep(0.01)
+            if found.snapshot is not None and found.snapshot.done():
+                break
+        for k in range(300):
+            documents.perform(found, say.Undo(document="", key=f"u{k}"))
+        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(say.Attach(document=found.key))
+        assert content(back) == content(found)
+        assert back.document.diagram.blocks["gain"].parameter_value("gain") == 149.0
+
+    going(talking)
+
+
+def test_a_journal_torn_anywhere_gives_back_what_was_before(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        states = [content(found)]
+        for k in range(6):
+            documents.perform(found, change(str(k), add(f"b{k}")))
+            states.append(content(found))
+        journal = disk.kept.journals / f"{found.key}.journal"
+        whole = journal.read_bytes()
+        ends = [0, *(k + 1 for k, byte in enumerate(whole) if byte == 10)]
+        other = disk.as_after_a_crash(tmp_path / "second")
+        copy = other.kept.journals / journal.name
+        for record in range(2, len(ends)):  # a head and a drawing are needed for anything
+            for cut in (ends[record] - 1, ends[record], ends[record] + 7):
+                copy.unlink()  # and with it the lock of the recovery before
+                copy.write_bytes(whole[: min(cut, len(whole))])
+                waiting = other.documents()
+                done = record - 2 if cut >= ends[record] else record - 3
+                if done < 0:
+                    assert [entry.missing != "" for entry in waiting.recoveries()] == [True]
+                    continue
+                assert [entry.edits for entry in waiting.recoveries()] == [done] * (done > 0)
+                if done > 0:
+                    back = await waiting.recover(say.Recover(document=found.key, action="open"))
+                    assert back is not None
+                    assert content(back) == states[done]
+
+    going(talking)
+
+
+def test_an_edit_sent_again_after_the_crash_is_done_once(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        documents.perform(found, change("one", add("gain")))
+        after = disk.as_after_a_crash(tmp_path / "second").documents()
+        back = after.attach(say.Attach(document=found.key))
+        assert not after.perform(back, change("one", add("gain")))
+        assert after.perform(back, change("two", add("gain 2")))
+        assert sorted(back.document.diagram.blocks) == ["gain", "gain 2"]
+
+    going(talking)
+
+
+def test_a_page_finds_its_document_again_after_the_server_was_started_anew(disk: Disk) -> None:
+    async def talking() -> None:
+        first = disk.documents()
+        new = first.new()
+        await first.save(new, "a.json", overwrite=False)
+        first.end()
+        documents = disk.documents()
+        key = "0123456789abcdef"
+        found = documents.attach(say.Attach(document=key, path="a.json"))
+        assert found.key == key
+        again = documents.attach(say.Attach(document="f" * 16, path="a.json"))
+        assert again is found
+        assert documents["f" * 16] is found
+        example = documents.attach(say.Attach(document="e" * 16, example="van_der_pol_pid"))
+        assert example.document.diagram.name == "van_der_pol_pid"
+        assert documents.attach(say.Attach(document="d" * 16)).document.diagram.blocks == {}
+        with pytest.raises(ArmblocksError, match="there is no such file"):
+            documents.attach(say.Attach(document="c" * 16, path="gone.json"))
+
+    going(talking)
+
+
+def test_a_file_newer_than_the_journal_is_kept_beside_what_was_drawn(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        documents.perform(found, change("1", add("gain")))
+        await documents.save(found, "a.json", overwrite=False)
+        documents.perform(found, change("2", add("mine")))
+        after_crash = disk.as_after_a_crash(tmp_path / "second")
+        theirs = after_crash.project.path("a.json")
+        theirs.write_bytes(theirs.read_bytes().replace(b'"gain"', b'"other"'))
+        newer = theirs.read_bytes()
+        after = after_crash.documents()
+        (recovery,) = after.recoveries()
+        assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
+        back = await after.recover(say.Recover(document=found.key, action="keep_both"))
+        assert back is not None
+        assert back.path is not None
+        assert back.path.startswith("a recovered 20")
+        assert theirs.read_bytes() == newer
+        assert sorted(back.document.diagram.blocks) == ["gain", "mine"]
+        assert not back.document.dirty
+        assert after.recoveries() == []
+
+    going(talking)
+
+
+def test_what_was_recovered_is_not_saved_over_a_newer_file(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        await documents.save(found, "a.json", overwrite=False)
+        documents.perform(found, change("2", add("mine")))
+        after_crash = disk.as_after_a_crash(tmp_path / "second")
+        after_crash.project.path("a.json").write_bytes(b"{}")
+        after = after_crash.documents()
+        back = await after.recover(say.Recover(document=found.key, action="open"))
+        assert back is not None
+        assert (back.disk, back.document.dirty) == ("changed", True)
+        with pytest.raises(ArmblocksError, match="the file has changed on the disk"):
+            await after.save(back, "", overwrite=False)
+
+    going(talking)
+
+
+def test_a_recovery_is_discarded_only_when_told_so(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        documents.perform(found, change("1", add("gain")))
+        second = disk.as_after_a_crash(tmp_path / "second")
+        second.documents().end()
+        after = second.documents()
+        assert len(after.recoveries()) == 1
+        assert await after.recover(say.Recover(document=found.key, action="discard")) is None
+        with pytest.raises(ArmblocksError, match="there is no drawing to recover named"):
+            await after.recover(say.Recover(document=found.key, action="open"))
+        assert second.documents().recoveries() == []
+
+    going(talking)
+
+
+def test_saved_drawings_leave_no_journal_behind(disk: Disk) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        documents.perform(found, change("1", add("gain")))
+        assert len(list(disk.kept.journals.iterdir())) == 1
+        with pytest.raises(InputError, match="'untitled' has edits that no file holds"):
+            documents.close(found, discard=False)
+        await documents.save(found, "a.json", overwrite=False)
+        documents.end()
+        assert list(disk.kept.journals.iterdir()) == []
+
+    going(talking)
+
+
+@pytest.mark.filterwarnings("ignore::armblocks.errors.InertiaWarning")
+def test_a_robot_that_is_gone_is_said_and_the_journal_kept(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        from armblocks.formats import write_robot
+
+        (disk.project.root / "arm.json").write_bytes(write_robot(load_robot("kr180")))
+
+        def resolve(name: str) -> Any:
+            return load_robot(str(disk.project.root / "arm.json") if name == "arm.json" else name)
+
+        documents = OpenDocuments(disk.project, disk.kept, resolve)
+        found = documents.new()
+        block = NewBlock(name="arm", type="Fkine", place=Place(x=0, y=0), parameters={"robot": "arm.json"})
+        documents.perform(found, change("1", add("gain")))
+        documents.perform(found, change("2", AddBlocks(blocks=[block])))
+        second = disk.as_after_a_crash(tmp_path / "second")
+        after = OpenDocuments(second.project, second.kept, lambda name: load_robot("no " + name))
+        (recovery,) = after.recoveries()
+        assert recovery.missing.startswith("the last 1 edits could not be repeated")
+        back = await after.recover(say.Recover(document=found.key, action="open"))
+        assert back is not None
+        assert list(back.document.diagram.blocks) == ["gain"]
+        assert back.document.dirty
+        assert [path.suffix for path in second.kept.journals.iterdir()] == [".unread"]
+
+    going(talking)
+
+
+def test_a_disk_that_refuses_the_journal_keeps_nobody_from_drawing(
+    disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        documents.perform(found, change("1", add("one")))
+
+        def refuse(*_: object) -> int:
+            raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "write", refuse)
+            documents.perform(found, change("2", add("two")))
+            assert not found.state().journaled
+        documents.perform(found, say.Undo(document="", key="3"))
+        documents.perform(found, say.Undo(document="", key="4"))
+        documents.perform(found, say.Redo(document="", key="5"))
+        assert found.state().journaled
+        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(say.Attach(document=found.key))
+        assert content(back) == content(found)
+
+    going(talking)

@@ -1,0 +1,203 @@
+"""Two pages on one document: no edit is lost without a word, and both pages end up with the same drawing."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from typing import Any
+
+import pytest
+
+from armblocks.diagram import Diagram
+from armblocks.errors import ArmblocksError, InputError
+from armblocks.formats import load_robot
+from armblocks.studio import messages as say
+from armblocks.studio.aspects import changed_aspects, clash
+from armblocks.studio.document import Document
+from armblocks.studio.edits import (
+    AddBlocks,
+    Connect,
+    Edit,
+    GroupBlocks,
+    MoveBlocks,
+    NewBlock,
+    Place,
+    RemoveBlocks,
+    Rename,
+    SetParameters,
+    Wire,
+)
+from armblocks.studio.sheet import sheet, sheet_change
+
+HERE = Place(x=0, y=0)
+
+
+def drawing() -> Document:
+    document = Document(Diagram(name="d", blocks={}), load_robot)
+    blocks = [NewBlock(name=f"b{k}", type="Gain", place=HERE) for k in range(4)]
+    document.edit(AddBlocks(blocks=blocks))
+    return document
+
+
+def change(author: str, base: int, edit: Edit, *inside: str) -> say.Change:
+    return say.Change(document="", author=author, base=base, edit=edit, inside=list(inside))
+
+
+def gain(block: str, value: float) -> SetParameters:
+    return SetParameters(block=block, values={"gain": value})
+
+
+CLASHES: list[tuple[Edit, Edit]] = [
+    (gain("b0", 2.0), gain("b0", 3.0)),
+    (gain("b0", 2.0), RemoveBlocks(blocks=["b0"])),
+    (gain("b0", 2.0), Rename(block="b0", name="other")),
+    (MoveBlocks(places={"b0": Place(x=9, y=0)}), MoveBlocks(places={"b0": Place(x=0, y=9)})),
+    (
+        Connect(wire=Wire(source="b0/y", target="b2/u")),
+        Connect(wire=Wire(source="b1/y", target="b2/u"), replace=True),
+    ),
+    (Connect(wire=Wire(source="b0/y", target="b2/u")), RemoveBlocks(blocks=["b0"])),
+    (gain("b0", 2.0), GroupBlocks(blocks=["b0", "b1"], name="S")),
+]
+PEACE: list[tuple[Edit, Edit]] = [
+    (gain("b0", 2.0), gain("b1", 3.0)),
+    (gain("b0", 2.0), MoveBlocks(places={"b0": Place(x=9, y=0)})),
+    (RemoveBlocks(blocks=["b0"]), gain("b1", 2.0)),
+    (Connect(wire=Wire(source="b0/y", target="b2/u")), Connect(wire=Wire(source="b0/y", target="b3/u"))),
+    (gain("b0", 2.0), gain("b0", 2.0)),
+    (gain("b0", 2.0), AddBlocks(blocks=[NewBlock(name="new", type="Gain", place=HERE)])),
+]
+
+
+@pytest.mark.parametrize(("theirs", "mine"), CLASHES)
+def test_an_edit_of_what_another_page_changed_is_refused(theirs: Edit, mine: Edit) -> None:
+    document = drawing()
+    base = document.version
+    document.perform(change("other", base, theirs))
+    before = document.diagram
+    with pytest.raises(
+        InputError,
+        match=r"what you changed was changed in another page meanwhile.*an edit of what this page showed"
+        r".*look at what is there now, and do it again if you still want to",
+    ):
+        document.perform(change("me", base, mine))
+    assert document.diagram is before
+    document.perform(change("me", document.version, mine))  # having seen it, one may
+
+
+@pytest.mark.parametrize(("theirs", "mine"), PEACE)
+def test_edits_of_different_things_are_both_carried_out(theirs: Edit, mine: Edit) -> None:
+    document, other_order = drawing(), drawing()
+    base = document.version
+    document.perform(change("other", base, theirs))
+    document.perform(change("me", base, mine))
+    other_order.perform(change("me", base, mine))
+    other_order.perform(change("other", base, theirs))
+    assert document.diagram == other_order.diagram
+
+
+def test_what_is_inside_a_subsystem_is_looked_at_too() -> None:
+    document = drawing()
+    document.edit(GroupBlocks(blocks=["b0", "b1"], name="S"))
+    base = document.version
+    document.perform(change("other", base, gain("b0", 2.0), "S"))
+    document.perform(change("me", base, gain("b1", 2.0), "S"))
+    with pytest.raises(InputError, match="what you changed was changed in another page"):
+        document.perform(change("me", base, gain("b0", 3.0), "S"))
+    with pytest.raises(InputError, match="what you changed was changed in another page"):
+        document.perform(change("me", base, RemoveBlocks(blocks=["S"])))
+
+
+def test_a_page_does_not_clash_with_its_own_edits_that_are_under_way() -> None:
+    document = drawing()
+    base = document.version
+    for value in (2.0, 3.0, 4.0):
+        document.perform(change("me", base, gain("b0", value)))
+    assert document.diagram.blocks["b0"].parameter_value("gain") == 4.0
+
+
+def test_undo_takes_back_what_the_page_saw_and_nothing_else() -> None:
+    document = drawing()
+    base = document.version
+    document.perform(change("other", base, gain("b0", 2.0)))
+    for undo in (say.Undo, say.Redo):
+        with pytest.raises(InputError, match="the drawing was changed in another page meanwhile"):
+            document.perform(undo(document="", author="me", base=base))
+    document.perform(say.Undo(document="", author="me", base=document.version))
+    assert document.diagram.blocks["b0"].parameter_value("gain") == 1.0
+
+
+@pytest.mark.parametrize("base", [-1, 10_000])
+def test_a_version_that_nobody_knows_is_refused(base: int) -> None:
+    with pytest.raises(InputError, match="the page shows a version of the drawing that is long past"):
+        drawing().perform(change("me", base, gain("b0", 2.0)))
+
+
+class Page:
+    """What a page knows: the sheet that it was told of, some messages late."""
+
+    def __init__(self, name: str, document: Document) -> None:
+        self.name = name
+        self.version = document.version
+        self.blocks: dict[str, Any] = dict(sheet(document.diagram).blocks)
+        self.wires = set(sheet(document.diagram).wires)
+        self.coming: deque[tuple[int, say.SheetChange]] = deque()
+
+    def hear(self) -> None:
+        """Take the next message in."""
+        self.version, told = self.coming.popleft()
+        for name, block in told.blocks.items():
+            if block is None:
+                self.blocks.pop(name, None)
+            else:
+                self.blocks[name] = block
+        self.wires = (self.wires - set(told.wires_removed)) | set(told.wires_added)
+
+
+def random_edit(random_: random.Random, page: Page) -> Edit:
+    """Something that a person does to what the page shows."""
+    names = sorted(page.blocks) or ["b0"]
+    block, other = random_.choice(names), random_.choice(names)
+    return random_.choice(
+        [
+            gain(block, random_.random()),
+            gain(block, random_.random()),
+            MoveBlocks(places={block: Place(x=random_.random(), y=0)}),
+            RemoveBlocks(blocks=[block]),
+            AddBlocks(blocks=[NewBlock(name=f"b{random_.randrange(6)}", type="Gain", place=HERE)]),
+            Connect(wire=Wire(source=f"{block}/y", target=f"{other}/u"), replace=True),
+        ]
+    )
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_whatever_two_pages_do_nothing_unseen_is_overwritten_and_both_agree(seed: int) -> None:
+    """200 turns each: 10 000 interleavings. An edit that was carried out and is not there any more was undone
+    by somebody who had seen it."""
+    random_ = random.Random(seed)
+    document = drawing()
+    pages = [Page("one", document), Page("two", document)]
+    done: list[tuple[int, str, set[tuple[str, ...]]]] = []
+    for _ in range(200):
+        page = random_.choice(pages)
+        if page.coming and random_.random() < 0.6:
+            page.hear()
+            continue
+        before = document.diagram
+        try:
+            document.perform(change(page.name, page.version, random_edit(random_, page)))
+        except ArmblocksError:
+            assert document.diagram is before
+            continue
+        touched = changed_aspects(before, document.diagram)
+        for version, author, theirs in done:
+            if author != page.name and version > page.version:
+                assert not clash(touched, theirs), "an edit that the page had not seen was overwritten"
+        done.append((document.version, page.name, touched))
+        for listener in pages:
+            listener.coming.append((document.version, sheet_change(before, document.diagram)))
+    for page in pages:
+        while page.coming:
+            page.hear()
+    assert pages[0].blocks == pages[1].blocks == sheet(document.diagram).blocks
+    assert pages[0].wires == pages[1].wires == set(sheet(document.diagram).wires)
