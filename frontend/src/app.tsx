@@ -12,6 +12,7 @@ import { Configuration } from './run/configuration'
 import { Timeline } from './run/timeline'
 import { TunePanel } from './run/tune_panel'
 import { Shortcuts } from './shortcuts'
+import { SignalInspector } from './scopes/inspector'
 import { Scopes } from './scopes/scopes'
 
 const RobotView = lazy(() => import('./robot/robot_view'))
@@ -21,6 +22,7 @@ const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
   canvas: Canvas,
   scopes: Scopes,
   tune: TunePanel,
+  signals: SignalInspector,
   robot: () => (
     <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
       <RobotView />
@@ -48,7 +50,7 @@ function arrange({ api }: DockviewReadyEvent): void {
     component: 'robot',
     title: 'Robot',
     position: { referencePanel: 'canvas', direction: 'right' },
-    initialWidth: Math.min(420, 0.28 * innerWidth),
+    initialWidth: Math.min(640, 0.28 * innerWidth),
   })
   api.addPanel({ id: 'tune', component: 'tune', title: 'Tune', position: { referencePanel: 'robot' }, inactive: true })
   api.addPanel({
@@ -56,8 +58,9 @@ function arrange({ api }: DockviewReadyEvent): void {
     component: 'scopes',
     title: 'Scopes',
     position: { referencePanel: 'canvas', direction: 'below' },
-    initialHeight: Math.min(300, 0.34 * innerHeight),
+    initialHeight: Math.min(460, 0.34 * innerHeight),
   })
+  api.addPanel({ id: 'signals', component: 'signals', title: 'Signals', position: { referencePanel: 'scopes' }, inactive: true })
 }
 
 export function App() {

@@ -101,6 +101,7 @@ export interface Change {
     | Rename
     | SetParameters
     | KeepTuned
+    | LogSignal
     | GroupBlocks
     | SetSettings
     | Describe;
@@ -192,6 +193,14 @@ export interface KeepTuned {
   values: {
     [k: string]: unknown;
   };
+}
+/**
+ * Log an output ``block/port``, so that it is seen without a Scope; or log it no longer.
+ */
+export interface LogSignal {
+  kind: "log";
+  port: string;
+  logged: boolean;
 }
 /**
  * Put blocks into a subsystem of their own; its ports are the wires that are cut thereby.
@@ -730,6 +739,7 @@ export interface Sheet {
   settings: {
     [k: string]: number | string | null;
   };
+  logged: string[];
 }
 /**
  * A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes.
@@ -784,6 +794,7 @@ export interface SheetChange {
   settings?: {
     [k: string]: number | string | null;
   } | null;
+  logged?: string[] | null;
 }
 /**
  * What the background check found in one version of a document; ``wires`` by source port.

@@ -78,6 +78,12 @@ export class RunSamples {
     this.data = this.data.map((column) => column.slice(0, this.count))
   }
 
+  /** What people call a signal: its block where that has no other output. */
+  title(name: string): string {
+    const block = name.slice(0, name.lastIndexOf('/'))
+    return this.aliases[block] === name ? block : name
+  }
+
   /** Names of all signals, as they were recorded. */
   get names(): string[] {
     return [...this.columns.keys()]

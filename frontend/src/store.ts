@@ -32,6 +32,7 @@ export interface OpenDocument {
   blocks: Record<string, SheetBlock>
   wires: Wire[]
   settings: Sheet['settings']
+  logged: string[]
   findings: Finding[]
   wireKinds: Record<string, WireKind>
 }
@@ -110,6 +111,7 @@ function changed(document: OpenDocument, event: EventOf<'changed'>): OpenDocumen
     wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...change.wires_added],
     description: change.description ?? document.description,
     settings: change.settings ?? document.settings,
+    logged: change.logged ?? document.logged,
   }
 }
 

@@ -7,16 +7,18 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram
-from armblocks.errors import ArmblocksError
-from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
+from armblocks.diagram import Diagram, diagram_views
+from armblocks.errors import ArmblocksError, FormatError
+from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
 from armblocks.studio.document import Document
 from armblocks.studio.edits import (
     AddBlocks,
     Connect,
     Describe,
     Edit,
+    GroupBlocks,
     KeepTuned,
+    LogSignal,
     MoveBlocks,
     NewBlock,
     Place,
@@ -41,9 +43,7 @@ values = st.sampled_from(
     [2.0, "2*pi", "[1 2 3]", "inf", "import os", "++-", "", None, [1.0], True, "puma560"]
 )
 parameters = st.dictionaries(st.sampled_from(["gain", "signs", "inputs", "nothing"]), values, max_size=2)
-blocks = st.builds(
-    NewBlock, name=names, type=st.sampled_from(TYPES), parameters=st.just({}) | parameters, place=places
-)
+blocks = st.builds(NewBlock, name=names, type=st.sampled_from(TYPES), parameters=parameters, place=places)
 edits: st.SearchStrategy[Edit] = st.one_of(
     st.builds(AddBlocks, blocks=st.lists(blocks, max_size=2), wires=st.lists(wires, max_size=1)),
     st.builds(RemoveBlocks, blocks=st.lists(names, max_size=2), wires=st.lists(wires, max_size=1)),
@@ -55,6 +55,7 @@ edits: st.SearchStrategy[Edit] = st.one_of(
         SetSettings, values=st.dictionaries(st.sampled_from(["stop_time", "step", "x"]), numbers, max_size=1)
     ),
     st.builds(KeepTuned, values=st.dictionaries(st.sampled_from(["gain.gain", "x.y"]), values, max_size=2)),
+    st.builds(LogSignal, port=ports, logged=st.booleans()),
     st.builds(Describe, text=st.text(max_size=5)),
 )
 
@@ -171,3 +172,33 @@ def test_tuned_values_of_several_blocks_are_kept_in_one_step() -> None:
     assert document.diagram.block("PID").parameter_value("I") == 0.25
     document.undo()
     assert content(document) == before
+
+
+def test_a_logged_signal_follows_its_block_and_goes_with_it() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    before = content(document)
+    document.edit(LogSignal(port="PID/y", logged=True))
+    document.edit(Rename(block="PID", name="controller"))
+    assert [str(ref) for ref in document.diagram.logged] == ["controller/y"]
+    again = diagram_from_bytes(content(document), "again", BLOCKS, load_robot)
+    assert again.logged == document.diagram.logged
+    name, view = diagram_views(again)[-1]
+    assert (name, view.signals, view.title) == ("controller", ("y",), "controller/y")
+    document.edit(GroupBlocks(blocks=["controller"], name="inner"))
+    name, view = diagram_views(document.diagram)[-1]
+    assert (name, view.title) == ("inner/controller", "inner/controller/y")
+    document.undo()
+    document.edit(RemoveBlocks(blocks=["controller"]))
+    assert document.diagram.logged == ()
+    for _ in range(3):
+        document.undo()
+    assert content(document) == before
+    with pytest.raises(ArmblocksError, match="output port"):
+        document.edit(LogSignal(port="PID/nothing", logged=True))
+    document.edit(LogSignal(port="PID/y", logged=True))
+    document.edit(LogSignal(port="PID/y", logged=False))
+    assert document.undo_title == "stop logging PID/y"
+    assert content(document) == before
+    wrong = before.replace(b'"connections":', b'"logged": ["PID"], "connections":')
+    with pytest.raises(FormatError, match="'PID' is no output"):
+        diagram_from_bytes(wrong, "wrong", BLOCKS, load_robot)

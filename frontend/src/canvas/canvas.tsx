@@ -16,6 +16,7 @@ import type { Place, SheetBlock } from '../protocol'
 import { change, freeName, look, useStudio } from '../store'
 import { BlockNode, type BlockNodeType } from './block_node'
 import { openQuickInsert } from '../library/quick_insert'
+import { WireValues } from '../run/wire_values'
 import { openShortcuts } from '../shortcuts'
 import { openConnectDialog } from './connect_dialog'
 import { copy, cut, duplicate, paste } from './clipboard'
@@ -274,6 +275,7 @@ function Sheet() {
       >
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
         <Controls showInteractive={false} />
+        <WireValues />
         {Object.keys(blocks).length > 40 && <MiniMap pannable zoomable />}
       </ReactFlow>
       {empty && (

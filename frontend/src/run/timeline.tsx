@@ -1,6 +1,7 @@
 import { ActionIcon, Button, NativeSelect, Slider, Text, Tooltip } from '@mantine/core'
-import { IconPlayerPauseFilled, IconPlayerPlayFilled, IconRepeat } from '@tabler/icons-react'
+import { IconPlayerPauseFilled, IconPlayerPlayFilled, IconRepeat, IconTag } from '@tabler/icons-react'
 import { ask, useStudio } from '../store'
+import { useValues } from './wire_values'
 import { hold, play, shownTime, stepCursor, useCursor } from './cursor'
 
 const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} ×` }))
@@ -10,6 +11,7 @@ const LONG_STEP = 10
 export function Timeline() {
   const run = useStudio((s) => s.run)
   const { time, playing, loop, rate } = useCursor()
+  const all = useValues((s) => s.all)
   const stop = run?.stopTime ?? 10
   const at = time ?? run?.time ?? 0
   const label = playing ? 'Hold the playback' : 'Play the run'
@@ -58,6 +60,11 @@ export function Timeline() {
           </Button>
         </Tooltip>
       )}
+      <Tooltip label="Values on all wires" openDelay={400}>
+        <ActionIcon variant={all ? 'light' : 'subtle'} color={all ? 'accent' : 'gray'} aria-label="Values on all wires" aria-pressed={all} onClick={() => useValues.setState({ all: !all })}>
+          <IconTag size={15} />
+        </ActionIcon>
+      </Tooltip>
       <Text size="sm" className="numbers instant">
         {(run ? shownTime() : 0).toFixed(3)} s
       </Text>

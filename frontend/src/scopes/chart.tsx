@@ -13,6 +13,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
   const handle = useRef<PlotHandle>(null)
+  const names = shortened(traces.map(({ label }) => label))
   const figure = () => handle.current?.figure()
   const toggle = (key: string) =>
     setHidden((now) => {
@@ -26,12 +27,12 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
         <b>{title}</b>
         <span className="legend">
           {!path &&
-            traces.map(({ key, label, tone, dash }) => (
+            traces.map(({ key, label, tone, dash }, k) => (
               <button key={key} type="button" aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
                 <svg width="16" height="4" aria-hidden>
                   <line x1="0" x2="16" y1="2" y2="2" stroke={`var(--${tone})`} strokeWidth="2.5" strokeDasharray={dash.join(' ')} />
                 </svg>
-                {label}
+                {names[k]}
               </button>
             ))}
         </span>
@@ -54,4 +55,11 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
       </div>
     </figure>
   )
+}
+
+/** The elements of one signal by their numbers alone, the first with the name of the signal. */
+function shortened(labels: string[]): string[] {
+  const stem = labels[0]?.match(/^(.*) 1$/)?.[1]
+  if (!stem || labels.length < 2 || !labels.every((label, k) => label === `${stem} ${k + 1}`)) return labels
+  return labels.map((label, k) => (k ? String(k + 1) : label))
 }

@@ -12,7 +12,7 @@ export interface Trace {
   read: () => { time: Float64Array; values: Float64Array } | undefined
 }
 
-const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]]
+export const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]]
 export const MOST_TRACES = 32
 
 /**
@@ -26,7 +26,7 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
     .flatMap(({ path, label }) => {
       const found = samples.signal(path)
       if (!found) return []
-      const name = label || found.channel.name
+      const name = label || samples.title(found.channel.name)
       return found.columns.map((_, element): Trace => {
         const single = found.columns.length === 1
         const tone = `trace-${(single ? scalars++ : element) % 8}`

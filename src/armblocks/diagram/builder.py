@@ -86,6 +86,7 @@ class DiagramBuilder:
         self._taken: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
         self._layout: dict[str, Placement] = {}
+        self._logged: dict[PortRef, None] = {}
         self._mask: list[Parameter] = []
         self._mask_values: dict[str, Value] = {}
         self._outer: dict[str, ParameterFormula] = {}
@@ -201,6 +202,14 @@ class DiagramBuilder:
         self._known(name)
         self._layout[name] = Placement(x=x, y=y, width=width, height=height, flipped=flipped)
 
+    def log(self, source: Source) -> None:
+        """Have an output seen without a Scope: reports and the studio show its traces.
+
+        Raises ``UnknownNameError`` and ``DiagramError``.
+        """
+        ref = self._resolve(source, output=True)
+        self._logged[ref] = None
+
     def build(self) -> Diagram:
         """The frozen diagram, after all checks of :func:`armblocks.diagram.check.check_diagram`."""
         diagram = self.draft()
@@ -217,6 +226,7 @@ class DiagramBuilder:
             settings=self.settings,
             extras=self._extras,
             description=self.description,
+            logged=tuple(self._logged),
             mask=tuple(self._mask),
             mask_values=self._mask_values,
         )

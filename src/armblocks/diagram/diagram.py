@@ -84,6 +84,8 @@ class Diagram:
     extras: Mapping[str, object] = field(default_factory=dict[str, object])
     description: str = ""
     """One line for people: what the diagram shows."""
+    logged: tuple[PortRef, ...] = ()
+    """Outputs of these blocks that are to be seen without a Scope: each gets a view of its own."""
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
     """Of a flat diagram, by block: see :mod:`armblocks.diagram.conditional_equations`."""
     mask: tuple[Parameter, ...] = ()
@@ -107,6 +109,7 @@ class Diagram:
             ordered = dict(sorted(getattr(self, name).items()))
             object.__setattr__(self, name, MappingProxyType(ordered))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))
+        object.__setattr__(self, "logged", tuple(sorted(self.logged)))
 
     def with_mask_values(self, values: Mapping[str, object]) -> Diagram:
         """A copy in which some parameters of the mask have other values, and what follows from them.

@@ -8,7 +8,7 @@ virtual blocks is its own flat form.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from armblocks.diagram.block import Block
@@ -25,7 +25,7 @@ from armblocks.diagram.conditional import (
 from armblocks.diagram.conditional_equations import ELAPSED, FIRE, ON, RESTART
 from armblocks.diagram.controls import EnableControl, HeldOutput, MergedOutput, TriggerControl
 from armblocks.diagram.diagram import Connection, Diagram, Gate
-from armblocks.diagram.port import PortRef, View
+from armblocks.diagram.port import PortRef, View, ViewKind
 from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem, stated_shape
 from armblocks.diagram.virtual_wiring import (
     BusAssignment,
@@ -88,11 +88,24 @@ def flat_diagram(diagram: Diagram) -> Diagram:
 
 
 def diagram_views(diagram: Diagram) -> tuple[tuple[str, View], ...]:
-    """Every picture that a diagram and its subsystems ask for, with the path of the block that asks."""
+    """Every picture that a diagram and its subsystems ask for, with the path of the block that asks.
+
+    Logged outputs come last: each is a picture of traces, named after the output.
+    """
     form = flatten_hierarchy(diagram)
-    if form.diagram is not diagram:
-        return form.views
-    return tuple((name, view) for name, block in diagram.blocks.items() for view in block.views())
+    views = form.views
+    if form.diagram is diagram:
+        views = tuple((name, view) for name, block in diagram.blocks.items() for view in block.views())
+    return (*views, *_logged_views(diagram))
+
+
+def _logged_views(diagram: Diagram, path: str = "") -> Iterator[tuple[str, View]]:
+    for ref in diagram.logged:
+        place = joined(path, ref.block)
+        yield place, View(kind=ViewKind.TRACES, signals=(ref.port,), title=f"{place}/{ref.port}")
+    for name, block in diagram.blocks.items():
+        if isinstance(block, Subsystem):
+            yield from _logged_views(block.diagram, joined(path, name))
 
 
 def _flat_form(diagram: Diagram) -> FlatForm:

@@ -67,7 +67,7 @@ MOST_BYTES = 16 * 2**20
 DEEPEST = 320
 """Objects and arrays inside each other: a hundred subsystems, and what stands in the innermost."""
 
-_INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "layout", "settings")
+_INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "logged", "layout", "settings")
 _DOCUMENT_KEYS = ("format", *_INNER_KEYS, "parameters", "robots")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
@@ -156,6 +156,7 @@ class _Writer:
                 for key, block in diagram.blocks.items()
             },
             "connections": [str(wire) for wire in diagram.connections],
+            **({"logged": [str(ref) for ref in diagram.logged]} if diagram.logged else {}),
             "layout": layout,
             "settings": {**extras.get("settings", {}), **settings},
         }
@@ -280,6 +281,9 @@ class _Reader:
             source, target = _wire(entry)
             with _located(entry):
                 builder.connect(source, target)
+        for entry in members["logged"].elements() if "logged" in members else []:
+            with _located(entry):
+                builder.log(_port(entry))
         for key, place in placements.items():
             builder.place(
                 key, place.x, place.y, width=place.width, height=place.height, flipped=place.flipped
@@ -409,6 +413,13 @@ def _wire(node: Node) -> tuple[PortRef, PortRef]:
     if found is None:
         raise node.error(f"'{node.text()[:80]}' is no connection", allowed='"block/output -> block/input"')
     return PortRef(found[1], found[2]), PortRef(found[3], found[4])
+
+
+def _port(node: Node) -> PortRef:
+    block, _, port = node.text().rpartition("/")
+    if not block or not port:
+        raise node.error(f"'{node.text()[:80]}' is no output", allowed='"block/output"')
+    return PortRef(block, port)
 
 
 def _layout(node: Node, blocks: set[str], extras: Extras) -> dict[str, Placement]:

@@ -49,6 +49,7 @@ def diagram_to_python(diagram: Diagram) -> str:
     added: set[str] = set()
     late = _late(diagram, order)
     used = {wire.source.block for wire in diagram.connections} | {wire.target.block for wire in late}
+    used |= {ref.block for ref in diagram.logged}
     for name in order:
         block = diagram.blocks[name]
         arguments = [_text(name), _construction(block, shown), *_sources(diagram, name, added, names)]
@@ -58,6 +59,7 @@ def diagram_to_python(diagram: Diagram) -> str:
     for wire in late:
         source = _end(diagram, wire.source, names)
         lines.append(f'builder.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
+    lines += [f"builder.log({_end(diagram, ref, names)})" for ref in diagram.logged]
     lines += ["diagram = builder.build()", "", f"result = ab.simulate({', '.join(_settings(diagram))})"]
     return "\n".join(lines) + "\n"
 

@@ -78,7 +78,7 @@ def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGU
     for block, view in diagram_views(diagram):
         if view.kind is ViewKind.TRACES:
             yield Figure(
-                name=f"scope-{file_name(block)}",
+                name=f"scope-{file_name(view.title or block)}",
                 section="scopes",
                 caption=view.title or block,
                 picture=_scope(diagram, block, view, result, width),

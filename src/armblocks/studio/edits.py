@@ -117,6 +117,14 @@ class SetParameters(Message):
     values: dict[str, Any]
 
 
+class LogSignal(Message):
+    """Log an output ``block/port``, so that it is seen without a Scope; or log it no longer."""
+
+    kind: Literal["log"] = "log"
+    port: str
+    logged: bool
+
+
 class KeepTuned(Message):
     """Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them."""
 
@@ -154,6 +162,7 @@ Edit = Annotated[
     | Rename
     | SetParameters
     | KeepTuned
+    | LogSignal
     | GroupBlocks
     | SetSettings
     | Describe,
@@ -184,6 +193,8 @@ def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagra
             return with_parameters(
                 diagram, {path: tuned_value(value, path) for path, value in edit.values.items()}
             )
+        case LogSignal():
+            return _log(edit, diagram)
         case GroupBlocks():
             return grouped(edit.blocks, edit.name, diagram)
         case SetSettings():
@@ -209,6 +220,8 @@ def summary(edit: Edit) -> str:
             return f"change {edit.block}"
         case KeepTuned():
             return f"keep {_counted(len(edit.values), 'tuned value')}"
+        case LogSignal():
+            return f"{'log' if edit.logged else 'stop logging'} {edit.port}"
         case GroupBlocks():
             return f"group {_counted(len(edit.blocks), 'block')}"
         case SetSettings():
@@ -292,7 +305,15 @@ def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
             for wire in diagram.connections
             if wire not in cut and wire.source.block not in gone and wire.target.block not in gone
         ),
+        logged=tuple(ref for ref in diagram.logged if ref.block not in gone),
     )
+
+
+def _log(edit: LogSignal, diagram: Diagram) -> Diagram:
+    ref = _port(edit.port)
+    _check_port(ref, diagram, output=True)
+    others = tuple(other for other in diagram.logged if other != ref)
+    return dataclasses.replace(diagram, logged=(*others, ref) if edit.logged else others)
 
 
 def _connect(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
@@ -359,6 +380,7 @@ def _rename(edit: Rename, diagram: Diagram) -> Diagram:
         blocks={renamed(name): block for name, block in diagram.blocks.items()},
         layout={renamed(name): place for name, place in diagram.layout.items()},
         connections=tuple(Connection(moved(wire.source), moved(wire.target)) for wire in diagram.connections),
+        logged=tuple(moved(ref) for ref in diagram.logged),
     )
 
 

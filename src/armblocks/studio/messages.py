@@ -56,6 +56,8 @@ class Sheet(Message):
     blocks: dict[str, SheetBlock]
     wires: list[Wire]
     settings: dict[str, float | str | None]
+    logged: list[str]
+    """Outputs, ``block/port``, that are seen without a Scope."""
 
 
 class SheetChange(Message):
@@ -67,6 +69,7 @@ class SheetChange(Message):
     wires_removed: list[Wire]
     description: str | None = None
     settings: dict[str, float | str | None] | None = None
+    logged: list[str] | None = None
 
 
 class Finding(Message):

@@ -53,6 +53,7 @@ def with_block(diagram: Diagram, name: str, block: Block) -> Diagram:
             if (wire.source.block != name or wire.source.port in out)
             and (wire.target.block != name or wire.target.port in into)
         ),
+        logged=tuple(ref for ref in diagram.logged if ref.block != name or ref.port in out),
     )
 
 
@@ -123,6 +124,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         },
         connections=(*inner_wires, *(Connection(port, PortRef(key, "u")) for port, key in outs.items())),
         layout=_inner_layout(diagram, list(group), list(ins.values()), list(outs.values())),
+        logged=tuple(ref for ref in diagram.logged if ref.block in group),
     )
     outer_wires = [
         wire if wire.source.block not in group else Connection(PortRef(name, outs[wire.source]), wire.target)
@@ -140,6 +142,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         blocks={k: b for k, b in diagram.blocks.items() if k not in group} | {name: Subsystem(diagram=inner)},
         connections=tuple(outer_wires),
         layout={k: p for k, p in diagram.layout.items() if k not in group} | {name: middle},
+        logged=tuple(ref for ref in diagram.logged if ref.block not in group),
     )
 
 

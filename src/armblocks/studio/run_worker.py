@@ -97,6 +97,8 @@ class _Run:
         for path, value in self.tuned.items():
             history.tune(path, tuned_value(value, path))
         self._tell_start(history.run)
+        self.began = perf_counter()
+        self.paced_from = (0.0, self.began)
         while True:
             self._advance(history)
             self._send_samples(history)

@@ -45,6 +45,7 @@ def sheet(diagram: Diagram) -> Sheet:
         blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
         wires=[_wire(wire) for wire in diagram.connections],
         settings=_settings(diagram.settings),
+        logged=[str(ref) for ref in diagram.logged],
     )
 
 
@@ -63,6 +64,7 @@ def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
         wires_removed=[_wire(wire) for wire in sorted(old - new)],
         description=after.description if after.description != before.description else None,
         settings=_settings(after.settings) if after.settings != before.settings else None,
+        logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
     )
 
 

@@ -1,0 +1,154 @@
+import { ActionIcon, Tooltip } from '@mantine/core'
+import { IconAntennaBars5, IconPinned, IconPinnedOff } from '@tabler/icons-react'
+import { useEdges, useStore, ViewportPortal } from '@xyflow/react'
+import { useEffect, useRef, useState } from 'react'
+import { create } from 'zustand'
+import type { Point } from '../canvas/router'
+import type { WireEdgeType } from '../canvas/wire_edge'
+import type { PortSpot, SheetBlock } from '../protocol'
+import { samples } from '../samples'
+import { digits, reading, useUnits } from '../scopes/quantity'
+import { change, useStudio } from '../store'
+import { shownTime } from './cursor'
+
+interface Shown {
+  /** Values of all outputs. */
+  all: boolean
+  /** Outputs, `block/port` with the path of their sheet, whose values stay on the sheet. */
+  pinned: ReadonlySet<string>
+}
+
+/** Which values stand on the wires; a wire under the pointer shows its own anyway. */
+export const useValues = create<Shown>(() => ({ all: false, pinned: new Set() }))
+
+const MOST_ELEMENTS = 4
+
+/** What a signal is at an instant, as people read it. */
+export function valueAtInstant(path: string, time: number): string {
+  const found = samples.signal(path)
+  const index = samples.indexAt(time)
+  if (!found || index < 0) return ''
+  const { channel, columns } = found
+  if (channel.shape.length > 1) return channel.shape.join(' × ')
+  const values = columns.slice(0, MOST_ELEMENTS).map((column) => column[index] ?? NaN)
+  const { factor, unit } = reading(channel.unit, Math.max(...values.map(Math.abs)))
+  const shown = values.map((value) => digits(value * factor)).join(', ')
+  const more = columns.length > MOST_ELEMENTS ? ', …' : ''
+  return `${columns.length > 1 ? `[${shown}${more}]` : shown}${unit && ` ${unit}`}`
+}
+
+function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; spot: PortSpot }[] {
+  return Object.values(blocks).flatMap((block) => block.outputs.map((spot) => ({ ref: `${block.name}/${spot.name}`, block, spot })))
+}
+
+/** Values on the wires, marks of what is logged, and what can be done with the selected wire: on the sheet itself. */
+export function WireValues() {
+  const blocks = useStudio((s) => s.document!.blocks)
+  const logged = useStudio((s) => s.document!.logged)
+  const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
+  const views = useStudio((s) => s.run?.views)
+  const ran = useStudio((s) => s.run !== null)
+  const { all, pinned } = useValues()
+  const edges = useEdges<WireEdgeType>()
+  const zoom = useStore((s) => s.transform[2])
+  const layer = useRef<HTMLDivElement>(null)
+  const [hovered, setHovered] = useState('')
+  useEffect(() => {
+    const sheet = layer.current?.closest('.react-flow')
+    if (!sheet) return
+    const over = ({ target }: Event) => {
+      const id = (target as Element).closest('.react-flow__edge')?.getAttribute('data-id')
+      setHovered(id ? id.slice(0, id.indexOf(' -> ')) : '')
+    }
+    sheet.addEventListener('pointerover', over)
+    return () => sheet.removeEventListener('pointerover', over)
+  }, [])
+  useWriting(layer)
+  const found = outputs(blocks)
+  const shown = ran ? found.filter(({ ref }) => all || ref === hovered || pinned.has(level + ref)) : []
+  const displays = (views ?? []).filter(({ kind, block }) => kind === 'value' && block.startsWith(level) && blocks[block.slice(level.length)])
+  const chosen = edges.filter(({ selected }) => selected)
+  return (
+    <ViewportPortal>
+      <div ref={layer} className="wire-values" style={{ '--legible': Math.min(Math.max(1 / zoom, 1), 2.5) } as React.CSSProperties}>
+        {shown.map(({ ref, block, spot }) => (
+          <span key={ref} className="wire-value numbers" data-path={level + ref} style={{ transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -6 : 6)}px, ${block.place.y + spot.y - 4}px) scale(var(--legible)) translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)` }} />
+        ))}
+        {displays.flatMap(({ block: path, signals }) => {
+          const block = blocks[path.slice(level.length)]!
+          return block.inputs
+            .filter(({ name }) => signals.includes(name))
+            .map((spot) => (
+              <span key={`${path}/${spot.name}`} className="display-value numbers" data-path={`${path}/${spot.name}`} style={{ width: block.width - 12, transform: `translate(${block.place.x + 6}px, ${block.place.y + spot.y}px) translateY(-50%)` }} />
+            ))
+        })}
+        {found
+          .filter(({ ref }) => logged.includes(ref))
+          .map(({ ref, block, spot }) => (
+            <span key={ref} className="logged-badge" title={`${ref} is logged`} style={{ transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -16 : 4)}px, ${block.place.y + spot.y + 3}px) scale(var(--legible))` }}>
+              <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
+            </span>
+          ))}
+        {chosen.length === 1 && <WireTools edge={chosen[0]!} level={level} logged={logged} pinned={pinned} />}
+      </div>
+    </ViewportPortal>
+  )
+}
+
+/** Write the values of the instant into their places, on animation frames and past React. */
+function useWriting(layer: React.RefObject<HTMLDivElement | null>): void {
+  useEffect(() => {
+    let handle = 0
+    const frame = () => {
+      handle = requestAnimationFrame(frame)
+      const time = shownTime()
+      layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((place) => {
+        const now = `${samples.version} ${time} ${place.dataset['path']} ${useUnits.getState().radians}`
+        if (place.dataset['seen'] === now) return
+        place.dataset['seen'] = now
+        place.textContent = valueAtInstant(place.dataset['path'] ?? '', time)
+      })
+    }
+    frame()
+    return () => cancelAnimationFrame(handle)
+  }, [layer])
+}
+
+function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level: string; logged: string[]; pinned: ReadonlySet<string> }) {
+  const ref = `${edge.source}/${edge.sourceHandle}`
+  const path = edge.data?.path ?? []
+  const longest = path.slice(1).reduce((best, _, k) => (length(path, k) > length(path, best) ? k : best), 0)
+  const [from, to] = [path[longest], path[longest + 1]]
+  if (!from || !to) return null
+  const isLogged = logged.includes(ref)
+  const isPinned = pinned.has(level + ref)
+  return (
+    <div className="wire-tools nodrag nopan" role="toolbar" aria-label={`Wire from ${ref}`} style={{ transform: `translate(${(from[0] + to[0]) / 2}px, ${(from[1] + to[1]) / 2 - 6}px) scale(var(--legible)) translate(-50%, -100%)` }}>
+      <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal: it gets a scope of its own'}>
+        <ActionIcon size="sm" variant={isLogged ? 'light' : 'subtle'} color={isLogged ? 'accent' : 'gray'} aria-label={isLogged ? 'Stop logging' : 'Log'} aria-pressed={isLogged} onClick={() => void change({ kind: 'log', port: ref, logged: !isLogged })}>
+          <IconAntennaBars5 size={15} />
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label={isPinned ? 'Take the value off the sheet' : 'Keep the value on the sheet'}>
+        <ActionIcon
+          size="sm"
+          variant={isPinned ? 'light' : 'subtle'}
+          color={isPinned ? 'accent' : 'gray'}
+          aria-label={isPinned ? 'Unpin the value' : 'Pin the value'}
+          aria-pressed={isPinned}
+          onClick={() =>
+            useValues.setState((s) => {
+              const next = new Set(s.pinned)
+              if (!next.delete(level + ref)) next.add(level + ref)
+              return { pinned: next }
+            })
+          }
+        >
+          {isPinned ? <IconPinnedOff size={15} /> : <IconPinned size={15} />}
+        </ActionIcon>
+      </Tooltip>
+    </div>
+  )
+}
+
+const length = (path: Point[], k: number) => (path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0)
