@@ -26,7 +26,8 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
     which ones fire and whether upwards; it gives their count. ``void take_signs(ptr reals, i1 only_fired)``
     notes the sides on which guards are. ``double note_events(double t, ptr reals, ptr counts)`` counts those
     that fired and gives a bound for the next step, negative where there are too many events. ``i64 dips(ptr
-    reals)`` counts the guards that may have been at zero between their three last values.
+    reals, double half)`` counts the guards that may have been at zero between their three last values, which
+    are ``half`` apart, and ``note_slopes`` keeps how fast they change at the last of them.
     """
     if sizes.algebraic:
         emit_solve(module, workspace, sizes.algebraic)
@@ -38,6 +39,7 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
         module.define("take_signs", writer.take_signs)
         module.define("note_events", writer.note_events)
         module.define("dips", writer.dips)
+        module.define("note_slopes", writer.note_slopes)
 
 
 class _GuardFunctions:
@@ -81,10 +83,13 @@ class _GuardFunctions:
         return w.text("define internal i64 @watch(ptr %t, ptr %x, ptr %reals, ptr %p)")
 
     def dips(self) -> str:
-        """Where the parabola through three values of one sign has its extremum between them, near zero.
+        """Where a guard may have gone to zero and come back between three values of one sign.
 
-        With A, M, B the values at the beginning, in the middle and at the end, as distances from zero, it is
-        M + (B - A) s / 2 + C s^2 / 2, C = A - 2 M + B, for s from -1 to 1.
+        With A, M, B the values at the beginning, in the middle and at the end, as distances from zero, the
+        parabola through them is M + (B - A) s / 2 + C s^2 / 2, C = A - 2 M + B, for s from -1 to 1. It is
+        doubtful where its extremum lies between them, near zero; and where it begins at another slope than
+        that at which the stretch before this one ended: a cubic that turns such a difference D, times half
+        the stretch, is D / 5 away from the parabola, so half of D has to be less than the distances.
         """
         w, places = Routine(self.module), self.places
         total = w.variable("i64", "0")
@@ -102,12 +107,38 @@ class _GuardFunctions:
             eight = w.multiply(number_text(8.0), bend)
             least = w.fma(eight, M, w.multiply(number_text(-1.0), w.multiply(rise, rise)))
             near = w.compare("olt", least, w.multiply(w.multiply(number_text(0.25), bend), eight))
-            dips = w.both(inside, near)
+            dips = w.either(w.both(inside, near), self.turns(w, i, side, (A, M, B)))
             w.put(w.word_op("add", w.get(total, "i64"), w.let(f"zext i1 {dips} to i64")), total, "i64")
 
         w.for_each(self.count, look)
         w.do(f"ret i64 {w.get(total, 'i64')}")
-        return w.text("define internal i64 @dips(ptr %reals)")
+        return w.text("define internal i64 @dips(ptr %reals, double %half)")
+
+    def turns(self, w: Routine, i: str, side: str, distances: tuple[str, str, str]) -> str:
+        """Whether a guard does not go on as the stretch before this one ended; false where that is NaN."""
+        A, M, B = distances
+        known = w.multiply(side, w.get(self.element(w, self.places.guard_slopes, i)))
+        now = w.fma(number_text(-1.5), A, w.fma(number_text(2.0), M, w.multiply(number_text(-0.5), B)))
+        turn = w.absolute(w.subtract(now, w.multiply(known, "%half")))
+        least = w.minimum(A, w.minimum(M, B))
+        doubtful = w.compare("ogt", w.multiply(number_text(0.5), turn), least)
+        return w.both(w.compare("ogt", least, number_text(0.0)), doubtful)
+
+    def note_slopes(self) -> str:
+        """The slope at the end of the parabola through the last three values."""
+        w, places = Routine(self.module), self.places
+
+        def note(i: str) -> None:
+            A, M, B = (
+                w.get(self.element(w, place, i))
+                for place in (places.guards_before, places.guards_middle, places.guards)
+            )
+            rise = w.fma(number_text(1.5), B, w.fma(number_text(-2.0), M, w.multiply(number_text(0.5), A)))
+            w.put(w.divide(rise, "%half"), self.element(w, places.guard_slopes, i))
+
+        w.for_each(self.count, note)
+        w.do("ret void")
+        return w.text("define internal void @note_slopes(ptr %reals, double %half)")
 
     def take_signs(self) -> str:
         w, places = Routine(self.module), self.places

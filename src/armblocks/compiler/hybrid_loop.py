@@ -337,6 +337,8 @@ class HybridLoop(Loop):
         fired = self.watch(time, places.x)
         w.do("call void @take_signs(ptr %reals, i1 false)")
         self.copy(places.guards, places.guards_before, self.guards)
+        unknown = number_text(float("nan"))
+        w.for_each(self.guards, lambda i: w.put(unknown, self.step.element(places.guard_slopes, i)))
         w.branch(w.word_test("eq", fired, "0"), settled, fire)
         w.place(fire)
         w.put("1", self.counts[Count.FRESH], "i64")
@@ -517,10 +519,10 @@ class HybridLoop(Loop):
         """If a guard fires within the step, go back to the first instant at which one does.
 
         The step is looked through in stretches, at the middle and the end of each. A stretch is as long as
-        the last ones proved to be smooth enough, and is halved where a guard may have gone to zero and come
-        back: where the parabola through its three values does so, or nearly. Then bisection: what is
-        bracketed is "some guard has fired", so that the first of several is found; the step ends on the far
-        side of the zero, where it has fired.
+        the last ones proved to be smooth enough, at the start an eighth of the step, and is halved where a
+        guard may have gone to zero and come back (``dips``). Then bisection: what is bracketed is "some guard
+        has fired", so that the first of several is found; the step ends on the far side of the zero, where it
+        has fired.
         """
         w, places = self.w, self.places
         turn, second, look, halve, follow, quiet, found, on = (
@@ -530,7 +532,8 @@ class HybridLoop(Loop):
         low, high = w.variable("double", time), w.variable("double", end)
         w.put(time, low)
         scan = w.at("%reals", Real.SCAN)
-        w.put(w.minimum(w.get(scan), h), scan)
+        unknown = w.compare("oeq", w.get(scan), number_text(float("inf")))
+        w.put(w.select(unknown, w.multiply(number_text(0.125), h), w.minimum(w.get(scan), h)), scan)
         finest = w.multiply(h, number_text(FINEST))
         self.emit_extra_stages_once(time, h)
         w.place(turn)
@@ -561,13 +564,15 @@ class HybridLoop(Loop):
         w.put(middle, low)
         w.jump(found)
         w.place(look)
-        dips = w.word_test("ne", w.let("call i64 @dips(ptr %reals)"), "0")
+        half = w.subtract(middle, a)
+        dips = w.word_test("ne", w.let(f"call i64 @dips(ptr %reals, double {half})"), "0")
         w.branch(w.both(dips, w.compare("ogt", w.get(scan), finest)), halve, follow)
         w.place(halve)
         length = w.minimum(w.get(scan), w.subtract(reached, a))
         w.put(w.multiply(number_text(0.5), length), scan)
         w.jump(turn)
         w.place(follow)
+        w.do(f"call void @note_slopes(ptr %reals, double {half})")
         w.do("call void @take_signs(ptr %reals, i1 false)")
         self.copy(places.guards, places.guards_before, self.guards)
         w.put(reached, low)

@@ -155,7 +155,8 @@ class Workspace:
     at each stage), ``slope(row)`` the stage derivatives; then what only hybrid systems have: ``z`` and ``w``
     as accepted, ``new_x`` and ``new_z`` what a reset or update makes of them, ``trial_w`` the unknowns of the
     implicit equations at the point evaluated last, ``guards``, those at the beginning and in the middle of
-    the stretch that is looked at (``guards_before``, ``guards_middle``), their ``signs`` (0: not known yet),
+    the stretch that is looked at (``guards_before``, ``guards_middle``), how fast they changed at the end of
+    the stretch before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet),
     ``fired``, when each fired last (``last``), how long after the time before (``gap``) and how often in a
     row this became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian``
     and ``before``. For delayed signals: how long each is delayed (``taus``), between which bounds
@@ -176,7 +177,8 @@ class Workspace:
         self.guards = self.trial_w + nw
         self.guards_before = self.guards + ng
         self.guards_middle = self.guards_before + ng
-        self.signs = self.guards_middle + ng
+        self.guard_slopes = self.guards_middle + ng
+        self.signs = self.guard_slopes + ng
         self.fired = self.signs + ng
         self.last = self.fired + ng
         self.gap = self.last + ng

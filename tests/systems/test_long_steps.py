@@ -1,0 +1,62 @@
+"""Events are found where nothing but the events themselves would hold the steps short."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks import blocks as bl
+
+
+def time_above(frequency: float, level: float, stop: float) -> float:
+    """For how long the sine is above a level from 0 to ``stop``, by its crossings."""
+    start, end = math.asin(level) / frequency, (math.pi - math.asin(level)) / frequency
+    period = 2 * math.pi / frequency
+    whole = math.floor(stop / period)
+    rest = stop - whole * period
+    return whole * (end - start) + float(np.clip(rest - start, 0.0, end - start))
+
+
+@pytest.mark.parametrize("solver", ["rk45", "dop853", "rodas5p"])
+@pytest.mark.parametrize(("frequency", "stop"), [(1.0, 100.0), (7.3, 100.0), (333.3, 20.0)])
+def test_a_level_that_a_sine_passes(solver: str, frequency: float, stop: float) -> None:
+    """The only state is the integral of the comparison: its derivative is constant, its steps are endless."""
+    builder = ab.DiagramBuilder("level")
+    wave = builder.add("wave", bl.SineWave(frequency=frequency))
+    above = builder.add("above", bl.CompareToConstant(relation=">", constant=0.5), wave)
+    builder.add("total", bl.Integrator(), above)
+    found = ab.simulate(builder.build(), stop_time=stop, solver=solver)
+    # each of some 2000 crossings is located to some units in the last place of the time
+    assert found["total"][-1] == pytest.approx(time_above(frequency, 0.5, stop), abs=1e-9)
+
+
+def integrating(initial: float) -> ab.Diagram:
+    """A subsystem with an integrator in it."""
+    inner = ab.DiagramBuilder("integrating")
+    inner.output("x", inner.add("integral", bl.Integrator(initial=initial), inner.input("rate")))
+    return inner.build()
+
+
+def test_two_actions_of_which_one_works_at_a_time_and_their_merge() -> None:
+    """While sin(pi t) > 1/2 one integrates 1 and keeps its state, otherwise one integrates -2 from 0.5."""
+    builder = ab.DiagramBuilder("actions")
+    wave = builder.add("wave", bl.SineWave(frequency=math.pi))
+    choice = builder.add("choice", bl.If(expressions="u > 0.5"), wave)
+    up, down = builder.add("up", bl.Constant(value=1.0)), builder.add("down", bl.Constant(value=-2.0))
+    first = builder.add("first", bl.ActionSubsystem(diagram=integrating(0.5)), up, action=choice["if1"])
+    second = builder.add(
+        "second",
+        bl.ActionSubsystem(diagram=integrating(0.5), states_when_resuming="reset"),
+        down,
+        action=choice["else"],
+    )
+    builder.add("y", bl.Merge(inputs=2), first, second)
+    found = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05, rtol=1e-9)
+    t = found.time
+    within = ((t > 1 / 6) & (t < 5 / 6)) | ((t > 13 / 6) & (t < 17 / 6))
+    works = 0.5 + np.clip(t - 1 / 6, 0.0, 2 / 3) + np.clip(t - 13 / 6, 0.0, 2 / 3)
+    begun = np.where(t > 17 / 6, 17 / 6, np.where(t > 5 / 6, 5 / 6, 0.0))
+    np.testing.assert_allclose(found["y"], np.where(within, works, 0.5 - 2 * (t - begun)), atol=1e-9)
