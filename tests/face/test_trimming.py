@@ -16,6 +16,7 @@ from armblocks.blocks import (
     Expression,
     Gain,
     Integrator,
+    LookupTable1D,
     Saturation,
     Sum,
     Switch,
@@ -194,3 +195,44 @@ def test_modes_that_chase_each_other_are_named() -> None:
     builder.connect(builder.add("switch", Switch(threshold=0.0), above, state, below), state["u"])
     with pytest.raises(SimulationError, match=r"the modes switch/[a-z]+ do not settle"):
         ab.trim(builder.build())
+
+
+def table_of(count: int) -> LookupTable1D:
+    """u^2 - 2 at ``count`` points from 0 to 5, straight in between."""
+    points = np.linspace(0.0, 5.0, count)
+    return LookupTable1D(positions=points, table=points**2 - 2.0)
+
+
+@pytest.mark.parametrize("count", [9, 1000])
+def test_a_curve_of_many_pieces_is_followed_piece_by_piece(count: int) -> None:
+    """x' = 2 - x^2 rests at the root of the piece around sqrt(2), though the first one points far beyond."""
+    builder = ab.DiagramBuilder("pieces")
+    state = builder.add("x", Integrator(initial=0.2))
+    curve = builder.add("curve", table_of(count), state)
+    builder.connect(builder.add("minus", Gain(gain=-1.0), curve), state["u"])
+    points = np.linspace(0.0, 5.0, count)
+    k = int(np.searchsorted(points, math.sqrt(2.0)))
+    low, high = points[k - 1] ** 2 - 2.0, points[k] ** 2 - 2.0
+    expected = points[k - 1] - low * (points[k] - points[k - 1]) / (high - low)
+    assert float(ab.trim(builder.build()).point.states["x/x"]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_single_entries_are_free_but_for_those_of_long_tables() -> None:
+    """The state follows a table at 2: of the entries 1.875 and 2.5, the lower one has a say of 4/5."""
+
+    def following(count: int) -> ab.Diagram:
+        builder = ab.DiagramBuilder("follows")
+        curve = builder.add("curve", table_of(count), builder.add("place", Constant(value=2.0)))
+        state = builder.add("x", Integrator())
+        builder.connect(builder.add("error", Sum(signs="+-"), curve, state), state["u"])
+        return builder.build()
+
+    found = ab.trim(following(9), free=["curve.table[3]"], states={"x": 3.0})
+    upper = 2.5**2 - 2.0
+    assert float(found.free["curve.table"][3]) == pytest.approx((3.0 - 0.2 * upper) / 0.8, rel=1e-12)
+    assert float(found.free["curve.table"][4]) == upper
+    for name in ("curve.table", "curve.table[400]", "curve.positions"):
+        with pytest.raises(InputError, match="is part of a table that is read by index"):
+            ab.trim(following(1000), free=[name], states={"x": 3.0})
+    with pytest.raises(UnknownNameError, match=r"there is no parameter named 'curve.table\[9\]'"):
+        ab.trim(following(9), free=["curve.table[9]"])

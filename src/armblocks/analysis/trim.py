@@ -5,7 +5,8 @@ the parameters that are free. The equations: every state that shall rest has the
 what it moves as it is, the implicit equations hold, and the chosen signals have their values. Steps are those
 of Levenberg and Marquardt (Moré, Lecture Notes in Mathematics 630, 1978, 105-116), each unknown in the scale
 of its own column and kept within its bounds; of several solutions the one near the start is found, and where
-there are infinitely many, the nearest. Modes follow the point that was found, then it is sought again.
+there are infinitely many, the nearest. Modes follow the point that was found, then it is sought again; where
+that leads nowhere (the line of a table's first piece meets zero far beyond its last), they follow every step.
 """
 
 from __future__ import annotations
@@ -86,33 +87,39 @@ class TrimResult:
 def trim_system(problem: TrimProblem) -> TrimResult:
     """Solve a problem. Raises ``SimulationError``, what was reached as ``partial``, where it cannot rest."""
     search = _Search(problem)
-    point, iterations = problem.start, 0
+    point, iterations, chasing = _modes_afterwards(search)
+    if chasing or not search.rests(point):
+        other, used = search.run(problem.start, settling=True)
+        iterations += used
+        if search.rests(other) and not search.unsettled(other):
+            point, chasing = other, []
+    result = search.result(point, iterations)
+    if chasing:
+        raise SimulationError(
+            f"the modes {', '.join(chasing[:NAMED])} do not settle",
+            where=problem.system.name,
+            allowed="an operating point inside one piece of every switching block",
+            fix="start from a point on the side that is meant, or change the limits",
+            partial=result,
+        )
+    if not search.rests(point):
+        raise _failure(problem, search, point, result)
+    return result
+
+
+def _modes_afterwards(search: _Search) -> tuple[Point, int, list[str]]:
+    """Seek with the modes that stand, let them settle, seek again; the modes that never come to an end."""
+    point, iterations = search.problem.start, 0
     seen: list[bytes] = []
     while True:
         point, used = search.run(point)
         iterations += used
-        if not problem.system.discrete.size:
-            break
-        z = np.where(search.sampled, point.z, search.whole.settled(point))
-        if np.array_equal(z, point.z) or z.tobytes() in seen or len(seen) == MOST_MODES:
-            settled = np.array_equal(z, point.z)
-            if not settled:
-                names = _elements(problem.system.discrete)
-                moving = [names[k] for k in np.flatnonzero(z != point.z).tolist()]
-                raise SimulationError(
-                    f"the modes {', '.join(moving[:NAMED])} do not settle",
-                    where=problem.system.name,
-                    allowed="an operating point inside one piece of every switching block",
-                    fix="start from a point on the side that is meant, or change the limits",
-                    partial=search.result(point, iterations),
-                )
-            break
+        moving = search.unsettled(point)
+        z = search.settled(point)
+        if not moving or z.tobytes() in seen or len(seen) == MOST_MODES:
+            return point, iterations, moving
         seen.append(point.z.tobytes())
         point = dataclasses.replace(point, z=z)
-    result = search.result(point, iterations)
-    if not search.rests(point):
-        raise _failure(problem, search, point, result)
-    return result
 
 
 def _elements(layout: Signature) -> list[str]:
@@ -201,9 +208,22 @@ class _Search:
             np.isfinite(residuals).all() and np.abs(residuals).max(initial=0.0) <= self.problem.tolerance
         )
 
-    def run(self, start: Point) -> tuple[Point, int]:
-        """Damped steps until they no longer help."""
+    def settled(self, point: Point) -> Array:
+        """``z`` with the modes that a point asks for; what clocks move stays."""
+        if not point.z.size:
+            return point.z
+        return np.where(self.sampled, point.z, self.whole.settled(point))
+
+    def unsettled(self, point: Point) -> list[str]:
+        """Modes that are not what the point asks for."""
+        names = _elements(self.problem.system.discrete)
+        return [names[k] for k in np.flatnonzero(self.settled(point) != point.z).tolist()]
+
+    def run(self, start: Point, *, settling: bool = False) -> tuple[Point, int]:
+        """Damped steps until they no longer help; ``settling``: the modes follow every step that is tried."""
         point = self.spread(np.clip(self.gathered(start), self.lower, self.upper), start)
+        if settling:
+            point = dataclasses.replace(point, z=self.settled(point))
         residuals = self.residuals(point)
         damping, scale = 1e-3, np.zeros(len(self.unknowns))
         for iteration in range(MOST_ITERATIONS):
@@ -218,6 +238,8 @@ class _Search:
                     return point, iteration
                 step = self._step(point, slopes, residuals, damping, scale)
                 trial = self.spread(self.gathered(point) + step, point)
+                if settling:
+                    trial = dataclasses.replace(trial, z=self.settled(trial))
                 left = self.residuals(trial)
                 if np.isfinite(left).all() and np.linalg.norm(left) < np.linalg.norm(residuals):
                     break

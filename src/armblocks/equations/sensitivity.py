@@ -34,6 +34,23 @@ def sensitivity_name(path: str, parameter: str) -> str:
     return f"{path} by {parameter}"
 
 
+def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
+    """The parameters that are long tables: no derivative by their entries is known (``table_reading``)."""
+    functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
+    tables = {
+        (place, place + count)
+        for traced in (*functions, system.reset)
+        for slot, place, count in tables_read(traced.casadi_function())
+        if traced.inputs.names[slot] == "p"
+    }
+    ranges = system.parameters.ranges
+    return frozenset(
+        name
+        for name in system.parameters.names
+        if any(ranges[name].start < end and start < ranges[name].stop for start, end in tables)
+    )
+
+
 def sensitivity_system(
     system: HybridSystem, parameters: Sequence[str], outputs: Sequence[str]
 ) -> HybridSystem:
@@ -89,20 +106,14 @@ class _Augmented:
                     allowed="parameters that move no breakpoint",
                     fix="take the difference of two runs for this one",
                 )
-        functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
-        for traced in (*functions, system.reset):
-            for slot, place, count in tables_read(traced.casadi_function()):
-                if traced.inputs.names[slot] != "p":
-                    continue
-                for name in parameters:
-                    given = system.parameters.ranges[name]
-                    if given.start < place + count and place < given.stop:
-                        raise InputError(
-                            f"the parameter '{name}' is a table that is read by index",
-                            where=system.name,
-                            allowed="parameters that are no entries of such tables",
-                            fix="take the difference of two runs for this one",
-                        )
+        for name in parameters:
+            if name in parameters_read_by_index(system):
+                raise InputError(
+                    f"the parameter '{name}' is a table that is read by index",
+                    where=system.name,
+                    allowed="parameters that are no entries of such tables",
+                    fix="take the difference of two runs for this one",
+                )
         if system.guard_names and system.algebraic.size:
             raise InputError(
                 f"the events of '{system.guard_names[0]}' and the implicit equation of "

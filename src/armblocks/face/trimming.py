@@ -13,6 +13,7 @@ from armblocks.analysis.trim import TrimProblem, TrimResult, trim_system
 from armblocks.diagram import Diagram
 from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.evaluation import Point
+from armblocks.equations.sensitivity import parameters_read_by_index
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.linearizing import Where, described_diagram, operating_point_at
 from armblocks.face.model import CompiledDiagram, compile_diagram
@@ -39,11 +40,11 @@ def trim(
 
     All states are sought, but for those in ``states``, which have the values given there, and all have to
     rest, but for those that are ``moving``. ``free``: tunable parameters that are sought too,
-    ``"torque.value"`` (or ``"torque"`` for a block that has one only). ``outputs``: values that signals have
-    to have; NaN leaves an entry open. ``bounds``: ``(lower, upper)`` of states and free parameters. The
-    search starts where the run is ``at`` (0: its start), with the values of ``guess`` put in; time-dependent
-    signals have their value of that time. A state is named ``block/state``, or by its block if that has only
-    one.
+    ``"torque.value"`` (or ``"torque"`` for a block that has one only), or an entry, ``"map.table[3]"``.
+    ``outputs``: values that signals have to have; NaN leaves an entry open. ``bounds``: ``(lower, upper)`` of
+    states and free parameters. The search starts where the run is ``at`` (0: its start), with the values of
+    ``guess`` put in; time-dependent signals have their value of that time. A state is named ``block/state``,
+    or by its block if that has only one.
 
     Sampled blocks rest when a tick changes nothing. Every equation holds to ``tolerance``, in its own unit.
 
@@ -99,8 +100,11 @@ def _slot_name(layout: Signature, name: str, kind: str, system: HybridSystem) ->
 
 
 def _places(layout: Signature, name: str, kind: str, system: HybridSystem) -> list[int]:
-    place = layout.ranges[_slot_name(layout, name, kind, system)]
-    return list(range(*place.indices(layout.size)))
+    """Of a whole slot, or of one entry of it: ``table.values[3]``."""
+    head, bracket, _ = name.partition("[")
+    if bracket and head in layout.ranges and name in layout[head].elements:
+        return [layout.ranges[head].start + layout[head].elements.index(name)]
+    return list(_span(layout, _slot_name(layout, name, kind, system)))
 
 
 def _values(layout: Signature, values: Values, kind: str, system: HybridSystem) -> dict[int, float]:
@@ -122,8 +126,25 @@ def _spread(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
     return np.broadcast_to(array, shape).ravel()
 
 
+def _span(layout: Signature, slot: str) -> range:
+    return range(*layout.ranges[slot].indices(layout.size))
+
+
 def _parameter_places(system: HybridSystem, free: Sequence[str]) -> list[int]:
-    return [place for name in free for place in _places(system.parameters, name, "parameter", system)]
+    found: list[int] = []
+    tables = parameters_read_by_index(system) if free else frozenset()
+    for name in free:
+        places = _places(system.parameters, name, "parameter", system)
+        owner = next(slot for slot in system.parameters.names if places[0] in _span(system.parameters, slot))
+        if owner in tables:
+            raise InputError(
+                f"the free parameter '{name}' is part of a table that is read by index",
+                where=system.name,
+                allowed="parameters that are no entries of such tables",
+                fix="free what the table is fed with, or a gain behind it",
+            )
+        found += places
+    return found
 
 
 def _targets(system: HybridSystem, outputs: Values) -> tuple[list[int], list[float]]:
