@@ -55,8 +55,14 @@ class InputError(ArmblocksError):
     """A call was given a wrong shape, dtype, value or option."""
 
 
+LONGEST_NAME = 60
+"""Characters of a name in a message that is none."""
+LONGEST_LIST = 200
+"""Characters of a list of names in a message; of a longer one, the names nearest to the one in question."""
+
+
 class UnknownNameError(ArmblocksError):
-    """A name that is not among the known ones; says the nearest and lists them."""
+    """A name that is not among the ``known`` ones; says the nearest and lists them, as far as is legible."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str = "") -> None:
         self.kind = kind
@@ -64,12 +70,33 @@ class UnknownNameError(ArmblocksError):
         self.known: Sequence[str] = sorted(known)
         folded = {entry.casefold(): entry for entry in self.known}
         near = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.5)
+        shown = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
         super().__init__(
-            f"there is no {kind} named '{name}'",
+            f"there is no {kind} named '{shown}'",
             where=where,
-            allowed=", ".join(self.known) if self.known else "none exist",
+            allowed=_legible(self.known, name),
             fix=f"did you mean '{folded[near[0]]}'?" if near else "use one of the names above",
         )
+
+
+def _legible(names: Sequence[str], wanted: str) -> str:
+    """All names if they are few, else those most like the wanted one and how many more there are."""
+    if not names:
+        return "none exist"
+    if len(whole := ", ".join(names)) <= LONGEST_LIST:
+        return whole
+    matcher = difflib.SequenceMatcher(b=wanted.casefold())
+
+    def likeness(name: str) -> float:
+        matcher.set_seq1(name.casefold())
+        return matcher.quick_ratio()
+
+    chosen: list[str] = []
+    for name in sorted(names, key=lambda name: -likeness(name)):
+        if sum(map(len, chosen)) + 2 * len(chosen) + len(name) > LONGEST_LIST - 30:
+            break
+        chosen.append(name)
+    return f"{', '.join(sorted(chosen) or [names[0][:LONGEST_LIST]])}, and {len(names) - len(chosen)} more"
 
 
 class RobotError(ArmblocksError):

@@ -136,7 +136,10 @@ class StateSpace(Block):
             )
         if shape_of(self.initial) not in ((), A[:1]):
             raise InputError(
-                f"initial has shape {shape_of(self.initial)}", where="StateSpace", allowed=f"() or {A[:1]}"
+                f"initial has shape {shape_of(self.initial)}",
+                where="StateSpace",
+                allowed=f"() or {A[:1]}",
+                fix="give one number for each row of A, or one for all",
             )
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -75,6 +75,7 @@ class DiscreteStateSpace(Block):
                 f"initial has shape {shape_of(self.initial)}",
                 where="DiscreteStateSpace",
                 allowed=f"() or {A[:1]}",
+                fix="give one number for each row of A, or one for all",
             )
 
     def input_ports(self) -> tuple[Port, ...]:

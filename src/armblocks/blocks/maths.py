@@ -102,7 +102,10 @@ class Sum(Block):
     def check(self) -> None:
         if not self.signs or set(self.signs) - set("+-"):
             raise InputError(
-                f"the value is '{self.signs}'", where="Sum.signs", allowed="+ and -, at least one"
+                f"the value is '{self.signs}'",
+                where="Sum.signs",
+                allowed="+ and -, at least one",
+                fix="write one sign for each input, such as '+-'",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -141,7 +144,10 @@ class Product(Block):
     def check(self) -> None:
         if not self.operators or set(self.operators) - set("*/"):
             raise InputError(
-                f"the value is '{self.operators}'", where="Product.operators", allowed="* and /, at least one"
+                f"the value is '{self.operators}'",
+                where="Product.operators",
+                allowed="* and /, at least one",
+                fix="write one sign for each input, such as '*/'",
             )
 
     def input_ports(self) -> tuple[Port, ...]:

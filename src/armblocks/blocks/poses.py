@@ -306,7 +306,10 @@ class PoseIntegration(Block):
             shape = shape_of(self.parameter_value(name))
             if shape != (count,):
                 raise InputError(
-                    f"the {name} has {shape[0]} numbers", where="PoseIntegration", allowed=f"{count}"
+                    f"the {name} has {shape[0]} numbers",
+                    where="PoseIntegration",
+                    allowed=f"{count}",
+                    fix="give a position as (x, y, z), a quaternion with the scalar first",
                 )
         if not any(np.asarray(self.quaternion)):
             raise InputError(

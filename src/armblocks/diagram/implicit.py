@@ -109,6 +109,14 @@ def check_solvable(
         if not np.isfinite(scale) or np.linalg.matrix_rank(matrix) == len(circle):
             continue
         others = [entry for entry in symvar(own) if not depends_on(unknowns, entry)]
+        if not slope.nnz() and others and not all(depends_on(p, entry) for entry in others):
+            raise AlgebraicLoopError(
+                loops[circle[0]],
+                where=where,
+                why="with an equation that does not contain its unknown (its index is above 1)",
+                allowed="equations in which the unknown stands itself",
+                fix="differentiate the equation in time until it does: twice for a rod and the force in it",
+            )
         why = "with no solution or infinitely many"
         if all(depends_on(p, entry) for entry in others):
             right = _number(substitute(own, unknowns, SX.zeros(len(circle))), p, values).ravel()

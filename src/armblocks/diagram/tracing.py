@@ -118,9 +118,9 @@ class Tracing:
         self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
         for name in self.network.diagram.blocks[node.block].implicit_outputs:
             if (SlotKind.OUTPUT, name) in self._values[node]:
-                self._left_over[Value(node, SlotKind.OUTPUT, name)] = self._values[node].pop(
-                    (SlotKind.OUTPUT, name)
-                )
+                unknown = Value(node, SlotKind.OUTPUT, name)
+                self._left_over[unknown] = self._values[node].pop((SlotKind.OUTPUT, name))
+                self.value(unknown)  # also where nothing reads it
         if node.block in self._clock_of:
             ticks = symbols.m[self._clock_of[node.block]]
             if ON in self.network.diagram.gates.get(node.block, {}):

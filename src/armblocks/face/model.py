@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
-from armblocks.errors import UnknownNameError
+from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
@@ -89,6 +89,9 @@ class CompiledDiagram:
         return self, changed_parameters(self.compiled, self.compiled.parameter_values, tuned)
 
 
+Start = RunState | OperatingPoint | str | PathLike[str]
+"""Where a run may begin: another run's state, the file of one, or an operating point."""
+
 _compiled: dict[int, CompiledDiagram] = {}
 
 
@@ -126,7 +129,7 @@ def simulate(
     *,
     parameters: Mapping[str, object] | None = None,
     progress: Progress | None = None,
-    initial_state: RunState | OperatingPoint | str | PathLike[str] | None = None,
+    initial_state: Start | None = None,
     log: str | PathLike[str] | None = None,
     log_signals: Sequence[str] = (),
     **settings: Any,
@@ -148,16 +151,12 @@ def simulate(
     the ``partial`` result) where the run cannot go on.
     """
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
-    if isinstance(initial_state, OperatingPoint):
-        initial_state = state_at(model, initial_state)
-    if initial_state is not None and not isinstance(initial_state, RunState):
-        initial_state = RunState.load(initial_state)
     options = _options(model, settings, "simulate")
     return model.simulate(
         options,
         parameters=parameters,
         progress=progress,
-        initial_state=initial_state,
+        initial_state=_starting_state(model, initial_state),
         log=_log_request(log, log_signals),
     )
 
@@ -166,7 +165,7 @@ def begin(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     *,
     parameters: Mapping[str, object] | None = None,
-    initial_state: RunState | str | PathLike[str] | None = None,
+    initial_state: Start | None = None,
     log: str | PathLike[str] | None = None,
     log_signals: Sequence[str] = (),
     **settings: Any,
@@ -176,14 +175,28 @@ def begin(
     Arguments are those of :func:`simulate`, and so are the errors.
     """
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
-    if initial_state is not None and not isinstance(initial_state, RunState):
-        initial_state = RunState.load(initial_state)
     options = _options(model, settings, "begin")
     return model.begin(
         options,
         parameters=parameters,
-        initial_state=initial_state,
+        initial_state=_starting_state(model, initial_state),
         log=_log_request(log, log_signals),
+    )
+
+
+def _starting_state(model: CompiledDiagram, start: object) -> RunState | None:
+    """Where a run begins, as a state of it. Raises ``InputError`` for what is none."""
+    if start is None or isinstance(start, RunState):
+        return start
+    if isinstance(start, OperatingPoint):
+        return state_at(model, start)
+    if isinstance(start, str | PathLike):
+        return RunState.load(cast("str | PathLike[str]", start))
+    raise InputError(
+        f"initial_state is a {type(start).__name__}",
+        where=model.diagram.name,
+        allowed="a run's final_state, the path of a saved one, or an operating point",
+        fix="to begin with other values, give parameters={'block.initial': …}",
     )
 
 

@@ -132,7 +132,7 @@ def _span(layout: Signature, slot: str) -> range:
 
 def _parameter_places(system: HybridSystem, free: Sequence[str]) -> list[int]:
     found: list[int] = []
-    tables = parameters_read_by_index(system) if free else frozenset()
+    tables = parameters_read_by_index(system) if free else frozenset[str]()
     for name in free:
         places = _places(system.parameters, name, "parameter", system)
         owner = next(slot for slot in system.parameters.names if places[0] in _span(system.parameters, slot))

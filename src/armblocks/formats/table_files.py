@@ -37,10 +37,17 @@ def load_table(path: str | PathLike[str]) -> TimeTable:
         columns = read(data)
     except Exception as error:
         raise FormatError(
-            f"the file cannot be read: {error}"[:300], where=str(place), allowed=f"a {place.suffix} file"
+            f"the file cannot be read: {error}"[:300],
+            where=str(place),
+            allowed=f"a {place.suffix} file",
+            fix="open it in what wrote it, and write it again",
         ) from None
     if not columns:
-        raise FormatError("the file holds no columns of numbers", where=str(place))
+        raise FormatError(
+            "the file holds no columns of numbers",
+            where=str(place),
+            fix="one column of times, one or more of values",
+        )
     key = next((name for name in ("time", "t") if name in columns), next(iter(columns)))
     count = len(columns[key])
     values = {name: column for name, column in columns.items() if name != key and len(column) == count}

@@ -58,8 +58,8 @@ def _signal_error(system: CompiledSystem, place: int, value: float, time: float)
         f"signal '{name}' is {value} at {time:.9g} s",
         where=system.name,
         allowed="finite numbers; every signal before it in evaluation order is finite",
-        fix=f"look at block '{block}': a division by zero, a root or logarithm of a negative number, or an "
-        "overflow",
+        fix=f"look at block '{block}': a division by zero, a root or logarithm of a negative number, an "
+        "overflow, or an algebraic loop through it that has become singular",
     )
 
 

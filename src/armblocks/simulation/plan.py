@@ -137,10 +137,10 @@ def check_options(options: SimulationOptions, where: str) -> None:
 
     Of a named ``solver`` only the name is looked at: whether it fits is known with the system.
     """
-    stop = _number("stop_time", options.stop_time, "a finite time in s, 0 or more", least=0.0)
+    stop = _number("stop_time", options.stop_time, where, "a finite time in s, 0 or more", least=0.0)
     step = options.step
     if step is not None:
-        step = _number("step", step, "a time in s above 0, at most the stop time", above=0.0)
+        step = _number("step", step, where, "a time in s above 0, at most the stop time", above=0.0)
         if stop > 0.0 and step > stop:
             raise InputError(
                 f"step is {step:g} s",
@@ -150,22 +150,28 @@ def check_options(options: SimulationOptions, where: str) -> None:
             )
         _resolvable("step", step, stop, where)
         _countable("step", step, stop, where)
-    if options.solver.casefold() != "auto":
-        find_tableau(options.solver)
+    _check_solver(options.solver, where)
     if options.sample_time is not None:
-        _number("sample_time", options.sample_time, "a time in s above 0", above=0.0)
-    if not SMALLEST_RTOL <= options.rtol <= 1.0:
+        _number("sample_time", options.sample_time, where, "a time in s above 0", above=0.0)
+    rtol = _finite(options.rtol)
+    if rtol is None or not SMALLEST_RTOL <= rtol <= 1.0:
         raise InputError(
             f"rtol is {options.rtol!r}",
             where=where,
             allowed=f"{SMALLEST_RTOL:g} to 1: doubles carry 16 digits",
             fix="1e-6 is a good start, 1e-10 is tight",
         )
-    _number("atol", options.atol, "a number above 0, in the units of the states", above=0.0)
+    _number("atol", options.atol, where, "a number above 0, in the units of the states", above=0.0)
     if options.max_step is not None:
-        _resolvable(
-            "max_step", _number("max_step", options.max_step, "a time in s above 0", above=0.0), stop, where
-        )
+        max_step = _number("max_step", options.max_step, where, "a time in s above 0", above=0.0)
+        _resolvable("max_step", max_step, stop, where)
+
+
+def _check_solver(name: object, where: str) -> None:
+    if not isinstance(name, str):
+        raise InputError(f"solver is {name!r}", where=where, allowed="a name", fix="'auto' chooses one")
+    if name.casefold() != "auto":
+        find_tableau(name, where)
 
 
 def _resolvable(name: str, step: float, stop: float, where: str) -> None:
@@ -191,15 +197,21 @@ def _countable(name: str, step: float, stop: float, where: str) -> None:
         )
 
 
+def _finite(value: object) -> float | None:
+    """The number that was given; of anything else, truth values and texts among it, none."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return None
+    number = float(value)
+    return number if math.isfinite(number) else None
+
+
 def _number(
-    name: str, value: object, allowed: str, least: float | None = None, above: float | None = None
+    name: str, value: object, where: str, allowed: str, least: float = -math.inf, above: float = -math.inf
 ) -> float:
-    if isinstance(value, Real):
-        number = float(value)
-        high_enough = (least is None or number >= least) and (above is None or number > above)
-        if math.isfinite(number) and high_enough:
-            return number
-    raise InputError(f"{name} is {value!r}", allowed=allowed, fix=f"give another {name}")
+    number = _finite(value)
+    if number is not None and number >= least and number > above:
+        return number
+    raise InputError(f"{name} is {value!r}", where=where, allowed=allowed, fix=f"give another {name}")
 
 
 def _choose(system: CompiledSystem, options: SimulationOptions) -> tuple[Tableau | None, str]:

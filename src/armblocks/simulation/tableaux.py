@@ -200,12 +200,12 @@ STIFF = RODAS5P
 _BY_NAME = {name.casefold(): tableau for tableau in TABLEAUX for name in (tableau.name, *tableau.aliases)}
 
 
-def find_tableau(name: str) -> Tableau:
-    """The integrator of this name or alias, in any case.
+def find_tableau(name: str, where: str = "") -> Tableau:
+    """The integrator of this name or alias, in any case. ``where``: the system that is to be run.
 
     Raises ``UnknownNameError`` with the nearest name.
     """
     found = _BY_NAME.get(name.casefold())
     if found is None:
-        raise UnknownNameError("solver", name, ["auto", *_BY_NAME])
+        raise UnknownNameError("solver", name, ["auto", *_BY_NAME], where=where)
     return found
