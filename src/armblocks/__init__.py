@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armblocks.face.block_examples import block_example
     from armblocks.face.diagram_run import DiagramRun
     from armblocks.face.diagrams import list_blocks, list_examples, load_diagram, save_diagram
-    from armblocks.face.linearizing import linearize
+    from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
     from armblocks.face.reporting import draw_diagram, write_files, write_report
@@ -79,6 +79,7 @@ else:
             "errors": "armblocks.errors",
             "formula": "armblocks.diagram",
             "jtraj": "armblocks.face.trajectory",
+            "frequency_response": "armblocks.face.linearizing",
             "linearize": "armblocks.face.linearizing",
             "list_blocks": "armblocks.face.diagrams",
             "list_examples": "armblocks.face.diagrams",
@@ -130,6 +131,7 @@ __all__ = [
     "draw_diagram",
     "errors",
     "formula",
+    "frequency_response",
     "jtraj",
     "linearize",
     "list_blocks",

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import armblocks as ab
 from armblocks.blocks import (
     Clock,
     CompareToConstant,
@@ -35,7 +34,7 @@ from armblocks.blocks import (
 from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
-from armblocks.errors import DiagramError, InputError
+from armblocks.errors import DiagramError
 from armblocks.simulation import RunState, SimulationResult, simulate
 
 Run = Callable[..., SimulationResult]
@@ -290,11 +289,6 @@ def test_what_cannot_be_delayed_is_refused() -> None:
     builder.add("late", VariableTimeDelay(), builder.add("sine", SineWave()), inner)
     with pytest.raises(DiagramError, match="how long a delay is depends on a delayed signal"):
         trace_diagram(builder.build())
-
-
-def test_a_dead_time_is_not_linearised() -> None:
-    with pytest.raises(InputError, match="the dead time of late has no finite linear system"):
-        ab.linearize(decay(), inputs=["minus.gain"], outputs=["x/y"])
 
 
 def test_vectors_are_delayed_by_element(run: Run) -> None:

@@ -15,13 +15,14 @@ clock).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.analysis.dead_time import HIGHEST_ORDER, Approximated, dead_time
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.equations import HybridSystem, Signature
@@ -29,6 +30,7 @@ from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 MOST_TICKS = 100_000
 """Of one period: beyond that, the clocks have next to no common multiple."""
@@ -45,35 +47,43 @@ class Ends:
 
 
 def linearise(
-    evaluated: EvaluatedSystem, point: Point, ends: Ends, known: OperatingPoint | None = None
+    evaluated: EvaluatedSystem,
+    point: Point,
+    ends: Ends,
+    known: OperatingPoint | None = None,
+    *,
+    delay_order: int | None = None,
 ) -> LinearSystem:
     """The linear system about a point, whose implicit equations are solved there.
 
     ``evaluated`` states the parameters that are the inputs and the signals that are the outputs; ``known``
-    is kept with the result. Raises ``SimulationError`` where a slope is not finite or the implicit equations
-    are singular, and ``InputError`` for clocks without a usable common period.
+    is kept with the result; ``delay_order`` is that of the approximation of every dead time
+    (:mod:`armblocks.analysis.dead_time`). Raises ``SimulationError`` where a slope is not finite or the
+    implicit equations are singular, and ``InputError`` for clocks without a usable common period and for
+    dead time without an order.
     """
     system = evaluated.system
-    if system.delays is not None:
-        names = sorted({name.rpartition("/")[0] for name in _delayed(system)})
-        raise InputError(
-            f"the dead time of {', '.join(names)} has no finite linear system",
-            where=system.name,
-            allowed="diagrams without transport delays",
-            fix="put a Transfer Function with the Pade approximation in its place: (2 - s d) / (2 + s d)",
-        )
     unknowns = _unknowns(evaluated, point)
-    flow = _without(evaluated.derivative_slopes(point), unknowns)
-    seen = _without(evaluated.signal_slopes(point), unknowns)
+    flow, seen = _slopes(evaluated, point, unknowns, ends)
     names, units = _elements(system.states)
-    _check_finite(system, names, flow, "the rate of state")
-    _check_finite(system, ends.outputs, seen, "the output")
+
+    def ticked(ticking: tuple[int, ...]) -> Slopes:
+        """How all of ``z`` follows from what was before a tick."""
+        slopes = _without(evaluated.update_slopes(point, np.array(ticking, dtype=np.float64)), unknowns)
+        _check_finite(system, _elements(system.discrete)[0], slopes, "the discrete variable")
+        return late(slopes) if late else slopes
+
+    late = _approximated(evaluated, point, unknowns, [flow, seen], delay_order)
+    if late:
+        flow, seen = late.flow(flow), late(seen)
+        names += late.names
+        units += ("",) * len(late.names)
     if not system.clocks:
         matrices = (flow.x, flow.p, seen.x, seen.p)
         dt = 0.0
     else:
         moved = np.flatnonzero(evaluated.sampled)
-        matrices, dt = _over_a_period(evaluated, point, unknowns, flow, seen, moved)
+        matrices, dt = _over_a_period(system, ticked, flow, seen, moved)
         discrete_names, discrete_units = _elements(system.discrete)
         names += tuple(discrete_names[k] for k in moved.tolist())
         units += tuple(discrete_units[k] for k in moved.tolist())
@@ -96,9 +106,96 @@ def linearise(
     )
 
 
-def _delayed(system: HybridSystem) -> list[str]:
+def exact_response(evaluated: EvaluatedSystem, point: Point, ends: Ends, frequencies: Array) -> Complex:
+    """The response (N, ny, nu) about a point at angular frequencies (N,) in rad/s; dead time is exact.
+
+    Raises as :func:`linearise`, and ``InputError`` for dead time in a diagram with clocks.
+    """
+    system = evaluated.system
+    if system.delays is None:
+        return linearise(evaluated, point, ends).frequency_response(frequencies)
+    if system.clocks:
+        raise InputError(
+            f"the dead time of {_late_blocks(system)} is in one diagram with the clock of "
+            f"{system.clocks[0].period:g} s",
+            where=system.name,
+            allowed="an exact response of dead time among continuous blocks only",
+            fix="linearize with a delay_order, and take the frequency_response of that",
+        )
+    unknowns = _unknowns(evaluated, point)
+    flow, seen = _slopes(evaluated, point, unknowns, ends)
+    inputs = _without(evaluated.delay_input_slopes(point), unknowns)
+    dead = dead_time(evaluated, point, inputs, [flow, seen])
+    opened = LinearSystem(
+        flow.x,
+        np.hstack([flow.p, flow.z[:, dead.places]]),
+        np.vstack([seen.x, dead.inputs.x]),
+        np.vstack(
+            [
+                np.hstack([seen.p, seen.z[:, dead.places]]),
+                np.hstack([dead.inputs.p, dead.through]),
+            ]
+        ),
+    ).frequency_response(frequencies)
+    ny, nu = seen.p.shape
+    late = np.exp(-1j * np.multiply.outer(frequencies, dead.delays))
+    # v = late (H u + K v), y = D u + F v
+    closed = np.eye(dead.count) - late[:, :, None] * opened[:, ny:, nu:]
+    v = np.linalg.solve(closed, late[:, :, None] * opened[:, ny:, :nu])
+    return np.asarray(opened[:, :ny, :nu] + opened[:, :ny, nu:] @ v, dtype=np.complex128)
+
+
+def _slopes(
+    evaluated: EvaluatedSystem, point: Point, unknowns: Slopes | None, ends: Ends
+) -> tuple[Slopes, Slopes]:
+    """Those of the flow and of the outputs, all finite."""
+    flow = _without(evaluated.derivative_slopes(point), unknowns)
+    seen = _without(evaluated.signal_slopes(point), unknowns)
+    _check_finite(evaluated.system, _elements(evaluated.system.states)[0], flow, "the rate of state")
+    _check_finite(evaluated.system, ends.outputs, seen, "the output")
+    return flow, seen
+
+
+def _approximated(
+    evaluated: EvaluatedSystem,
+    point: Point,
+    unknowns: Slopes | None,
+    readers: list[Slopes],
+    order: int | None,
+) -> Approximated | None:
+    """What stands in place of dead time, if there is any."""
+    system = evaluated.system
+    if system.delays is None:
+        return None
+    if order is None:
+        raise InputError(
+            f"the dead time of {_late_blocks(system)} has no finite linear system",
+            where=system.name,
+            allowed="dead time with the order of its approximation",
+            fix="give delay_order=3, which is right up to about 3 / delay in rad/s",
+        )
+    if not _is_order(order):
+        raise InputError(
+            f"the delay_order is {order!r}",
+            where=system.name,
+            allowed=f"a whole number from 1 to {HIGHEST_ORDER}",
+            fix="3 is a good start",
+        )
+    everybody = [*readers]
+    if system.clocks:
+        everybody.append(_without(evaluated.update_slopes(point, np.ones(len(system.clocks))), unknowns))
+    inputs = _without(evaluated.delay_input_slopes(point), unknowns)
+    return Approximated(dead_time(evaluated, point, inputs, everybody), order)
+
+
+def _is_order(given: object) -> bool:
+    return isinstance(given, int) and not isinstance(given, bool) and 1 <= given <= HIGHEST_ORDER
+
+
+def _late_blocks(system: HybridSystem) -> str:
     names, _ = _elements(system.discrete)
-    return [names[place] for place in system.delays.values] if system.delays else []
+    places = system.delays.values if system.delays else ()
+    return ", ".join(sorted({names[place].rpartition("/")[0] for place in places}))
 
 
 def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -153,9 +250,8 @@ def _check_finite(system: HybridSystem, names: Sequence[str], slopes: Slopes, wh
 
 
 def _over_a_period(
-    evaluated: EvaluatedSystem,
-    point: Point,
-    unknowns: Slopes | None,
+    system: HybridSystem,
+    ticked: Callable[[tuple[int, ...]], Slopes],
     flow: Slopes,
     seen: Slopes,
     moved: NDArray[np.intp],
@@ -163,8 +259,7 @@ def _over_a_period(
     """The map of ``[x; z]`` over one period, and the output right after its first tick."""
     from scipy.linalg import expm
 
-    system = evaluated.system
-    n, m, k = system.states.size, moved.size, flow.p.shape[1]
+    n, m, k = flow.x.shape[1], moved.size, flow.p.shape[1]
     period, instants = common_period(system)
     generator = np.zeros((n + m + k, n + m + k))
     generator[:n] = np.hstack([flow.x, flow.z[:, moved], flow.p])
@@ -175,10 +270,9 @@ def _over_a_period(
     times = [time for time, _ in instants]
     for index, (time, ticking) in enumerate(instants):
         if ticking not in ticks:
-            slopes = _without(evaluated.update_slopes(point, np.array(ticking, dtype=np.float64)), unknowns)
+            slopes = ticked(ticking)
             jump = np.eye(n + m + k)
             jump[n : n + m] = np.hstack([slopes.x[moved], slopes.z[np.ix_(moved, moved)], slopes.p[moved]])
-            _check_finite(system, _elements(system.discrete)[0], slopes, "the discrete variable")
             ticks[ticking] = jump
         whole = ticks[ticking] @ whole
         if index == 0:
@@ -223,7 +317,7 @@ def _kept(
 ) -> NDArray[np.intp]:
     """All states but held outputs that are worked out anew before anybody looks at them."""
     a, _, c, _ = matrices
-    n = system.states.size
+    n = a.shape[0] - moved.size
     held = np.zeros(n + moved.size, dtype=np.bool_)
     names = [slot.name for slot in system.discrete for _ in range(slot.size)]
     held[n:] = [names[k] in system.signals_layout.ranges for k in moved]

@@ -1,12 +1,13 @@
 """Operating points at which a system rests: Newton's method, damped, with exact slopes.
 
-The unknowns are the states that are not given, what the clocks move, the unknowns of implicit equations, and
-the parameters that are free. The equations: every state that shall rest has the rate 0, every tick leaves
-what it moves as it is, the implicit equations hold, and the chosen signals have their values. Steps are those
-of Levenberg and Marquardt (Moré, Lecture Notes in Mathematics 630, 1978, 105-116), each unknown in the scale
-of its own column and kept within its bounds; of several solutions the one near the start is found, and where
-there are infinitely many, the nearest. Modes follow the point that was found, then it is sought again; where
-that leads nowhere (the line of a table's first piece meets zero far beyond its last), they follow every step.
+The unknowns are the states that are not given, what the clocks move, what comes out of delays, the unknowns
+of implicit equations, and the parameters that are free. The equations: every state that shall rest has the
+rate 0, every tick leaves what it moves as it is, what comes out of a delay is what goes in, the implicit
+equations hold, and the chosen signals have their values. Steps are those of Levenberg and Marquardt (Moré,
+Lecture Notes in Mathematics 630, 1978, 105-116), each unknown in the scale of its own column and kept within
+its bounds; of several solutions the one near the start is found, and where there are infinitely many, the
+nearest. Modes follow the point that was found, then it is sought again; where that leads nowhere (the line of
+a table's first piece meets zero far beyond its last), they follow every step.
 """
 
 from __future__ import annotations
@@ -135,7 +136,10 @@ class _Search:
         self.evaluated = EvaluatedSystem(system, problem.free_parameters.tolist(), problem.rows.tolist())
         self.whole = EvaluatedSystem(system)
         self.sampled = self.evaluated.sampled
-        self.moved: Places = np.flatnonzero(self.sampled)
+        delays = system.delays
+        self.delayed: Places = np.array([*delays.values, *delays.slopes] if delays else [], dtype=np.intp)
+        self.ticked: Places = np.flatnonzero(self.sampled)
+        self.moved: Places = np.concatenate([self.ticked, self.delayed])
         moved: list[int] = self.moved.tolist()
         self.ticking = np.ones(len(system.clocks))
         self.state_names, discrete_names = _elements(system.states), _elements(system.discrete)
@@ -149,7 +153,8 @@ class _Search:
         ]
         self.equations: list[str] = [
             *(f"rate of {self.state_names[k]}" for k in problem.resting.tolist()),
-            *(f"tick of {discrete_names[k]}" for k in moved),
+            *(f"tick of {discrete_names[k]}" for k in self.ticked.tolist()),
+            *(f"past of {discrete_names[k]}" for k in self.delayed.tolist()),
             *(f"equation of {name}" for name in _elements(system.algebraic)),
             *(signal_names[k] for k in problem.rows.tolist()),
         ]
@@ -177,8 +182,10 @@ class _Search:
         """What is left of every equation."""
         problem, evaluated = self.problem, self.evaluated
         parts = [evaluated.derivative(point)[problem.resting]]
-        if self.moved.size:
-            parts.append((evaluated.update(point, self.ticking) - point.z)[self.moved])
+        if self.ticked.size:
+            parts.append((evaluated.update(point, self.ticking) - point.z)[self.ticked])
+        if self.delayed.size:
+            parts.append(evaluated.delay_inputs(point) - point.z[self.delayed])
         parts += [evaluated.residual(point), evaluated.signals(point) - problem.targets]
         return np.concatenate(parts)
 
@@ -186,17 +193,21 @@ class _Search:
         """Derivatives of the equations by the unknowns."""
         problem, evaluated = self.problem, self.evaluated
         flow = evaluated.derivative_slopes(point)
-        blocks = [(flow, problem.resting, False)]
-        if self.moved.size:
-            blocks.append((evaluated.update_slopes(point, self.ticking), self.moved, True))
-        everything = np.arange(point.w.size)
-        blocks.append((evaluated.residual_slopes(point), everything, False))
-        blocks.append((evaluated.signal_slopes(point), np.arange(problem.rows.size), False))
+        nobody = np.zeros(0, dtype=np.intp)
+        # Slopes, their rows, and which of z is taken off each of these.
+        blocks = [(flow, problem.resting, nobody)]
+        if self.ticked.size:
+            blocks.append((evaluated.update_slopes(point, self.ticking), self.ticked, self.ticked))
+        if self.delayed.size:
+            going_in = evaluated.delay_input_slopes(point)
+            blocks.append((going_in, np.arange(self.delayed.size), self.delayed))
+        blocks.append((evaluated.residual_slopes(point), np.arange(point.w.size), nobody))
+        blocks.append((evaluated.signal_slopes(point), np.arange(problem.rows.size), nobody))
         rows: list[Array] = []
-        for slopes, chosen, ticked in blocks:
+        for slopes, chosen, taken_off in blocks:
             by_z = slopes.z[np.ix_(chosen, self.moved)]
-            if ticked:
-                by_z = by_z - np.eye(self.moved.size)
+            if taken_off.size:
+                by_z = by_z - (taken_off[:, None] == self.moved)
             by_x = slopes.x[np.ix_(chosen, problem.free_states)]
             rows.append(np.hstack([by_x, by_z, slopes.w[chosen], slopes.p[chosen]]))
         return np.vstack(rows)

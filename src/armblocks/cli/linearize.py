@@ -37,6 +37,10 @@ def linearize(
         typer.Option("--open", metavar="SIGNAL", help="A signal whose loop is cut; may be repeated."),
     ] = None,
     at: Annotated[float, typer.Option(help="Time of the run to linearize at, s.")] = 0.0,
+    delay_order: Annotated[
+        int | None,
+        typer.Option(help="States that stand for each dead time (Padé approximation).", show_default=False),
+    ] = None,
     trimmed: Annotated[
         bool, typer.Option("--trim", help="Linearize where the diagram rests, sought from there.")
     ] = False,
@@ -70,7 +74,13 @@ def linearize(
     if trimmed:
         place = ab.trim(diagram, free=free or (), at=at, parameters=parameters).point
     system: LinearSystem = ab.linearize(
-        diagram, inputs or (), outputs or (), at=place, open=opened or (), parameters=parameters
+        diagram,
+        inputs or (),
+        outputs or (),
+        at=place,
+        open=opened or (),
+        delay_order=delay_order,
+        parameters=parameters,
     )
     loop = bool(opened) and opened == inputs == outputs and system.is_siso
     shown = -system if loop else system

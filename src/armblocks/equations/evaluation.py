@@ -13,7 +13,7 @@ import numpy as np
 from casadi import SX, Function, densify, jacobian, jacobian_sparsity, vec, vertcat
 from numpy.typing import NDArray
 
-from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.hybrid_system import Delays, HybridSystem
 from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
 from armblocks.equations.traced_function import TracedFunction
 
@@ -148,6 +148,25 @@ class EvaluatedSystem:
     def update_slopes(self, point: Point, ticking: Array) -> Slopes:
         """Derivatives of what ``z`` becomes at a tick."""
         return self._differentiate(self.system.update, [*point.ends, ticking])
+
+    # Delays.
+
+    def delay_times(self, point: Point) -> Array:
+        """How long each delayed scalar is delayed (nd,), s."""
+        return self._call(self._delays.times, point.ends)
+
+    def delay_inputs(self, point: Point) -> Array:
+        """What goes into the delays, and its time derivatives (2 nd,)."""
+        return self._call(self._delays.inputs, point.ends)
+
+    def delay_input_slopes(self, point: Point) -> Slopes:
+        """Derivatives of what goes into the delays."""
+        return self._differentiate(self._delays.inputs, point.ends)
+
+    @property
+    def _delays(self) -> Delays:
+        assert self.system.delays is not None
+        return self.system.delays
 
     @cached_property
     def sampled(self) -> NDArray[np.bool_]:

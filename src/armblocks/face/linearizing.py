@@ -8,9 +8,10 @@ from os import PathLike
 from typing import Any, overload
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
-from armblocks.analysis.linearisation import input_ends, linearise, output_ends
+from armblocks.analysis.linearisation import exact_response, input_ends, linearise, output_ends
 from armblocks.analysis.operating_point import OperatingPoint, initial_point, operating_point, placed
 from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.diagram.analysis_points import PreparedDiagram, with_analysis_points
@@ -34,6 +35,7 @@ def linearize(
     *,
     at: Where = 0.0,
     open: str | Sequence[str] = (),
+    delay_order: int | None = None,
     parameters: Mapping[str, object] | None = None,
     **settings: Any,
 ) -> LinearSystem: ...
@@ -47,6 +49,7 @@ def linearize(
     *,
     at: Sequence[float],
     open: str | Sequence[str] = (),
+    delay_order: int | None = None,
     parameters: Mapping[str, object] | None = None,
     **settings: Any,
 ) -> tuple[LinearSystem, ...]: ...
@@ -59,6 +62,7 @@ def linearize(
     *,
     at: Where | Sequence[float] = 0.0,
     open: str | Sequence[str] = (),
+    delay_order: int | None = None,
     parameters: Mapping[str, object] | None = None,
     **settings: Any,
 ) -> LinearSystem | tuple[LinearSystem, ...]:
@@ -72,7 +76,9 @@ def linearize(
     So ``inputs="e", outputs="e", open="e"`` is the loop transfer function, signs included.
 
     ``at``: a time of a run (0: the start), several times (one system each), where a run ended
-    (``result.final_state``) or the point that ``trim`` found. ``parameters`` other values of parameters,
+    (``result.final_state``) or the point that ``trim`` found. ``delay_order``: dead time is approximated by
+    so many states each (Padé); needed where there is any, and exact in :func:`frequency_response`.
+    ``parameters`` other values of parameters,
     ``settings`` those of the run to ``at``, as in :func:`simulate`.
 
     Modes (a limiter at its limit) stay as they are at the point. A diagram with sample times gives a
@@ -84,10 +90,12 @@ def linearize(
     described = described_diagram(diagram, parameters)
     wanted, seen, opened = _names(inputs), _names(outputs), _names(open)
     if isinstance(at, float | int | RunState | OperatingPoint):
-        return _linearized(described, wanted, seen, opened, operating_point_at(described, at, **settings))
+        return _linearized(
+            described, wanted, seen, opened, operating_point_at(described, at, **settings), delay_order
+        )
     points = operating_points_at(described, at, **settings)
     prepared = _Prepared(described, wanted, seen, opened)
-    return tuple(prepared.at(point) for point in points)
+    return tuple(prepared.at(point, delay_order) for point in points)
 
 
 def described_diagram(
@@ -111,8 +119,31 @@ def _linearized(
     outputs: tuple[str, ...],
     opened: tuple[str, ...],
     point: OperatingPoint,
+    delay_order: int | None,
 ) -> LinearSystem:
-    return _Prepared(diagram, inputs, outputs, opened).at(point)
+    return _Prepared(diagram, inputs, outputs, opened).at(point, delay_order)
+
+
+def frequency_response(
+    diagram: Diagram | CompiledDiagram | str | PathLike[str],
+    inputs: str | Sequence[str],
+    outputs: str | Sequence[str],
+    frequencies: ArrayLike,
+    *,
+    at: Where = 0.0,
+    open: str | Sequence[str] = (),
+    parameters: Mapping[str, object] | None = None,
+    **settings: Any,
+) -> NDArray[np.complex128]:
+    """The response (N, ny, nu) of a diagram's linear system at angular frequencies (N,) in rad/s.
+
+    Dead time is exact: it is ``exp(-j w T)``, however it lies in loops. Arguments and errors are those of
+    :func:`linearize`; dead time beside sampled blocks raises ``InputError``.
+    """
+    described = described_diagram(diagram, parameters)
+    prepared = _Prepared(described, _names(inputs), _names(outputs), _names(open))
+    along = np.asarray(frequencies, dtype=np.float64).reshape(-1)
+    return prepared.response(operating_point_at(described, at, **settings), along)
 
 
 class _Prepared:
@@ -141,16 +172,22 @@ class _Prepared:
         self.evaluated = EvaluatedSystem(system, places, rows)
         self.system = system
 
-    def at(self, known: OperatingPoint) -> LinearSystem:
+    def at(self, known: OperatingPoint, delay_order: int | None) -> LinearSystem:
         """The linear system about a point of the diagram without points."""
+        return linearise(self.evaluated, self._placed(known), self.ends, known, delay_order=delay_order)
+
+    def response(self, known: OperatingPoint, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """The frequency response about such a point."""
+        return exact_response(self.evaluated, self._placed(known), self.ends, frequencies)
+
+    def _placed(self, known: OperatingPoint) -> Point:
         layout = self.system.parameters
         levels = {
             path: known.signals[signal].reshape(layout[path].shape)
             for path, signal in self.points.levels.items()
         }
         still = {slot.name: np.zeros(slot.shape) for slot in layout if slot.name not in known.parameters}
-        point = placed(self.evaluated, known, still | levels)
-        return linearise(self.evaluated, point, self.ends, known)
+        return placed(self.evaluated, known, still | levels)
 
 
 def _units(system: HybridSystem, path: str) -> tuple[str, ...]:

@@ -1,0 +1,147 @@
+"""Dead time in a linear system: as an all-pass of finite order, or exactly over the frequency.
+
+Linearised, what comes out of the delays of a diagram is one more input ``v`` and what goes into them one more
+output ``d``::
+
+    dx' = A dx + B du + E dv    dy = C dx + D du + F dv    dd = G dx + H du + K dv    dv(t) = dd(t - T)
+
+In its place stands Padé's approximation of order n over n, ``Q(-s T) / Q(s T)`` with the coefficients
+``(2n - k)! n! / ((2n)! k! (n - k)!)`` (Golub, Van Loan, Matrix Computations, 4th ed., 9.3.1): its gain is 1,
+and its phase is right as far as about n / T rad/s. How long a delay is stays as it is at the operating point.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+Realisation = tuple[Array, Array, Array, float]
+
+HIGHEST_ORDER = 10
+"""Of an approximation: beyond it, the coefficients are more rounding than approximation."""
+
+
+def pade(order: int, delay: float) -> Realisation:
+    """``A (n, n), B (n, 1), C (1, n), D`` of the approximation of a delay (s)."""
+    n = order
+    weights = [
+        math.factorial(2 * n - k) * math.factorial(n) / (math.factorial(k) * math.factorial(n - k))
+        for k in range(n + 1)
+    ]
+    # In units of time in which the product of all poles is 1, the companion matrix is well scaled.
+    unit = (weights[0] / weights[n]) ** (1.0 / n)
+    below = np.array([weights[k] * unit**k for k in range(n + 1)]) / weights[0]
+    above = below * (-1.0) ** np.arange(n + 1)
+    direct = float(above[n] / below[n])
+    A = np.diag(np.ones(n - 1), 1)
+    A[-1] = -below[:n] / below[n]
+    B = np.zeros((n, 1))
+    B[-1, 0] = 1.0
+    C = ((above[:n] - direct * below[:n]) / below[n])[None]
+    return A * (unit / delay), B * (unit / delay), C, direct
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DeadTime:
+    """The delays of a system at a point: where ``v`` stands in ``z``, how long each is, the slopes of ``d``.
+
+    ``names`` are those of ``v``. Only what some equation reads is kept.
+    """
+
+    places: Places
+    names: tuple[str, ...]
+    delays: Array
+    inputs: Slopes
+
+    @property
+    def count(self) -> int:
+        """Of delayed scalars."""
+        return self.places.size
+
+    @cached_property
+    def through(self) -> Array:
+        """``K``: what comes out of a delay and goes into another one at once."""
+        return self.inputs.z[:, self.places]
+
+
+def dead_time(evaluated: EvaluatedSystem, point: Point, inputs: Slopes, readers: list[Slopes]) -> DeadTime:
+    """The delays that ``readers``, or a delay that these read, look at; ``inputs``: of what goes in."""
+    system = evaluated.system
+    assert system.delays is not None
+    places = np.array([*system.delays.values, *system.delays.slopes], dtype=np.intp)
+    names = [name for slot in system.discrete for name in slot.elements]
+    delays = np.tile(evaluated.delay_times(point), 2)
+    read = np.any([reader.z[:, places].any(axis=0) for reader in readers], axis=0)
+    for _ in range(places.size):
+        read = read | inputs.z[np.ix_(np.flatnonzero(read), places)].any(axis=0)
+    kept: Places = np.flatnonzero(read)
+    chosen = Slopes(t=inputs.t[kept], x=inputs.x[kept], z=inputs.z[kept], w=inputs.w[kept], p=inputs.p[kept])
+    kept_places = places[kept]
+    return DeadTime(
+        places=kept_places,
+        names=tuple(names[int(k)] for k in kept_places),
+        delays=delays[kept],
+        inputs=chosen,
+    )
+
+
+class Approximated:
+    """Slopes over ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W d``."""
+
+    def __init__(self, dead: DeadTime, order: int) -> None:
+        self.dead = dead
+        size = dead.count * order
+        P, R, S = np.zeros((size, size)), np.zeros((size, dead.count)), np.zeros((dead.count, size))
+        W = np.zeros((dead.count, dead.count))
+        for k, delay in enumerate(dead.delays.tolist()):
+            own = slice(k * order, (k + 1) * order)
+            P[own, own], R[own, k : k + 1], S[k : k + 1, own], W[k, k] = pade(order, delay)
+        given = dead.inputs
+        # v = S q + W (G x + H u + K v), and so d.
+        inside = np.linalg.inv(np.eye(dead.count) - W @ dead.through)
+        self.by_x = inside @ np.hstack([W @ given.x, S])
+        self.by_z = inside @ (W @ self._others(given.z))
+        self.by_p = inside @ (W @ given.p)
+        self.names = tuple(f"{name} pade[{k}]" for name in dead.names for k in range(order))
+        went_in = self(given)
+        rate = np.hstack([np.zeros((size, given.x.shape[1])), P]) + R @ went_in.x
+        self.rates = Slopes(
+            t=np.zeros((size, 1)), x=rate, z=R @ went_in.z, w=np.zeros((size, 0)), p=R @ went_in.p
+        )
+
+    def _others(self, by_z: Array) -> Array:
+        """The slopes by all of ``z`` but what is delayed."""
+        others = by_z.copy()
+        others[:, self.dead.places] = 0.0
+        return others
+
+    def __call__(self, slopes: Slopes) -> Slopes:
+        """The slopes with the approximations in place of what is delayed."""
+        late = slopes.z[:, self.dead.places]
+        wider = np.hstack([slopes.x, np.zeros((slopes.x.shape[0], self.by_x.shape[1] - slopes.x.shape[1]))])
+        return Slopes(
+            t=slopes.t,
+            x=wider + late @ self.by_x,
+            z=self._others(slopes.z) + late @ self.by_z,
+            w=slopes.w,
+            p=slopes.p + late @ self.by_p,
+        )
+
+    def flow(self, slopes: Slopes) -> Slopes:
+        """Those of ``[x'; q']``."""
+        own, rates = self(slopes), self.rates
+        return Slopes(
+            t=np.vstack([own.t, rates.t]),
+            x=np.vstack([own.x, rates.x]),
+            z=np.vstack([own.z, rates.z]),
+            w=own.w,
+            p=np.vstack([own.p, rates.p]),
+        )
