@@ -67,3 +67,12 @@ def test_a_drawing_in_progress_is_drawn() -> None:
     wire = Connection(PortRef("gain", "y"), PortRef("scope", "u1"))
     draft = Diagram(name="draft", blocks={"gain": Gain(), "scope": Scope(inputs=2)}, connections=(wire,))
     assert b"gain (Gain)" in drawing_bytes(draft, "svg")
+
+
+def test_rates_have_colours_and_a_legend(invoke: Invoke, tmp_path: Path) -> None:
+    """The example has a 10 kHz and a 1 kHz loop."""
+    assert invoke("diagram", "puma560_multirate", "--rates", "-o", "rates.svg").exit_code == 0
+    text = (tmp_path / "rates.svg").read_text(encoding="utf-8")
+    assert ">D1: 100 µs<" in text and ">D2: 1 ms<" in text
+    assert ">D1<" in text and ">D2<" in text
+    assert ">D1<" not in drawing_bytes(ab.load_diagram("puma560_multirate"), "svg").decode()

@@ -14,16 +14,20 @@ from armblocks.blocks import (
     Constant,
     Demux,
     Display,
+    EnabledSubsystem,
     Gain,
+    Inport,
     Integrator,
     MathFunction,
     Mux,
+    Outport,
     Product,
     Saturation,
     Scope,
     SineWave,
     StateSpace,
     Step,
+    Subsystem,
     Sum,
     TransferFunction,
     Trigonometry,
@@ -32,12 +36,12 @@ from armblocks.diagram import Block, Diagram, DiagramBuilder, PortRef
 from armblocks.face.block_examples import example_block
 from armblocks.report.block_faces import face_size
 from armblocks.report.diagram_drawing import (
-    _nets,
-    _obstacle,
     block_marks,
     block_picture,
     diagram_picture,
     diagram_svg,
+    obstacle,
+    wire_nets,
 )
 from armblocks.report.diagram_layout import boxes, sized_box
 from armblocks.report.face_symbols import SIGNS
@@ -98,8 +102,8 @@ def routed(
     diagram: Diagram,
 ) -> tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]:
     placed = boxes(diagram)
-    nets, wires = _nets(diagram, placed)
-    obstacles = [_obstacle(box) for box in placed.values()]
+    nets, wires = wire_nets(diagram, placed)
+    obstacles = [obstacle(box) for box in placed.values()]
     return wires, nets, route(obstacles, nets), obstacles
 
 
@@ -218,6 +222,16 @@ def test_a_face_is_read_whole(kind: type[Block]) -> None:
 
 def test_signs_stand_for_blocks_that_exist() -> None:
     assert set(SIGNS) <= set(BLOCKS)
+
+
+def test_a_mask_shows_its_name() -> None:
+    inner = DiagramBuilder("Servo")
+    stiffness = inner.parameter("K", 3.0, doc="stiffness")
+    inner.add("y", Outport(), inner.add("spring", Gain(gain=stiffness), inner.add("u", Inport())))
+    masked = inner.build()
+    for kind in (Subsystem, EnabledSubsystem):
+        shown = {mark.text for mark in text_marks(block_picture(kind(diagram=masked)))}
+        assert {"Servo", "u", "y"} <= shown
 
 
 def test_a_run_shows_on_the_sinks_faces() -> None:

@@ -23,6 +23,9 @@ def diagram(
         bool | None,
         typer.Option("--dark/--light", help="The colours.", show_default="light; SVG as its reader prefers"),
     ] = None,
+    rates: Annotated[
+        bool, typer.Option("--rates", help="Show the sample times: a colour for each, and a legend.")
+    ] = False,
     trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagram names.")] = False,
 ) -> None:
     """Draw a diagram, or one of its subsystems, into a file."""
@@ -31,5 +34,5 @@ def diagram(
     drawn = ab.load_diagram(model, trust=trust)
     name = "-".join((drawn.name, *sheet.split("/"))) if sheet else drawn.name
     theme = None if dark is None else "dark" if dark else "light"
-    path = ab.draw_diagram(drawn, out or Path(f"{name}.svg"), sheet=sheet, theme=theme)
+    path = ab.draw_diagram(drawn, out or Path(f"{name}.svg"), sheet=sheet, theme=theme, rates=rates)
     results_console().print(f"wrote {path}", soft_wrap=True)

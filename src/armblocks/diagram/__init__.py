@@ -25,6 +25,7 @@ from armblocks.diagram.hierarchy import (
 )
 from armblocks.diagram.library import BlockLibrary
 from armblocks.diagram.mask import ParameterFormula, formula, mask_parameter
+from armblocks.diagram.model import sampling_of
 from armblocks.diagram.names import check_block_name
 from armblocks.diagram.parameter import REQUIRED, Parameter, ParameterKind, parameter, shape_of
 from armblocks.diagram.port import (
@@ -121,6 +122,7 @@ __all__ = [
     "parameter",
     "rate_unit",
     "sample_time_parameter",
+    "sampling_of",
     "shape_of",
     "trace_diagram",
     "with_parameters",

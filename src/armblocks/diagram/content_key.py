@@ -24,6 +24,7 @@ import numpy as np
 from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.function_content import UnknownContentError, function_parts
+from armblocks.diagram.hierarchy import levels_of
 from armblocks.diagram.port import PortRef
 from armblocks.diagram.user_function import UserFunction
 
@@ -34,7 +35,9 @@ def content_key(diagram: Diagram) -> str | None:
     """The key, hexadecimal; ``None`` where something about the equations cannot be known."""
     content = _Content()
     try:
-        content.add(diagram)
+        # Those inside first: each then finds what it holds known, however deep they are inside each other.
+        for level in reversed(levels_of(diagram).values()):
+            content.add(level)
     except UnknownContentError:
         return None
     content.add((casadi.__version__, np.__version__, platform.python_version()))
@@ -67,8 +70,6 @@ class _Content:
             self._add_array(np.asarray(cast("Any", value)))
         elif isinstance(value, Enum):
             self._texts.append(f"enum {_class_name(value)} {value.name}")
-        elif isinstance(value, Diagram):
-            self._add_diagram(value)
         else:
             self._add_object(value)
 
@@ -92,7 +93,7 @@ class _Content:
         self.add(("diagram", diagram.name, diagram.blocks, wires, gates))
 
     def _add_object(self, value: object) -> None:
-        """A block, a robot and other descriptions, once each: several blocks may share a robot."""
+        """A block, a diagram, a robot and the like, once each: several blocks may share a robot."""
         known = self._known.get(id(value))
         if known is None:
             part = _Content()
@@ -104,6 +105,9 @@ class _Content:
     def _add_fields(self, value: object) -> None:
         if isinstance(value, UserFunction):
             self._add_sequence(function_parts(value.function), "function")
+            return
+        if isinstance(value, Diagram):
+            self._add_diagram(value)
             return
         name = _class_name(value)
         if not dataclasses.is_dataclass(value) or not name.startswith(_OWN):

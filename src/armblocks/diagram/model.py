@@ -80,3 +80,11 @@ def _equations(
     except ArmblocksError as error:
         where = ", ".join(filter(None, (f"block '{name}' ({block.title})", error.where)))
         raise DiagramError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
+
+
+def sampling_of(diagram: Diagram) -> Sampling:
+    """The clocks of a diagram, and which one each sampled block of its flat form obeys.
+
+    Raises ``DiagramError`` for a diagram that cannot be traced.
+    """
+    return diagram.keep("sampling", lambda: diagram_model(diagram).sampling)

@@ -52,13 +52,15 @@ def draw_diagram(
     sheet: str = "",
     theme: Literal["light", "dark"] | None = None,
     result: SimulationResult | None = None,
+    rates: bool = False,
 ) -> Path:
     """Draw a diagram into a ``.svg``, ``.png`` or ``.pdf`` file; returns the path.
 
     ``sheet``: the path of a subsystem, such as ``"controller/filter"``; ``""`` is the top. ``theme``
     ``None``: SVG follows the reader's preference, the others are light. With a ``result``, scopes and
-    displays show what it holds. Raises UnknownNameError for another suffix or sheet.
+    displays show what it holds; ``rates`` shows the clocks of sampled blocks. Raises UnknownNameError for
+    another suffix or sheet.
     """
     from armblocks import report
 
-    return report.draw_diagram(path, diagram, result, sheet=sheet, theme=theme)
+    return report.draw_diagram(path, diagram, result, sheet=sheet, theme=theme, rates=rates)

@@ -26,6 +26,7 @@ from armblocks.report.block_faces import FaceShape
 from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes, sized_box
 from armblocks.report.face_marks import Room
 from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text
+from armblocks.report.rates import Rates
 from armblocks.report.sink_faces import Trend
 from armblocks.report.style import Theme, Tone
 from armblocks.report.svg import svg_file
@@ -40,28 +41,37 @@ _STUB = 16.0
 """px of wire at the ports of a block that is drawn alone."""
 
 
-def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *, sheet: str = "") -> Picture:
+def diagram_picture(
+    diagram: Diagram, result: SimulationResult | None = None, *, sheet: str = "", rates: bool = False
+) -> Picture:
     """A sheet of the diagram, its sinks showing what the run gave them if a result is given.
 
     ``sheet``: the path of the subsystem that is drawn instead of the top. A drawing in progress, which cannot
-    be traced yet, has thin wires only. Raises UnknownNameError for a sheet that is not there.
+    be traced yet, has thin wires only. ``rates``: sampled blocks and their wires show their clocks, which a
+    legend names. Raises UnknownNameError for a sheet that is not there, DiagramError for unknown rates.
     """
     carried = _Carried.of(diagram)
+    clocks = Rates.of(diagram) if rates else Rates()
     if sheet not in carried.levels:
         known = [path for path in carried.levels if path]
         raise UnknownNameError("sheet", sheet, known, where=f"diagram '{diagram.name}'")
     level = carried.levels[sheet]
     path = f"{sheet}/" if sheet else ""
     placed = boxes(level)
-    nets, wires = _nets(level, placed)
-    routed = route([_obstacle(box) for box in placed.values()], nets)
+    nets, wires = wire_nets(level, placed)
+    routed = route([obstacle(box) for box in placed.values()], nets)
     marks: list[Mark] = []
     for (source, _), net in zip(wires.items(), routed):
         kind = carried.kind(PortRef(path + source.block, source.port))
-        marks += _wire(net, kind, _wire_title(source, wires[source]))
+        _, tone = clocks.mark(path + source.block) or ("", Tone.WIRE)
+        marks += _wire(net, kind, _wire_title(source, wires[source]), tone)
     for name, box in placed.items():
         trend = _trend(path + name, carried.views.get(path + name), result)
-        marks.append(Group(tuple(_block(box, trend)), title=_block_title(name, box)))
+        block = _block(box, trend)
+        if (mark := clocks.mark(path + name)) is not None:
+            place = box.x + box.width, box.y - 4
+            block.append(Text(*place, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
+        marks.append(Group(tuple(block), title=_block_title(name, box)))
     left, top, right, bottom = _extent(placed, routed)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
@@ -71,6 +81,7 @@ def diagram_picture(diagram: Diagram, result: SimulationResult | None = None, *,
     )
     drawn = Picture(width=0, height=0, title="", marks=marks)
     picture.place(drawn, _MARGIN - left, _MARGIN - top)
+    clocks.add_legend(picture)
     return picture
 
 
@@ -114,7 +125,8 @@ def block_picture(block: Block) -> Picture:
     return picture
 
 
-def _nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
+def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
+    """What is to be laid out: a net for every output that is connected, and its targets by source."""
     wires: dict[PortRef, list[PortRef]] = {}
     for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
         wires.setdefault(wire.source, []).append(wire.target)
@@ -133,7 +145,8 @@ def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
     return WireEnd(spot.x, spot.y, spot.dx, spot.dy)
 
 
-def _obstacle(box: Box) -> Obstacle:
+def obstacle(box: Box) -> Obstacle:
+    """The room of a block and its name, which wires go around."""
     return Obstacle(box.x, box.y, box.width, box.height, _label(box))
 
 
@@ -257,19 +270,19 @@ class _Carried:
         return WireKind(min(len(self.outputs.get(carried.block, {}).get(carried.port, ())), 2))
 
 
-def _wire(net: RoutedNet, kind: WireKind, title: str) -> list[Mark]:
+def _wire(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[Mark]:
     """A scalar is a thin line, a vector a heavy one, a matrix a double one, a bus three lines."""
     marks: list[Mark] = []
     weight = (1.2, 2.3, 3.8, 5.4)[kind]
     lines = [_rounded(_shortened(path, 5.0)) for path in net.paths]
-    marks += [Curve(line, stroke=Tone.WIRE, width=weight) for line in lines]
+    marks += [Curve(line, stroke=tone, width=weight) for line in lines]
     if kind is WireKind.MATRIX:
         marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
     if kind is WireKind.BUS:
         marks += [Curve(line, stroke=Tone.SURFACE, width=3.2) for line in lines]
-        marks += [Curve(line, stroke=Tone.WIRE, width=1.0) for line in lines]
-    marks += [_arrow_head(path) for path in net.paths]
-    marks += [Disc(x, y, 2.6 + 0.3 * kind, fill=Tone.WIRE) for x, y in net.dots]
+        marks += [Curve(line, stroke=tone, width=1.0) for line in lines]
+    marks += [_arrow_head(path, tone) for path in net.paths]
+    marks += [Disc(x, y, 2.6 + 0.3 * kind, fill=tone) for x, y in net.dots]
     return [Group(tuple(marks), title=title)]
 
 
@@ -302,13 +315,13 @@ def _towards(a: Point, b: Point, length: float) -> Point:
     return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
 
 
-def _arrow_head(path: tuple[Point, ...]) -> Mark:
+def _arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:
     (ax, ay), (bx, by) = path[-2], path[-1]
     length = _distance((ax, ay), (bx, by)) or 1.0
     dx, dy = (bx - ax) / length, (by - ay) / length
     back = (bx - 8 * dx, by - 8 * dy)
     corners = [(bx, by), (back[0] - 3.7 * dy, back[1] + 3.7 * dx), (back[0] + 3.7 * dy, back[1] - 3.7 * dx)]
-    return Polyline(corners, stroke=None, fill=Tone.WIRE, closed=True)
+    return Polyline(corners, stroke=None, fill=tone, closed=True)
 
 
 def _extent(placed: dict[str, Box], routed: list[RoutedNet]) -> tuple[float, float, float, float]:

@@ -24,6 +24,7 @@ def draw_diagram(
     *,
     sheet: str = "",
     theme: Theme | None = None,
+    rates: bool = False,
 ) -> Path:
     """Write a sheet as ``….svg``, ``….png`` or ``….pdf``, all or nothing; returns the path.
 
@@ -31,7 +32,7 @@ def draw_diagram(
     """
     place = Path(path)
     kind = place.suffix.removeprefix(".").lower()
-    write_atomically(place, drawing_bytes(diagram, kind, result, sheet=sheet, theme=theme))
+    write_atomically(place, drawing_bytes(diagram, kind, result, sheet=sheet, theme=theme, rates=rates))
     return place
 
 
@@ -42,16 +43,18 @@ def drawing_bytes(
     *,
     sheet: str = "",
     theme: Theme | None = None,
+    rates: bool = False,
 ) -> bytes:
     """A sheet in one of ``DRAWING_FORMATS``.
 
-    ``sheet``: the path of a subsystem, ``""`` the top. ``result``: what the sinks show. ``theme`` ``None``:
+    ``sheet``: the path of a subsystem, ``""`` the top. ``result``: what the sinks show. ``rates``: clocks in
+    colours, with a legend. ``theme`` ``None``:
     SVG follows the reader's preference, the others are light. A drawing in progress, whose inputs are not all
     connected, is drawn as well. Raises UnknownNameError for another format or sheet.
     """
     if kind not in DRAWING_FORMATS:
         raise UnknownNameError("drawing format", kind, DRAWING_FORMATS)
-    picture = diagram_picture(diagram, result, sheet=sheet)
+    picture = diagram_picture(diagram, result, sheet=sheet, rates=rates)
     if kind == "svg":
         return svg_file(picture, theme=theme).encode()
     if kind == "png":

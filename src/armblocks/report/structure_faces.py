@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armblocks import blocks as kinds
-from armblocks.diagram import Block
+from armblocks.diagram import Block, Diagram
 from armblocks.report.face_marks import Room, words
 from armblocks.report.picture import Disc, Mark, Polyline, Rectangle, Text
 from armblocks.report.style import Tone
@@ -66,9 +66,13 @@ def bus_bar(block: Block, x: float, y: float, width: float, height: float, flipp
 
 
 def subsystem_marks(block: Block, room: Room, tops: tuple[tuple[str, float], ...]) -> list[Mark]:
-    """A small diagram, and above it the symbols of its controls under their ports (name, x)."""
+    """A small diagram, or a mask's name; above it the symbols of its controls under their ports (name, x)."""
     down = CONTROL_ROOM if tops else 0.0
-    marks = _sheet(Room(room.x, room.y + down, room.width, room.height - down))
+    below = Room(room.x, room.y + down, room.width, room.height - down)
+    inner: object = block.parameter_value("diagram")
+    marks = (
+        words(below, inner.name, size=10.5) if isinstance(inner, Diagram) and inner.mask else _sheet(below)
+    )
     for name, x in tops:
         marks += _control(block, name, x, room.y + 5.0)
     return marks
