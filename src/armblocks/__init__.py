@@ -18,7 +18,15 @@ if TYPE_CHECKING:
     from armblocks.face.arm import Arm
     from armblocks.face.block_examples import block_example
     from armblocks.face.diagram_run import DiagramRun
-    from armblocks.face.diagrams import list_blocks, list_examples, load_diagram, save_diagram
+    from armblocks.face.diagrams import (
+        list_blocks,
+        list_examples,
+        list_libraries,
+        load_diagram,
+        load_library,
+        save_diagram,
+        save_library,
+    )
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
     from armblocks.face.payload import Payload
@@ -83,12 +91,15 @@ else:
             "linearize": "armblocks.face.linearizing",
             "list_blocks": "armblocks.face.diagrams",
             "list_examples": "armblocks.face.diagrams",
+            "list_libraries": "armblocks.face.diagrams",
             "list_robots": "armblocks.face.robots",
             "load_diagram": "armblocks.face.diagrams",
+            "load_library": "armblocks.face.diagrams",
             "load_robot": "armblocks.face.robots",
             "load_table": "armblocks.formats",
             "modified_dh": "armblocks.robot",
             "save_diagram": "armblocks.face.diagrams",
+            "save_library": "armblocks.face.diagrams",
             "save_robot": "armblocks.face.robots",
             "sensitivity": "armblocks.face.sensitivity",
             "simulate": "armblocks.face.model",
@@ -136,12 +147,15 @@ __all__ = [
     "linearize",
     "list_blocks",
     "list_examples",
+    "list_libraries",
     "list_robots",
     "load_diagram",
+    "load_library",
     "load_robot",
     "load_table",
     "modified_dh",
     "save_diagram",
+    "save_library",
     "save_robot",
     "sensitivity",
     "simulate",

@@ -25,7 +25,7 @@ def test_the_wheel_fits_every_system(wheel: Path) -> None:
 
 def test_the_wheel_brings_what_is_shipped(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
-    for folder in ("robots", "examples"):
+    for folder in ("robots", "examples", "libraries"):
         for path in (ROOT / folder).rglob("*.*"):
             if path.is_file() and not path.name.startswith("."):
                 assert f"armblocks/shipped/{path.relative_to(ROOT).as_posix()}" in names

@@ -43,7 +43,7 @@ from armblocks.diagram.port import (
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
-from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem
+from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem, block_count
 from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
@@ -103,6 +103,7 @@ __all__ = [
     "View",
     "ViewKind",
     "WorkedExample",
+    "block_count",
     "block_equations",
     "broadcast",
     "check_block_name",

@@ -27,6 +27,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
+from armblocks.diagram.mask_tuning import mask_parameters
 from armblocks.equations import Shape
 from armblocks.errors import InputError, UnknownNameError
 
@@ -95,7 +96,8 @@ def with_analysis_points(
     """Put the points of a linearisation into a diagram.
 
     An input or opening is an output port ``block/port`` (all wires that leave it), an input port (that one
-    wire), or a block with a single output. An input may also be a tunable parameter, ``block.parameter``.
+    wire), or a block with a single output. An input may also be a tunable parameter, ``block.parameter``,
+    or that of a mask, for which :func:`~armblocks.diagram.mask_tuning.added_parameter` makes the equations.
     Where a signal is both, the change comes in behind the cut. Raises ``UnknownNameError`` and ``InputError``
     for names that mean nothing of the kind or stand twice.
     """
@@ -103,8 +105,9 @@ def with_analysis_points(
     given, diagram = diagram, form.diagram
     parameters: dict[str, str] = {}
     moved: dict[PortRef, str] = {}
+    masked = mask_parameters(given)
     for name in _once(inputs, "input"):
-        path = _parameter(diagram, name)
+        path = name if name in masked and name not in diagram.blocks else _parameter(diagram, name)
         if path is None:
             moved[_port(form, name, "input")] = name
         else:

@@ -217,6 +217,17 @@ def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[st
     return tuple(found)
 
 
+def block_count(diagram: Diagram) -> int:
+    """How many blocks a diagram has, those inside its subsystems included."""
+    return diagram.keep(
+        "block count",
+        lambda: sum(
+            1 + (block_count(block.diagram) if isinstance(block, DiagramBlock) else 0)
+            for block in diagram.blocks.values()
+        ),
+    )
+
+
 def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
     """The ports that the In blocks of a diagram are from outside."""
     return diagram.keep(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import Diagram, flat_diagram, with_parameters
+from armblocks.diagram.mask_tuning import followers, mask_parameters, tunable_parameters
 from armblocks.errors import InputError
 from armblocks.simulation import RunState, Samples, Simulation, SimulationResult
 
@@ -83,11 +84,15 @@ class DiagramRun:
         changed = with_parameters(self.diagram, {path: value})
         tuned = tuned_parameters(self.diagram, changed)
         if tuned is None:
+            follows = (
+                followers(self.diagram, path).structural if path in mask_parameters(self.diagram) else []
+            )
+            why = f": '{follows[0]}', which follows from it, belongs to the structure" if follows else ""
+            names = [name for name, _, _ in tunable_parameters(self.diagram)]
             raise InputError(
-                f"parameter '{path}' cannot take this value while the diagram runs",
+                f"parameter '{path}' cannot take this value while the diagram runs{why}",
                 where=self.diagram.name,
-                allowed="tunable parameters, of the shape that they have: "
-                f"{', '.join(self.simulation.compiled.parameters.names)}",
+                allowed=f"tunable parameters, of the shape that they have: {', '.join(names)}",
                 fix="end the run, change the diagram and begin another run",
             )
         self.simulation.set(tuned)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram
+from armblocks.diagram import Diagram, DiagramBlock, Subsystem
 
 
 def load_diagram(name_or_path: str | PathLike[str], *, trust: bool = False) -> Diagram:
@@ -22,6 +23,28 @@ def load_diagram(name_or_path: str | PathLike[str], *, trust: bool = False) -> D
 def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
     """Write a diagram as canonical JSON, all or nothing; returns the path."""
     return formats.write_diagram(path, diagram)
+
+
+def load_library(name_or_path: str | PathLike[str], *, trust: bool = False) -> Mapping[str, Subsystem]:
+    """The blocks of a library of subsystems by name, linked to it: a shipped name, or a file's path.
+
+    ``load_library("joint_servos")["JointServo"].with_parameters(kp=40.0)`` is a block for a builder. What
+    ``trust`` means is as in :func:`load_diagram`.
+    """
+    entries = formats.load_library(name_or_path, BLOCKS, trust=trust)
+    return {name: Subsystem(diagram=diagram) for name, diagram in entries.items()}
+
+
+def save_library(blocks: Mapping[str, DiagramBlock | Diagram], path: str | PathLike[str]) -> Path:
+    """Write diagrams, or what is inside blocks, as a library, all or nothing; returns the path."""
+    return formats.write_library(
+        path, {name: b.diagram if isinstance(b, DiagramBlock) else b for name, b in blocks.items()}
+    )
+
+
+def list_libraries() -> tuple[str, ...]:
+    """Names of the shipped libraries of subsystems."""
+    return formats.list_libraries()
 
 
 def list_examples() -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from armblocks.analysis.operating_point import OperatingPoint, initial_point, op
 from armblocks.diagram import Diagram, trace_diagram, with_parameters
 from armblocks.diagram.analysis_points import PreparedDiagram, with_analysis_points
 from armblocks.diagram.hierarchy import flatten_hierarchy
+from armblocks.diagram.mask_tuning import with_mask_parameters
 from armblocks.equations import HybridSystem
 from armblocks.equations.evaluation import EvaluatedSystem, Point
 from armblocks.errors import InputError
@@ -69,10 +70,11 @@ def linearize(
     """The exact linear system of a diagram about an operating point, by differentiating its equations.
 
     ``inputs``: signals that are moved. ``"step"`` or ``"step/y"`` adds a small change to that output;
-    ``"plant/u"`` to what reaches that input only; ``"const.value"`` moves a tunable parameter. ``outputs``:
-    signals that are looked at, by the names that a result knows. An output port shows the signal before a
-    change that is added to it, an input port what arrives. ``open``: signals that are cut; what comes
-    behind the cut stays as it is at the operating point, but for the change of an input at the same place.
+    ``"plant/u"`` to what reaches that input only; ``"const.value"`` moves a tunable parameter, a mask's too.
+    ``outputs``: signals that are looked at, by the names that a result knows. An output port shows the signal
+    before a change that is added to it, an input port what arrives. ``open``: signals that are cut; what
+    comes behind the cut stays as it is at the operating point, but for the change of an input at the same
+    place.
     So ``inputs="e", outputs="e", open="e"`` is the loop transfer function, signs included.
 
     ``at``: a time of a run (0: the start), several times (one system each), where a run ended
@@ -162,6 +164,7 @@ class _Prepared:
             if self.points.diagram is diagram
             else trace_diagram(self.points.diagram)
         )
+        system = with_mask_parameters(system, diagram, self.points.inputs.values())
         places, names = input_ends(system, self.points.inputs)
         # Ports of subsystems are not in the flat diagram that has the points.
         aliases = flatten_hierarchy(diagram).aliases

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram
+from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations.sensitivity import sensitivity_name, sensitivity_system
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.linearizing import described_diagram
@@ -63,6 +64,8 @@ def sensitivity(
 ) -> SensitivityResult:
     """Run a diagram together with the exact derivatives of ``outputs`` by tunable ``parameters``.
 
+    Parameters of masks are among them, and what follows from them by formulas is moved with them.
+
     The traced equations are differentiated and integrated beside the equations themselves, natively, under
     the same error control; ticks, implicit equations and the instants of events are accounted for.
     ``values``: other values of parameters; ``settings`` those of the run, as in :func:`simulate`.
@@ -72,8 +75,8 @@ def sensitivity(
     ``SimulationError`` as a run does.
     """
     described = described_diagram(diagram, values)
-    system = compile_diagram(described).system
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+    system = with_mask_parameters(compile_diagram(described).system, described, names)
     wanted = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     if not names or not wanted:
         raise InputError(
@@ -81,7 +84,8 @@ def sensitivity(
         )
     for name in names:
         if name not in system.parameters.ranges:
-            raise UnknownNameError("tunable parameter", name, system.parameters.names, where=system.name)
+            known = [*mask_parameters(described), *system.parameters.names]
+            raise UnknownNameError("tunable parameter", name, known, where=system.name)
     paths = [system.aliases.get(name, name) for name in wanted]
     for path in paths:
         if path not in system.signals_layout.ranges:

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING
 from armblocks.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from armblocks.formats.diagram_files import list_examples, load_diagram, read_diagram, write_diagram
+    from armblocks.formats.diagram_files import (
+        list_examples,
+        load_diagram,
+        load_library,
+        read_diagram,
+        write_diagram,
+        write_library,
+    )
     from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
     from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.matlab_script import Script, read_script
@@ -14,6 +21,7 @@ if TYPE_CHECKING:
     from armblocks.formats.robot_format import RobotFormat
     from armblocks.formats.robot_json import holds_robot, read_robot, write_robot
     from armblocks.formats.robot_references import ResolveRobot
+    from armblocks.formats.subsystem_libraries import list_libraries
     from armblocks.formats.table_files import load_table
 else:
     __getattr__ = lazy_exports(
@@ -28,8 +36,10 @@ else:
             "diagram_to_python": "armblocks.formats.diagram_python",
             "holds_robot": "armblocks.formats.robot_json",
             "list_examples": "armblocks.formats.diagram_files",
+            "list_libraries": "armblocks.formats.subsystem_libraries",
             "list_robots": "armblocks.formats.robot_files",
             "load_diagram": "armblocks.formats.diagram_files",
+            "load_library": "armblocks.formats.diagram_files",
             "load_robot": "armblocks.formats.robot_files",
             "load_table": "armblocks.formats.table_files",
             "read_diagram": "armblocks.formats.diagram_files",
@@ -37,6 +47,7 @@ else:
             "read_robots": "armblocks.formats.robot_files",
             "read_script": "armblocks.formats.matlab_script",
             "write_diagram": "armblocks.formats.diagram_files",
+            "write_library": "armblocks.formats.diagram_files",
             "write_robot": "armblocks.formats.robot_json",
         },
     )
@@ -51,8 +62,10 @@ __all__ = [
     "diagram_to_python",
     "holds_robot",
     "list_examples",
+    "list_libraries",
     "list_robots",
     "load_diagram",
+    "load_library",
     "load_robot",
     "load_table",
     "read_diagram",
@@ -60,5 +73,6 @@ __all__ = [
     "read_robots",
     "read_script",
     "write_diagram",
+    "write_library",
     "write_robot",
 ]

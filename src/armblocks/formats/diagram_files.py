@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike, fspath
 from pathlib import Path
 
-from armblocks.diagram import BlockLibrary, Diagram
+from armblocks.diagram import BlockLibrary, Diagram, check_block_name
 from armblocks.errors import UnknownNameError
 from armblocks.files import read_bounded, write_atomically
-from armblocks.formats.diagram_json import MOST_BYTES, diagram_from_bytes, diagram_to_bytes
+from armblocks.formats.diagram_json import (
+    MOST_BYTES,
+    diagram_from_bytes,
+    diagram_to_bytes,
+    library_to_bytes,
+    read_library,
+)
 from armblocks.formats.robot_files import load_robot, shipped_folder
 from armblocks.formats.robot_references import ResolveRobot
+from armblocks.formats.subsystem_libraries import library_path
 
 SUFFIX = ".json"
 
@@ -73,4 +81,30 @@ def write_diagram(
     """
     target = Path(fspath(path))
     write_atomically(target, diagram_to_bytes(diagram, resolve_robot, folder=target.parent))
+    return target
+
+
+def load_library(
+    name_or_path: str | PathLike[str],
+    library: BlockLibrary,
+    resolve_robot: ResolveRobot = load_robot,
+    *,
+    trust: bool = False,
+) -> Mapping[str, Diagram]:
+    """The diagrams of a library by name, each linked to it: a shipped library's name, or a path.
+
+    Raises as :func:`read_diagram`.
+    """
+    path = Path(name_or_path) if isinstance(name_or_path, PathLike) else library_path(name_or_path, None)
+    return read_library(path.resolve(), library, resolve_robot, trust=trust)
+
+
+def write_library(
+    path: str | PathLike[str], entries: Mapping[str, Diagram], resolve_robot: ResolveRobot = load_robot
+) -> Path:
+    """Write a library of diagrams by name, all or nothing, and return its path."""
+    target = Path(fspath(path))
+    for name in entries:
+        check_block_name(name, str(target))
+    write_atomically(target, library_to_bytes(entries, resolve_robot, folder=target.parent))
     return target

@@ -17,6 +17,9 @@ A diagram may declare parameters, its ``mask``; a block's ``formulas`` over them
 and the values that follow are not written. What the parameters are is said by the block that holds the
 diagram, among its own, and by the document itself of the outermost one, under ``parameters``.
 
+A block that is linked to an entry of a library has ``library`` in the place of ``diagram``: see
+:mod:`armblocks.formats.subsystem_libraries`.
+
 A block that holds a diagram has it beside its parameters, under ``diagram``, with the same keys, but without
 ``format`` and ``robots``, which stand once, and without settings and layout where there is nothing to say.
 
@@ -60,6 +63,13 @@ from armblocks.formats.json_document import (
 )
 from armblocks.formats.mask_json import mask_parameter_from, mask_parameter_to
 from armblocks.formats.robot_references import ResolveRobot, RobotReader, RobotWriter
+from armblocks.formats.subsystem_libraries import (
+    Libraries,
+    ReadEntry,
+    ReadFile,
+    read_library_file,
+    shortest_link,
+)
 from armblocks.robot import Robot
 
 FORMAT_VERSION = 1
@@ -69,6 +79,7 @@ DEEPEST = 320
 
 _INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "logged", "layout", "settings")
 _DOCUMENT_KEYS = ("format", *_INNER_KEYS, "parameters", "robots")
+_LIBRARY_KEYS = ("format", "library", "robots")
 _SETTINGS = {field.name: field.default for field in dataclasses.fields(SimulationOptions)}
 _PLACEMENT = {field.name: field.default for field in dataclasses.fields(Placement)}
 _WIRE = re.compile(r"([^/]+)/([^/]+?) -> ([^/]+)/([^/]+)")
@@ -88,21 +99,25 @@ def diagram_from_bytes(
     folder: Path | None = None,
     trust: bool = False,
     draft: bool = False,
+    read_library: ReadFile = read_library_file,
 ) -> Diagram:
     """The checked diagram of a document; ``library`` holds the block types that it may use.
 
     ``name`` is what messages call the file; a robot's path is relative to ``folder``, and ``resolve_robot``
     turns a shipped name or a path into a robot. Python functions that the diagram names are only loaded,
     which runs their file, with ``trust``. With ``draft`` the diagram may be one that cannot run yet: open
-    inputs, shapes that do not fit. Raises ``FormatError`` for what the format forbids,
-    ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, and ``DiagramError`` for a
-    diagram that cannot be built. All name the file, and the line where the fault has one.
+    inputs, shapes that do not fit. ``read_library`` opens the libraries that blocks are linked to.
+
+    Raises ``FormatError`` for what the format forbids, ``UnknownNameError`` for unknown types, parameters,
+    blocks, ports and robots, and ``DiagramError`` for a diagram that cannot be built. All name the file, and
+    the line where the fault has one.
     """
     root = read_document(data, name, MOST_BYTES, DEEPEST)
     members, _ = split_members(root, _DOCUMENT_KEYS)
     _check_version(root, members)
     robots = RobotReader(members.get("robots"), folder, resolve_robot, trust=trust)
-    reader = _Reader(library, robots, draft=draft)
+    libraries = Libraries(folder, _entry_reader(library, resolve_robot, trust=trust), read_library)
+    reader = _Reader(library, robots, libraries, draft=draft)
     return reader.diagram(root, _DOCUMENT_KEYS, Path(name).stem)
 
 
@@ -112,7 +127,7 @@ def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: P
     A robot is written as the shortest reference that gives an equal one, its path relative to ``folder``.
     Raises ``FormatError`` where a value has no place in JSON.
     """
-    writer = _Writer(RobotWriter(folder, resolve_robot))
+    writer = _Writer(RobotWriter(folder, resolve_robot), folder)
     document = {"format": FORMAT_VERSION, **writer.diagram(diagram)}
     if diagram.mask:
         document["parameters"] = writer.values(diagram)
@@ -121,11 +136,37 @@ def diagram_to_bytes(diagram: Diagram, resolve_robot: ResolveRobot, *, folder: P
     return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
 
 
+def read_library(
+    path: Path,
+    library: BlockLibrary,
+    resolve_robot: ResolveRobot,
+    *,
+    trust: bool = False,
+) -> Mapping[str, Diagram]:
+    """All diagrams of a library file, each linked to it; raises as :func:`diagram_from_bytes`."""
+    return Libraries(None, _entry_reader(library, resolve_robot, trust=trust)).entries(path)
+
+
+def library_to_bytes(
+    entries: Mapping[str, Diagram], resolve_robot: ResolveRobot, *, folder: Path | None = None
+) -> bytes:
+    """The canonical document of a library of diagrams by name."""
+    writer = _Writer(RobotWriter(folder, resolve_robot), folder)
+    document: dict[str, object] = {
+        "format": FORMAT_VERSION,
+        "library": {name: writer.inside(diagram) for name, diagram in entries.items()},
+    }
+    if writer.robots.table:
+        document["robots"] = writer.robots.table
+    return canonical_bytes(document, one_line=_is_placement, deepest=DEEPEST)
+
+
 class _Writer:
     """Says the diagrams of one document as plain values."""
 
-    def __init__(self, robots: RobotWriter) -> None:
+    def __init__(self, robots: RobotWriter, folder: Path | None) -> None:
         self.robots = robots
+        self.folder = folder
 
     def diagram(self, diagram: Diagram) -> dict[str, object]:
         """A diagram, and those inside it."""
@@ -170,11 +211,14 @@ class _Writer:
             for rule, value in values.items()
             if not _is_diagram(rule) and rule.name not in formulas
         }
-        inside = {
-            rule.name: self._inside(cast("Diagram", value))
-            for rule, value in values.items()
-            if _is_diagram(rule)
-        }
+        inside: dict[str, object] = {}
+        for rule, value in values.items():
+            if _is_diagram(rule):
+                diagram = cast("Diagram", value)
+                if diagram.link:
+                    inside["library"] = shortest_link(diagram.link, self.folder)
+                else:
+                    inside[rule.name] = self.inside(diagram)
         stated = {"formulas": formulas} if formulas else {}
         return {"type": block.type_name(), "parameters": plain, **stated, **inside}
 
@@ -182,7 +226,8 @@ class _Writer:
         """What the parameters of the outermost diagram's own mask are."""
         return {rule.name: self._value(rule, diagram.mask_values[rule.name]) for rule in diagram.mask}
 
-    def _inside(self, diagram: Diagram) -> dict[str, object]:
+    def inside(self, diagram: Diagram) -> dict[str, object]:
+        """A diagram that is not the outermost one: what says nothing is left out."""
         document = self.diagram(diagram)
         if diagram.settings == SimulationOptions() and "settings" not in diagram.extras:
             del document["settings"]
@@ -205,6 +250,8 @@ def _is_diagram(rule: Parameter) -> bool:
 
 
 def _is_placement(path: KeyPath) -> bool:
+    if len(path) > 2 and path[0] == "library":
+        path = path[2:]
     while len(path) > 3 and path[0] == "blocks" and path[2] == "diagram":
         path = path[3:]
     return len(path) == 2 and path[0] == "layout"
@@ -253,9 +300,12 @@ def _joined(node: Node, error: ArmblocksError) -> str:
 class _Reader:
     """Makes the diagrams of one document."""
 
-    def __init__(self, library: BlockLibrary, robots: RobotReader, *, draft: bool) -> None:
+    def __init__(
+        self, library: BlockLibrary, robots: RobotReader, libraries: Libraries, *, draft: bool
+    ) -> None:
         self.library = library
         self.robots = robots
+        self.libraries = libraries
         self.draft = draft
 
     def diagram(self, node: Node, known: tuple[str, ...], name: str) -> Diagram:
@@ -298,10 +348,17 @@ class _Reader:
             kind = self.library[node.members()["type"].text()]
         rules = {rule.name: rule for rule in kind.parameters()}
         inside = [name for name, rule in rules.items() if _is_diagram(rule)]
-        members = _split(node, ("type", "parameters", "formulas", *inside), extras, "blocks", key)
+        linked = ("library",) if inside else ()
+        members = _split(node, ("type", "parameters", "formulas", *inside, *linked), extras, "blocks", key)
         values: dict[str, object] = {
             name: self.diagram(members[name], _INNER_KEYS, key) for name in inside if name in members
         }
+        if linked and "library" in members:
+            if values:
+                raise members["library"].error(
+                    "the block has a diagram and a library", allowed="one of the two", fix="remove one"
+                )
+            values[inside[0]] = self.libraries.linked(members["library"])
         mask = {rule.name: rule for value in values.values() for rule in cast("Diagram", value).mask}
         known = {**mask, **{name: rule for name, rule in rules.items() if name not in inside}}
         masked: dict[str, object] = {}
@@ -353,6 +410,18 @@ class _Reader:
             value = _parameter(rule, given[rule.name], self.robots) if rule.name in given else None
             with _located(node):
                 builder.declare(rule, value)
+
+
+def _entry_reader(library: BlockLibrary, resolve_robot: ResolveRobot, *, trust: bool) -> ReadEntry:
+    """Makes diagrams of the entries of libraries as of any document."""
+
+    def read(root: Node, entry: Node, name: str, folder: Path, libraries: Libraries) -> Diagram:
+        members, _ = split_members(root, _LIBRARY_KEYS)
+        _check_version(root, members)
+        robots = RobotReader(members.get("robots"), folder, resolve_robot, trust=trust)
+        return _Reader(library, robots, libraries, draft=False).diagram(entry, _INNER_KEYS, name)
+
+    return read
 
 
 def _split(node: Node, known: tuple[str, ...], extras: Extras, place: str, key: str = "") -> dict[str, Node]:

@@ -146,7 +146,7 @@ class RobotWriter:
                 allowed="functions at the top of a .py file, whose place a diagram can name",
                 fix="move it to a file and import it",
             )
-        return f"{_relative(file, self._folder)}:{name}"
+        return f"{relative_to_folder(file, self._folder)}:{name}"
 
     def table_reference(self, table: TimeTable) -> object:
         """The path of the table's file where it still gives the same, else its rows."""
@@ -156,7 +156,7 @@ class RobotWriter:
             except ArmblocksError:
                 same = False
             if same:
-                return _relative(table.source, self._folder)
+                return relative_to_folder(table.source, self._folder)
         rows = np.asarray(table)
         if rows.size > MOST_INLINE:
             raise FormatError(
@@ -206,10 +206,10 @@ def _candidates(
             base = resolve_robot(robot.source)
         except ArmblocksError:
             return  # the file has changed: the robot itself is written
-        yield _relative(robot.source, folder), base
+        yield relative_to_folder(robot.source, folder), base
 
 
-def _relative(source: str, folder: Path | None) -> str:
+def relative_to_folder(source: str, folder: Path | None) -> str:
     """A path as seen from the diagram's folder where it lies inside, with ``/`` on every system."""
     if folder is None:
         return Path(source).as_posix()

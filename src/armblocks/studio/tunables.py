@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from armblocks.diagram import Diagram, flat_diagram
+from armblocks.diagram import Diagram
+from armblocks.diagram.mask_tuning import tunable_parameters
 from armblocks.studio.messages import Tunable
 from armblocks.studio.parameter_values import parameter_json
 
@@ -15,22 +16,18 @@ LONGEST = 64
 
 
 def tunables(diagram: Diagram) -> list[Tunable]:
-    """The tunable parameters of all blocks, by ``block.parameter``, with the values that they have now."""
-    flat = flat_diagram(diagram)
-    # Blocks that share their parameters say the same under one name.
-    blocks = {flat.owner(name): block for name, block in flat.blocks.items()}
+    """The tunable parameters of masks and blocks, by ``block.parameter``, with the values that they have."""
     return [
         Tunable(
-            path=f"{name}.{rule.name}",
+            path=path,
             value=parameter_json(value),
             unit=rule.unit,
             doc=rule.doc,
             low=_bound(rule.minimum if rule.above is None else rule.above),
             high=_bound(rule.maximum),
         )
-        for name, block in blocks.items()
-        for rule in block.inputs_of_the_run()
-        if rule.tunable and np.size(np.asarray(value := block.parameter_value(rule.name))) <= LONGEST
+        for path, rule, value in tunable_parameters(diagram)
+        if np.size(np.asarray(value)) <= LONGEST
     ]
 
 

@@ -1,0 +1,168 @@
+"""What follows from a parameter of a mask: which parameters of blocks, and whether it may change in a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from casadi import SX, evalf, substitute
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.hierarchy import flat_diagram, joined, levels_of
+from armblocks.diagram.mask import as_symbols, formula_names, formula_symbols
+from armblocks.diagram.parameter import Parameter, Value, shape_of
+from armblocks.diagram.structure import DiagramBlock
+from armblocks.equations import HybridSystem, Slot, unflatten
+from armblocks.equations.added_parameters import AddedParameter, with_added_parameters
+from armblocks.errors import InputError, UnknownNameError
+
+
+@dataclass
+class Followers:
+    """What follows by formulas from one mask parameter, by path, at any depth.
+
+    ``tunable``: parameters that stay inputs of the compiled system, as formulas of the mask parameter's
+    symbol. ``structural``: those that belong to the structure.
+    """
+
+    tunable: dict[str, SX] = field(default_factory=dict[str, SX])
+    structural: list[str] = field(default_factory=list[str])
+
+
+def mask_parameters(diagram: Diagram) -> Mapping[str, tuple[Diagram, Parameter]]:
+    """All parameters of masks of a hierarchy by path, ``servo.kp`` or ``kp``, with the diagrams that declare
+    them."""
+    return {
+        f"{path}.{rule.name}" if path else rule.name: (level, rule)
+        for path, level in levels_of(diagram).items()
+        for rule in level.mask
+    }
+
+
+def followers(diagram: Diagram, path: str, symbol: SX | None = None) -> Followers:
+    """What follows from the mask parameter of this path, whose value is ``symbol``.
+
+    Raises ``UnknownNameError`` for a path that is no mask parameter's.
+    """
+    known = mask_parameters(diagram)
+    if path not in known:
+        raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
+    level, rule = known[path]
+    found = Followers()
+    value = as_symbols(level.mask_values[rule.name])
+    moved = symbol if symbol is not None else SX.sym(rule.name, *((1, 1) if value is None else value.shape))
+    _follow(path.rpartition(".")[0], level, {rule.name: moved}, found)
+    return found
+
+
+def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
+    """A mask parameter as one of the equations: its change, and what that changes.
+
+    Raises ``UnknownNameError`` for a path that is no mask parameter's, ``InputError`` for one that is no
+    number or from which something structural follows.
+    """
+    known = mask_parameters(diagram)
+    if path not in known:
+        raise UnknownNameError("mask parameter", path, known, where=f"diagram '{diagram.name}'")
+    level, rule = known[path]
+    value = level.mask_values[rule.name]
+    now = as_symbols(value)
+    if now is None or isinstance(value, bool):
+        raise InputError(
+            f"the mask parameter '{path}' is {type(value).__name__}, which has no slope",
+            where=f"diagram '{diagram.name}'",
+            allowed="numbers and arrays",
+        )
+    slot = Slot(path, shape_of(value), rule.unit)
+    change = SX.sym(rule.name, slot.size)
+    found = followers(diagram, path, now + unflatten(change, slot.shape))
+    if found.structural:
+        raise InputError(
+            f"'{found.structural[0]}', which belongs to the structure, follows from '{path}'",
+            where=f"diagram '{diagram.name}'",
+            allowed="parameters from which only tunable ones follow",
+            fix="take the difference of two runs for this one",
+        )
+    still = SX.zeros(slot.size)
+    changes = {
+        name: formula - SX(evalf(substitute(formula, change, still)))
+        for name, formula in found.tunable.items()
+    }
+    return AddedParameter(slot=slot, symbol=change, changes=changes)
+
+
+def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable[str]) -> HybridSystem:
+    """The equations of a diagram with those of ``names`` as parameters that are its masks'.
+
+    Raises as :func:`added_parameter`.
+    """
+    known = mask_parameters(diagram)
+    added = [name for name in names if name in known and name not in system.parameters.ranges]
+    if not added:
+        return system
+    return with_added_parameters(system, tuple(added_parameter(diagram, name) for name in added))
+
+
+def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers) -> None:
+    """Look for formulas over the moved parameters of one diagram, and go on inside its subsystems."""
+    still = {
+        name: symbols
+        for name, value in level.mask_values.items()
+        if (symbols := as_symbols(value)) is not None
+    }
+    for name, block in level.blocks.items():
+        inner: dict[str, SX] = {}
+        for parameter, text in block.formulas:
+            if not formula_names(text) & set(moved):
+                continue
+            if isinstance(block, DiagramBlock) and parameter in block.diagram.mask_values:
+                if as_symbols(block.diagram.mask_values[parameter]) is None:
+                    inner[parameter] = SX.sym(parameter)  # a choice or a robot: no formula but its name
+                else:
+                    inner[parameter] = formula_symbols(text, {**still, **moved})
+            elif _stays_input(block, parameter):
+                found.tunable[f"{joined(path, name)}.{parameter}"] = formula_symbols(text, {**still, **moved})
+            else:
+                found.structural.append(f"{joined(path, name)}.{parameter}")
+        if inner and isinstance(block, DiagramBlock):
+            _follow(joined(path, name), block.diagram, inner, found)
+
+
+def _stays_input(block: Block, parameter: str) -> bool:
+    return any(rule.name == parameter for rule in block.inputs_of_the_run())
+
+
+def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
+    """Path, rule and value of every parameter that may be changed while the diagram runs.
+
+    Those of masks first, then those of blocks that nothing else decides: no formula, and no library that the
+    block is part of.
+    """
+    levels = levels_of(diagram)
+    linked = [f"{path}/" for path, level in levels.items() if level.link]
+    decided = {
+        f"{joined(path, name)}.{parameter}"
+        for path, level in levels.items()
+        for name, block in level.blocks.items()
+        for parameter, _ in block.formulas
+    }
+    found = [
+        (path, rule, level.mask_values[rule.name])
+        for path, (level, rule) in mask_parameters(diagram).items()
+        if as_symbols(level.mask_values[rule.name]) is not None and not followers(diagram, path).structural
+    ]
+    flat = flat_diagram(diagram)
+    # Blocks that share their parameters say the same under one name.
+    owners = {flat.owner(name): block for name, block in flat.blocks.items()}
+    found += [
+        (f"{name}.{rule.name}", rule, block.parameter_value(rule.name))
+        for name, block in owners.items()
+        for rule in block.inputs_of_the_run()
+        if rule.tunable
+    ]
+    return [
+        (path, rule, value)
+        for path, rule, value in found
+        if path not in decided and not any(path.startswith(inside) for inside in linked)
+    ]

@@ -1,0 +1,76 @@
+"""A system with more parameters, which move those that it has."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from casadi import SX, Function, vertcat, vertsplit
+
+from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.signatures import Signature, Slot
+from armblocks.equations.symbols import flatten
+from armblocks.equations.traced_function import TracedFunction
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AddedParameter:
+    """A parameter that starts at 0: ``changes`` says what is added to others, in the symbols ``symbol``."""
+
+    slot: Slot
+    symbol: SX
+    changes: Mapping[str, SX]
+
+
+def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...]) -> HybridSystem:
+    """The same equations with parameters behind those that they have; at 0 they change nothing.
+
+    A change for a parameter that the system has not is left out. ``derivatives by`` an added parameter are
+    those along the changes that it makes.
+    """
+    old = system.parameters
+    layout = Signature((*old.slots, *(entry.slot for entry in added)))
+    p = SX.sym("p", layout.size)
+    columns = vertsplit(p, [0, *np.cumsum([slot.size for slot in layout]).tolist()])
+    parts = dict(zip(layout.names, columns))
+    moved = {name: parts[name] for name in old.names}
+    for entry in added:
+        paths = [path for path in entry.changes if path in moved]
+        flat = [flatten(entry.changes[path], old[path].shape) for path in paths]
+        changes = Function("f", [entry.symbol], flat).call([parts[entry.slot.name]], True, False)
+        for path, change in zip(paths, changes):
+            moved[path] = moved[path] + change
+    whole = vertcat(*moved.values(), SX(0, 1))
+
+    def widened(traced: TracedFunction) -> TracedFunction:
+        if "p" not in traced.inputs.names:
+            return traced
+        place = traced.inputs.names.index("p")
+        given = [whole if k == place else symbol for k, symbol in enumerate(traced.arguments)]
+        results = Function("f", list(traced.arguments), list(traced.results)).call(given, True, False)
+        slots = [Slot("p", (layout.size,)) if k == place else slot for k, slot in enumerate(traced.inputs)]
+        arguments = tuple(p if k == place else symbol for k, symbol in enumerate(traced.arguments))
+        return dataclasses.replace(
+            traced, inputs=Signature(tuple(slots)), arguments=arguments, results=tuple(results)
+        )
+
+    delays = system.delays
+    return dataclasses.replace(
+        system,
+        parameters=layout,
+        parameter_values=np.concatenate(
+            [system.parameter_values, np.zeros(layout.size - old.size, dtype=np.float64)]
+        ),
+        delays=None
+        if delays is None
+        else dataclasses.replace(
+            delays, **{key: widened(getattr(delays, key)) for key in ("inputs", "times", "bounds")}
+        ),
+        **{
+            field.name: widened(value)
+            for field in dataclasses.fields(system)
+            if isinstance(value := getattr(system, field.name), TracedFunction)
+        },
+    )

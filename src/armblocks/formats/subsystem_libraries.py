@@ -1,0 +1,189 @@
+"""Libraries of subsystems: files of named, masked diagrams that blocks of other files are linked to.
+
+A library file holds diagrams by name, as they stand inside blocks::
+
+    {"format": 1, "library": {"JointServo": {"mask": […], "blocks": {…}, "connections": […]}, …}}
+
+and a block of a diagram, or of a library, says which one it holds and what its parameters are::
+
+    "hip": {"type": "Subsystem", "library": "servos.json#JointServo", "parameters": {"kp": 40}}
+
+The file is a path relative to the folder of the file that names it, or a shipped library by its name. It is
+looked up when the diagram is read, so that a better library betters all that use it; what is read has
+``Diagram.link`` and is not to be changed, unless the link is given up (``link=""``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from armblocks.diagram import Diagram, block_count
+from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
+from armblocks.files import read_bounded
+from armblocks.formats.json_document import Node, read_document
+from armblocks.formats.robot_files import shipped_folder
+from armblocks.formats.robot_references import relative_to_folder
+
+SUFFIX = ".json"
+MOST_BYTES = 16 * 2**20
+DEEPEST = 320
+"""Objects and arrays inside each other, as in diagrams."""
+DEEPEST_CHAIN = 40
+"""Library blocks inside library blocks."""
+MOST_BLOCKS = 250_000
+"""Blocks that a library block may bring, those inside it included."""
+
+ReadFile = Callable[[Path], bytes]
+"""From the resolved path of a library file to its bytes; raises ``FormatError`` for a forbidden one."""
+
+
+class ReadEntry(Protocol):
+    """Makes the diagram of one entry of a library document."""
+
+    def __call__(self, root: Node, entry: Node, name: str, folder: Path, libraries: Libraries) -> Diagram:
+        """``folder`` is that of the library, ``libraries`` finds what the entry is linked to itself."""
+        ...
+
+
+def read_library_file(path: Path) -> bytes:
+    """The bytes of a library file, wherever it lies."""
+    return read_bounded(path, MOST_BYTES)
+
+
+def list_libraries() -> tuple[str, ...]:
+    """Names of the shipped libraries, sorted."""
+    return tuple(sorted(path.stem for path in shipped_folder("libraries").glob(f"*{SUFFIX}")))
+
+
+def library_path(reference: str, folder: Path | None) -> Path:
+    """The file that a reference without its ``#name`` means: a shipped library, or a path from a folder.
+
+    Raises ``UnknownNameError`` for a name that is not shipped, ``FormatError`` for another kind of file.
+    """
+    if not is_path(reference):
+        known = list_libraries()
+        if reference not in known:
+            raise UnknownNameError("shipped library", reference, known)
+        return shipped_folder("libraries").resolve() / f"{reference}{SUFFIX}"
+    if "\0" in reference or not reference.lower().endswith(SUFFIX):
+        raise FormatError(
+            f"{reference[:80]!r} is no path of a library",
+            allowed=f"the path of a {SUFFIX} file, or one of {', '.join(list_libraries())}",
+        )
+    return (Path(reference) if folder is None else folder / reference).resolve()
+
+
+def is_path(reference: str) -> bool:
+    """Whether a path is meant, and not the name of a shipped library."""
+    return "/" in reference or "\\" in reference or reference.lower().endswith(SUFFIX)
+
+
+def shortest_link(link: str, folder: Path | None) -> str:
+    """A link as a file in ``folder`` says it: by shipped name, by relative path where it lies below."""
+    file, _, entry = link.partition("#")
+    return f"{relative_to_folder(file, folder) if is_path(file) else file}#{entry}"
+
+
+def _named(path: Path) -> str:
+    """A shipped library by its name, so that it is the same in every installation; others by their path."""
+    return path.stem if path.parent == shipped_folder("libraries").resolve() else str(path)
+
+
+class Libraries:
+    """Finds entries of libraries for one document; each is made once. Errors have file and line."""
+
+    def __init__(
+        self,
+        folder: Path | None,
+        read_entry: ReadEntry,
+        read_file: ReadFile = read_library_file,
+        *,
+        around: Libraries | None = None,
+    ) -> None:
+        self._folder = folder
+        self._read_entry = read_entry
+        self._read_file = read_file
+        self._roots: dict[Path, Node] = {} if around is None else around._roots
+        self._made: dict[tuple[Path, str], Diagram] = {} if around is None else around._made
+        self._chain: list[tuple[Path, str]] = [] if around is None else around._chain
+
+    def linked(self, node: Node) -> Diagram:
+        """The diagram that ``"file#name"`` means."""
+        file, sharp, name = node.text().partition("#")
+        if not (file and sharp and name):
+            raise node.error(
+                f"'{node.text()[:80]}' is no entry of a library",
+                allowed='"file.json#Name", or "shipped#Name"',
+                fix="name the file and the entry",
+            )
+        try:
+            path = library_path(file, self._folder)
+            return self._entry(path, name)
+        except UnknownNameError as error:
+            where = f"{node.where}: {error.where}" if error.where else node.where
+            raise UnknownNameError(error.kind, error.name, error.known, where=where) from error
+        except ArmblocksError as error:
+            where = f"{node.where}: {error.where}" if error.where else node.where
+            raise FormatError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
+
+    def entries(self, path: Path) -> Mapping[str, Diagram]:
+        """All diagrams of a library."""
+        return {name: self._entry(path, name) for name in self._root(path).members()["library"].members()}
+
+    def _entry(self, path: Path, name: str) -> Diagram:
+        key = (path, name)
+        if key in self._made:
+            return self._made[key]
+        shown = [f"{file.name}#{entry}" for file, entry in (*self._chain, key)]
+        if key in self._chain:
+            first = self._chain.index(key)
+            raise FormatError(
+                f"library blocks hold each other in a circle: {' -> '.join(shown[first:])}",
+                where=str(path),
+                allowed="library blocks that do not hold themselves",
+                fix="take one of these blocks out of the other",
+            )
+        if len(self._chain) >= DEEPEST_CHAIN:
+            raise FormatError(
+                f"library blocks are more than {DEEPEST_CHAIN} deep inside each other: "
+                f"{' -> '.join(shown[:3])} -> …",
+                where=str(path),
+                allowed=f"at most {DEEPEST_CHAIN}",
+                fix="put some of them side by side",
+            )
+        root = self._root(path)
+        known = root.members()["library"].members()
+        if name not in known:
+            raise UnknownNameError("library block", name, known, where=str(path))
+        inner = Libraries(path.parent, self._read_entry, self._read_file, around=self)
+        self._chain.append(key)
+        try:
+            made = self._read_entry(root, known[name], name, path.parent, inner)
+        finally:
+            self._chain.pop()
+        made = replace(made, link=f"{_named(path)}#{name}")
+        if block_count(made) > MOST_BLOCKS:
+            raise FormatError(
+                f"the library block '{name}' brings {block_count(made)} blocks",
+                where=str(path),
+                allowed=f"at most {MOST_BLOCKS}",
+                fix="use fewer library blocks inside it",
+            )
+        self._made[key] = made
+        return made
+
+    def _root(self, path: Path) -> Node:
+        """The document of a library file."""
+        if path not in self._roots:
+            root = read_document(self._read_file(path), str(path), MOST_BYTES, DEEPEST)
+            if "library" not in root.members():
+                raise root.error(
+                    "the key 'library' is missing",
+                    allowed="a library of subsystems",
+                    fix="give the path of a library, not of a diagram",
+                )
+            self._roots[path] = root
+        return self._roots[path]

@@ -1,0 +1,67 @@
+"""Slopes by parameters of masks: what follows from them by formulas moves with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import Gain, Integrator, SineWave, Subsystem, Sum, UnitDelay
+from armblocks.diagram import Diagram, DiagramBuilder, formula
+from armblocks.errors import InputError, UnknownNameError
+
+
+def loop() -> Diagram:
+    """x' = K^2 (u - 3 K x) through two masks, u = sin t."""
+    inner = DiagramBuilder("inner")
+    a = inner.parameter("a", 1.0, unit="1/s")
+    inner.output("y", inner.add("gain", Gain(gain=a), inner.input("u")))
+    builder = DiagramBuilder("loop")
+    builder.parameter("K", 2.0, unit="1/s")
+    builder.parameter("n", 0.5, unit="s")
+    builder.parameter("way", "+-")
+    sum_ = builder.add("sum", Sum(signs=formula("way")), builder.add("u", SineWave()))
+    forward = builder.add("forward", Subsystem(diagram=inner.build()).with_parameters(a=formula("K^2")), sum_)
+    x = builder.add("x", Integrator(initial=formula("K/4")), forward)
+    builder.connect(builder.add("back", Gain(gain=formula("3*K")), x), sum_["u2"])
+    builder.add("hold", UnitDelay(sample_time=formula("n")), x)
+    return builder.build()
+
+
+def test_sensitivity_by_a_mask_is_the_slope_of_runs() -> None:
+    settings = {"stop_time": 2.0, "rtol": 1e-12, "atol": 1e-14, "sample_time": 0.1}
+    found = ab.sensitivity(loop(), ["K", "forward.a"], "x", **settings)
+    h = 1e-5
+    runs = [ab.simulate(loop(), parameters={"K": 2.0 + step}, **settings)["x"] for step in (h, -h)]
+    # The error of a central difference is h^2/6 of the third derivative, and rounding over h.
+    assert np.abs(found["x", "K"] - (runs[0] - runs[1]) / (2 * h)).max() < 1e-8
+    assert found["x", "K"][0] == 0.25
+    assert np.abs(found["x", "forward.a"]).max() > 0.01
+
+
+def test_linearization_by_a_mask_is_the_chain_rule() -> None:
+    point = ab.linearize(loop(), inputs=["K", "forward.a", "back.gain"], outputs="x", at=1.0)
+    u, x = np.sin(1.0), ab.simulate(loop(), stop_time=1.0)["x"][-1]
+    row = point.B[0] if point.B.shape[0] == 1 else point.B[list(point.states).index("x/x")]
+    assert point.input_units[:2] == ("1/s", "1/s")
+    by_K, by_a, by_back = (float(entry) for entry in row[:3])
+    assert by_K == pytest.approx(2 * 2.0 * by_a + 3 * by_back, rel=1e-12)
+    assert by_K != 0.0
+    assert u
+    assert x
+
+
+def test_what_has_no_slope_says_why() -> None:
+    with pytest.raises(InputError, match=r"'hold.sample_time', which belongs to the .*, follows from 'n'"):
+        ab.sensitivity(loop(), "n", "x")
+    with pytest.raises(InputError, match="the mask parameter 'way' is str, which has no slope"):
+        ab.sensitivity(loop(), "way", "x")
+    with pytest.raises(UnknownNameError, match=r"no tunable parameter named 'k'.*did you mean 'K'"):
+        ab.sensitivity(loop(), "k", "x")
+    run = ab.begin(loop(), stop_time=1.0)
+    with pytest.raises(
+        InputError,
+        match=r"parameter 'n' cannot take this value while the diagram runs: 'hold.sample_time', which "
+        r"follows from it, belongs to the structure.*Allowed: tunable parameters, .*: K, ",
+    ):
+        run.set("n", 0.25)
