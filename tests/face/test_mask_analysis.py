@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def loop() -> Diagram:
 
 
 def test_sensitivity_by_a_mask_is_the_slope_of_runs() -> None:
-    settings = {"stop_time": 2.0, "rtol": 1e-12, "atol": 1e-14, "sample_time": 0.1}
+    settings: dict[str, Any] = {"stop_time": 2.0, "rtol": 1e-12, "atol": 1e-14, "sample_time": 0.1}
     found = ab.sensitivity(loop(), ["K", "forward.a"], "x", **settings)
     h = 1e-5
     runs = [ab.simulate(loop(), parameters={"K": 2.0 + step}, **settings)["x"] for step in (h, -h)]

@@ -91,11 +91,12 @@ def _wires(wires: Sequence[PlacedWire]) -> list[str]:
 
 def _block_text(block: Block) -> str:
     """The type and what is not as the type has it by itself."""
-    words = [f"{name}={value_text(value)}" for name, value in _own_values(block).items()]
+    words = [f"{name}={value_text(value)}" for name, value in own_values(block).items()]
     return " ".join([block.type_name(), *words])
 
 
-def _own_values(block: Block) -> dict[str, object]:
+def own_values(block: Block) -> dict[str, object]:
+    """The parameters of a block that are not as its type has them; formulas as such."""
     rules = block.own_parameters()
     values = {rule.name: block.stated_value(rule.name) for rule in rules}
     return {
@@ -163,7 +164,7 @@ def _object_text(value: object) -> str:
     from armblocks.diagram import Parameter, ParameterFormula
 
     if isinstance(value, ParameterFormula):
-        return f"= {value}"
+        return value.text
     if isinstance(value, Parameter):
         rest = " ".join(filter(None, (value.unit, f"({value.doc})" if value.doc else "")))
         return f"{value.kind.value} {value_text(value.default)} {rest}".rstrip()
@@ -199,7 +200,7 @@ def difference_document(found: DiagramDifference) -> dict[str, object]:
 
 
 def _placed(path: str, block: Block) -> dict[str, object]:
-    values = {name: _plain(value) for name, value in _own_values(block).items()}
+    values = {name: _plain(value) for name, value in own_values(block).items()}
     return {"path": path, "type": block.type_name(), "parameters": values}
 
 

@@ -1,4 +1,4 @@
-"""``armblocks show``: a robot's tables, as the toolbox prints them and the paper's Table 2 has them."""
+"""``armblocks show``: a robot's tables, as the toolbox and the paper have them; a diagram's tree."""
 
 from __future__ import annotations
 
@@ -19,17 +19,34 @@ _DEGREE = float(np.pi / 180.0)
 
 
 def show(
-    robot: Annotated[str, typer.Argument(help="A shipped robot's name, or the path of a robot file.")],
+    model: Annotated[
+        str, typer.Argument(help="The name of something shipped, or a file: a robot, a diagram, a library.")
+    ],
     name: Annotated[str | None, typer.Option(help="Which robot of a script that makes several.")] = None,
+    flat: Annotated[bool, typer.Option("--flat", help="All blocks of a diagram, without hierarchy.")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that a diagram names.")] = False,
 ) -> None:
-    """Print a robot's D-H table, dynamics, limits, gravity, base and tool."""
+    """Print a robot's D-H table, dynamics, limits, gravity, base and tool, or a diagram's hierarchy."""
     import armblocks as ab
+    from armblocks.cli.show_diagram import print_flat, print_hierarchy
+    from armblocks.formats import DocumentKind, kind_of_document
     from armblocks.robot import warn_of_inertias
 
-    described = ab.load_robot(robot, name=name).robot
+    console = results_console()
+    match kind_of_document(model):
+        case DocumentKind.DIAGRAM:
+            (print_flat if flat else print_hierarchy)(ab.load_diagram(model, trust=trust), console)
+            return
+        case DocumentKind.LIBRARY:
+            for block in ab.load_library(model, trust=trust).values():
+                (print_flat if flat else print_hierarchy)(block.diagram, console)
+            return
+        case DocumentKind.ROBOT:
+            pass
+    described = ab.load_robot(model, name=name).robot
     # Loading a shipped robot is silent about what is known of it; here it belongs to what is shown.
     warn_of_inertias(described)
-    print_robot(described, results_console())
+    print_robot(described, console)
 
 
 def print_robot(robot: Robot, console: Console) -> None:

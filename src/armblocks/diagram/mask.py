@@ -62,10 +62,13 @@ def formula(text: str) -> Any:
 def mask_parameter(name: str, default: Any, *, doc: str = "", unit: str = "", **rules: Any) -> Parameter:
     """A parameter that a diagram declares, with the rules of :func:`armblocks.diagram.parameter`.
 
+    ``kind`` is told by the default; for a robot it is ``"robot"``.
+
     Raises ``InputError`` for a name that is no name in formulas, for a kind that no mask has, and for a
     default that breaks its own rules.
     """
-    kind = rules.pop("kind", None) or kind_of(default, rules)
+    given = rules.pop("kind", None)
+    kind = kind_of(default, rules) if given is None else ParameterKind(given)
     rule = Parameter(name=name, kind=kind, doc=doc, default=default, unit=unit, tunable=False, **rules)
     return checked_mask((rule,), "mask")[0]
 
@@ -99,7 +102,9 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
             )
         place = f"{where}, mask parameter '{name}'"
         # Whether a value may change during a run follows from what depends on it: see the module mask_tuning.
-        found.append(dataclasses.replace(rule, tunable=False, default=rule.check(rule.default, place)))
+        lists = {"choices": tuple(rule.choices), "dimensions": tuple(rule.dimensions)}
+        default = rule.check(rule.default, place)
+        found.append(dataclasses.replace(rule, tunable=False, default=default, **lists))
     return tuple(found)
 
 

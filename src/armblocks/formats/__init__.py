@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     )
     from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
     from armblocks.formats.diagram_python import diagram_to_python
+    from armblocks.formats.document_kinds import DocumentKind, kind_of_document
     from armblocks.formats.matlab_script import Script, read_script
     from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot, read_robots
     from armblocks.formats.robot_format import RobotFormat
@@ -27,6 +28,7 @@ else:
     __getattr__ = lazy_exports(
         __name__,
         {
+            "DocumentKind": "armblocks.formats.document_kinds",
             "ROBOT_FORMATS": "armblocks.formats.robot_files",
             "ResolveRobot": "armblocks.formats.robot_references",
             "RobotFormat": "armblocks.formats.robot_format",
@@ -35,6 +37,7 @@ else:
             "diagram_to_bytes": "armblocks.formats.diagram_json",
             "diagram_to_python": "armblocks.formats.diagram_python",
             "holds_robot": "armblocks.formats.robot_json",
+            "kind_of_document": "armblocks.formats.document_kinds",
             "list_examples": "armblocks.formats.diagram_files",
             "list_libraries": "armblocks.formats.subsystem_libraries",
             "list_robots": "armblocks.formats.robot_files",
@@ -54,6 +57,7 @@ else:
 
 __all__ = [
     "ROBOT_FORMATS",
+    "DocumentKind",
     "ResolveRobot",
     "RobotFormat",
     "Script",
@@ -61,6 +65,7 @@ __all__ = [
     "diagram_to_bytes",
     "diagram_to_python",
     "holds_robot",
+    "kind_of_document",
     "list_examples",
     "list_libraries",
     "list_robots",

@@ -1,7 +1,8 @@
 """A diagram as the lines of Python that build and run it, as a person would type them.
 
 Blocks stand after what feeds them where they can, so that a wire is an argument of ``add``; the wires of
-loops follow as ``connect``. Only parameters that differ from their defaults are written.
+loops follow as ``connect``. Only parameters that differ from their defaults are written. A diagram inside a
+block is built before it, by a builder of its own; a block that is linked is taken from its library.
 """
 
 from __future__ import annotations
@@ -11,11 +12,25 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from armblocks.diagram import Block, Connection, Diagram, Port, PortRef, TimeTable, UserFunction
+from armblocks.diagram import (
+    Block,
+    Connection,
+    Diagram,
+    DiagramBlock,
+    Parameter,
+    ParameterKind,
+    Port,
+    PortRef,
+    Subsystem,
+    TimeTable,
+    UserFunction,
+    mask_parameter,
+)
+from armblocks.diagram.parameter import kind_of
 from armblocks.errors import FormatError
 from armblocks.formats.robot_files import list_robots, load_robot
 from armblocks.formats.robot_references import shortest_reference
@@ -38,30 +53,130 @@ def diagram_to_python(diagram: Diagram) -> str:
     Robots must be shipped ones, or those of a file. Raises ``FormatError`` for another robot. Layout,
     description and unknown keys of a file are not written.
     """
-    order = _reading_order(diagram)
-    kinds = sorted({diagram.blocks[name].type_name() for name in order})
-    robots = _robots(diagram)
+    diagrams = list(_own_diagrams(diagram))
+    blocks = [block for level in diagrams for block in level.blocks.values()]
+    kinds = sorted({block.type_name() for block in blocks if not _is_whole_link(block)})
+    robots = _robots(diagrams)
     shown = _identifiers({robot: name for robot, (name, _) in robots.items()}, _PACKAGE_NAMES)
-    names = _identifiers({name: name for name in order}, [*_PACKAGE_NAMES, *shown.values()])
+    listing = _Listing(shown)
     lines = ["import armblocks as ab", *_import(kinds), ""]
     lines += [f"{shown[robot]} = {expression}" for robot, (_, expression) in robots.items()]
-    lines.append(f"builder = ab.DiagramBuilder({_text(diagram.name)})")
-    added: set[str] = set()
-    late = _late(diagram, order)
-    used = {wire.source.block for wire in diagram.connections} | {wire.target.block for wire in late}
-    used |= {ref.block for ref in diagram.logged}
-    for name in order:
-        block = diagram.blocks[name]
-        arguments = [_text(name), _construction(block, shown), *_sources(diagram, name, added, names)]
-        target = f"{names[name]} = " if name in used else ""
-        lines += _call(f"{target}builder.add", arguments)
-        added.add(name)
-    for wire in late:
-        source = _end(diagram, wire.source, names)
-        lines.append(f'builder.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
-    lines += [f"builder.log({_end(diagram, ref, names)})" for ref in diagram.logged]
+    lines += listing.lines(diagram, "builder")
     lines += ["diagram = builder.build()", "", f"result = ab.simulate({', '.join(_settings(diagram))})"]
     return "\n".join(lines) + "\n"
+
+
+class _Listing:
+    """Writes diagrams, those inside blocks before the blocks; every name means one thing."""
+
+    def __init__(self, robots: Mapping[Robot, str]) -> None:
+        self._robots = robots
+        self._taken = {*_PACKAGE_NAMES, *robots.values()}
+
+    def lines(self, diagram: Diagram, builder: str, *, inside: bool = False) -> list[str]:
+        """The lines that fill a builder of this name."""
+        order = _reading_order(diagram)
+        names = _identifiers({name: name for name in order}, self._taken)
+        self._taken |= set(names.values())
+        written = [f"{builder} = ab.DiagramBuilder({_text(diagram.name)})"]
+        for rule in diagram.mask:
+            written += _call(f"{builder}.parameter", self._declaration(diagram, rule, inside=inside))
+        added: set[str] = set()
+        late = _late(diagram, order)
+        used = {wire.source.block for wire in diagram.connections} | {wire.target.block for wire in late}
+        used |= {ref.block for ref in diagram.logged}
+        before: list[str] = []
+        for name in order:
+            block = diagram.blocks[name]
+            construction = self._construction(block, names[name], before)
+            arguments = [_text(name), construction, *_sources(diagram, name, added, names)]
+            target = f"{names[name]} = " if name in used else ""
+            written += _call(f"{target}{builder}.add", arguments)
+            added.add(name)
+        for wire in late:
+            source = _end(diagram, wire.source, names)
+            written.append(f'{builder}.connect({source}, {names[wire.target.block]}["{wire.target.port}"])')
+        written += [f"{builder}.log({_end(diagram, ref, names)})" for ref in diagram.logged]
+        return [*before, *written]
+
+    def _construction(self, block: Block, name: str, before: list[str]) -> str:
+        """What makes a block; the lines that build a diagram inside it go ``before``."""
+        formulas = dict(block.formulas)
+
+        def written(rule: Parameter) -> str:
+            if rule.name in formulas:
+                return f"ab.formula({_text(formulas[rule.name])})"
+            value = block.parameter_value(rule.name)
+            return self._robots[value] if isinstance(value, Robot) else _value(value)
+
+        def own(rules: Iterable[Parameter]) -> list[str]:
+            return [
+                f"{rule.name}={written(rule)}"
+                for rule in rules
+                if rule.kind is not ParameterKind.DIAGRAM and _is_stated(block, rule)
+            ]
+
+        stated = own(block.parameters())
+        if not isinstance(block, DiagramBlock):
+            return f"{block.type_name()}({', '.join(stated)})"
+        if _is_whole_link(block):
+            made = _library_block(block.diagram.link)
+        elif block.diagram.link:
+            linked = f"diagram={_library_block(block.diagram.link)}.diagram"
+            made = f"{block.type_name()}({', '.join([linked, *stated])})"
+        else:
+            inner = next(iter(_identifiers({"": f"{name} inside"}, self._taken).values()))
+            self._taken.add(inner)
+            before += [*self.lines(block.diagram, inner, inside=True), ""]
+            made = f"{block.type_name()}({', '.join([f'diagram={inner}.build()', *stated])})"
+        masked = own(block.diagram.mask)
+        return f"{made}.with_parameters({', '.join(masked)})" if masked else made
+
+    def _declaration(self, diagram: Diagram, rule: Parameter, *, inside: bool) -> list[str]:
+        def shown(value: object) -> str:
+            return self._robots[value] if isinstance(value, Robot) else _value(value)
+
+        stated = [_text(rule.name), shown(rule.default)]
+        if not inside and diagram.mask_values[rule.name] != rule.default:
+            stated.append(f"value={shown(diagram.mask_values[rule.name])}")
+        if rule.kind is not kind_of(rule.default, {"choices": rule.choices} if rule.choices else {}):
+            stated.append(f"kind={_text(rule.kind.value)}")
+        plain = mask_parameter(rule.name, rule.default, kind=rule.kind, **_needed(rule))
+        return stated + [
+            f"{key}={_value(getattr(rule, key))}"
+            for key in ("unit", "doc", "minimum", "above", "maximum", "choices", "dimensions")
+            if getattr(rule, key) != getattr(plain, key) or key in _needed(rule)
+        ]
+
+
+def _needed(rule: Parameter) -> dict[str, Any]:
+    """What has to be said for the kind to be what it is."""
+    return {"choices": rule.choices} if rule.choices else {}
+
+
+def _is_stated(block: Block, rule: Parameter) -> bool:
+    """Whether a parameter has to be written: it has a formula, or is not at its default."""
+    if rule.required or rule.name in dict(block.formulas):
+        return True
+    return rule.check(rule.default, "") != block.parameter_value(rule.name)
+
+
+def _is_whole_link(block: Block) -> bool:
+    """Whether a block is what a library has: a plain subsystem that is linked."""
+    return isinstance(block, Subsystem) and bool(block.diagram.link)
+
+
+def _library_block(link: str) -> str:
+    file, _, entry = link.partition("#")
+    return f"ab.load_library({_text(file)})[{_text(entry)}]"
+
+
+def _own_diagrams(diagram: Diagram) -> Iterator[Diagram]:
+    """A diagram and those inside its blocks, libraries' left out."""
+    yield diagram
+    for block in diagram.blocks.values():
+        if isinstance(block, DiagramBlock) and not block.diagram.link:
+            yield from _own_diagrams(block.diagram)
 
 
 def _reading_order(diagram: Diagram) -> list[str]:
@@ -113,11 +228,11 @@ def _end(diagram: Diagram, source: PortRef, names: Mapping[str, str]) -> str:
     return names[source.block] if len(outputs) == 1 else f'{names[source.block]}["{source.port}"]'
 
 
-def _robots(diagram: Diagram) -> dict[Robot, tuple[str, str]]:
+def _robots(diagrams: Iterable[Diagram]) -> dict[Robot, tuple[str, str]]:
     """A name for every robot that a block has, and the expression that gives it."""
     found: dict[Robot, tuple[str, str]] = {}
-    for name, block in diagram.blocks.items():
-        for rule in block.parameters():
+    for name, block in ((name, block) for diagram in diagrams for name, block in diagram.blocks.items()):
+        for rule in block.own_parameters():
             robot = block.parameter_value(rule.name)
             if isinstance(robot, Robot) and robot not in found:
                 found[robot] = _loading(robot, f"block '{name}'")
@@ -155,16 +270,6 @@ def _identifiers(names: Mapping[_Named, str], others: Iterable[str]) -> dict[_Na
         taken.add(wish)
         found[key] = wish
     return found
-
-
-def _construction(block: Block, robots: Mapping[Robot, str]) -> str:
-    stated: list[str] = []
-    for rule in block.parameters():
-        value = block.parameter_value(rule.name)
-        if not rule.required and rule.check(rule.default, "") == value:
-            continue
-        stated.append(f"{rule.name}={robots[value] if isinstance(value, Robot) else _value(value)}")
-    return f"{block.type_name()}({', '.join(stated)})"
 
 
 def _value(value: object) -> str:

@@ -1,0 +1,100 @@
+"""What ``armblocks show`` prints of a diagram: its hierarchy as a tree, or all its blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.text import Text
+from rich.tree import Tree
+
+from armblocks.cli.diff import value_text
+from armblocks.cli.terminal import ACCENT, STRONG, table
+
+if TYPE_CHECKING:
+    from armblocks.diagram import Diagram, DiagramBlock
+
+
+def print_hierarchy(diagram: Diagram, console: Console) -> None:
+    """The tree of subsystems: what kind each is, its parameters, its library, and how much is inside."""
+    tree = Tree(_heading(diagram, diagram.name), guide_style=ACCENT)
+    if diagram.description:
+        tree.add(Text(diagram.description, "italic"))
+    for line in _mask_lines(diagram):
+        tree.add(line)
+    _add_subsystems(tree, diagram)
+    console.print(tree)
+
+
+def print_flat(diagram: Diagram, console: Console) -> None:
+    """All blocks of the flat diagram, by path, with what is not as their types have it."""
+    from armblocks.cli.diff import own_values
+    from armblocks.diagram import flat_diagram
+
+    flat = flat_diagram(diagram)
+    console.print(_heading(flat, diagram.name))
+    blocks = table(("block", "left"), ("type", "left"), ("parameters", "left"))
+    for path, block in flat.blocks.items():
+        words = (f"{name}={value_text(value)}" for name, value in own_values(block).items())
+        blocks.add_row(path, block.type_name(), "  ".join(words))
+    console.print(blocks)
+
+
+def _add_subsystems(tree: Tree, diagram: Diagram) -> None:
+    for name, block in _subsystems(diagram):
+        inner = block.diagram
+        label = Text.assemble((name, STRONG), "  ", block.title.lower())
+        if inner.link:
+            label.append_text(Text.assemble("  from ", (_short(inner.link), ACCENT)))
+        branch = tree.add(Text.assemble(label, "  ", _count(inner)))
+        if values := _values(block):
+            branch.add(Text(values))
+        if not inner.link:  # what is inside is told by the library
+            _add_subsystems(branch, inner)
+
+
+def _subsystems(diagram: Diagram) -> Iterator[tuple[str, DiagramBlock]]:
+    from armblocks.diagram import DiagramBlock
+
+    for name, block in diagram.blocks.items():
+        if isinstance(block, DiagramBlock):
+            yield name, block
+
+
+def _heading(diagram: Diagram, name: str) -> Text:
+    return Text.assemble((name, STRONG), "  ", _count(diagram))
+
+
+def _count(diagram: Diagram) -> str:
+    """``"12 blocks (80 with those inside), 14 wires"``."""
+    from armblocks.diagram import block_count
+
+    here, all_in_all = len(diagram.blocks), block_count(diagram)
+    inside = f" ({all_in_all} with those inside)" if all_in_all > here else ""
+    wires = len(diagram.connections)
+    return f"{here} block{'' if here == 1 else 's'}{inside}, {wires} wire{'' if wires == 1 else 's'}"
+
+
+def _mask_lines(diagram: Diagram) -> Iterator[Text]:
+    for rule in diagram.mask:
+        value = value_text(diagram.mask_values[rule.name])
+        unit = f" {rule.unit}" if rule.unit else ""
+        doc = f"  {rule.doc}" if rule.doc else ""
+        yield Text.assemble((rule.name, ACCENT), f" = {value}{unit}", doc)
+
+
+def _values(block: DiagramBlock) -> str:
+    """``"w = 20 rad/s (from w0), G = 107.8"``: what the parameters of the mask are, and by which formula."""
+    formulas = dict(block.formulas)
+    shown: list[str] = []
+    for rule in block.diagram.mask:
+        value = value_text(block.parameter_value(rule.name)) + (f" {rule.unit}" if rule.unit else "")
+        text = f" (from {formulas[rule.name]})" if rule.name in formulas else ""
+        shown.append(f"{rule.name} = {value}{text}".replace(" ", "\u00a0"))
+    return ", ".join(shown)
+
+
+def _short(link: str) -> str:
+    """A link without the folders on the way to its file."""
+    return link.rpartition("/")[2]
