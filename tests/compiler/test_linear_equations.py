@@ -9,7 +9,7 @@ import pytest
 
 from armblocks.compiler.elimination import JacobianPattern
 from armblocks.compiler.ir_text import Module
-from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations
+from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations, emit_rate_bound
 from armblocks.compiler.native import load_code
 
 GAMMA, H = 0.25, 0.1
@@ -26,6 +26,9 @@ class Solver:
         self.space = LinearSpace(pattern)
         module = Module()
         emit_linear_equations(module, self.space, GAMMA)
+        emit_rate_bound(module, self.space)
+        rate = "define double @rate(ptr %s) {\n  %r = call double @rate_bound(ptr %s)\n  ret double %r\n}"
+        module.add("rate", rate)
         plan = self.space.plan is not None
         judged = "  %g = call i1 @solved_well(ptr %s, double %h)\n  %r = zext i1 %g to i64\n  ret i64 %r\n}"
         for name, function in (("sparse", "factor" if plan else "factor_whole"), ("whole", "factor_whole")):
@@ -37,6 +40,7 @@ class Solver:
         self.code = load_code(("linear equations test", repr(pattern)), lambda: module.text)
         kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_double)
         self.functions = {name: kind(self.code.address(name)) for name in ("sparse", "whole")}
+        self.rate = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(self.code.address("rate"))
         self.scratch = np.empty(self.space.length)
         self.scratch[: len(rows)] = J[rows, columns]
         E = np.zeros(len(J))
@@ -64,6 +68,24 @@ def test_both_eliminations_agree_with_numpy(n: int, filled: float) -> None:
         good, found = solver.solve(how, right)
         assert good
         np.testing.assert_allclose(found, np.linalg.solve(solver.matrix, right), rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [2, 7, 40])
+@pytest.mark.parametrize("spread", [0.0, 3.0])
+def test_the_bound_of_the_rates_is_above_every_eigenvalue_and_near_the_largest(n: int, spread: float) -> None:
+    """Also where states have units that differ by many powers of ten, which no eigenvalue sees."""
+    random = np.random.default_rng(n)
+    for _ in range(10):
+        scales = 10.0 ** random.uniform(-spread, spread, n)
+        J = random_sparse(int(random.integers(1000)), n, 0.3) * scales[:, None] / scales[None, :]
+        J[0, 1] = J[0, 1] or scales[0] / scales[1]
+        solver = Solver(J, n)
+        bound = solver.rate(solver.scratch.ctypes.data)
+        assert bound >= np.abs(np.linalg.eigvals(J)).max() * (1 - 1e-12)
+        # The best that any scaling of the states gives is the largest eigenvalue of |J|.
+        assert bound <= 40.0 * max(np.abs(np.linalg.eigvals(np.abs(J))).max(), 0.1)
+    oscillator = Solver(np.array([[0.0, 1.0], [-100.0, 0.0]]), 2)
+    assert oscillator.rate(oscillator.scratch.ctypes.data) == pytest.approx(10.0)
 
 
 def test_small_and_full_matrices_have_no_plan() -> None:

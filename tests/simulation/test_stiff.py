@@ -220,7 +220,7 @@ def test_chunks_of_steps_do_not_move_the_change_of_method() -> None:
         run = native.begin(
             np.array([1.0]), np.empty(0), np.array([0.0, 10.0]), np.empty(0), watch_stiffness=True
         )
-        while not run.stiff:
+        while not run.wants_other:
             run.advance(chunk)
         times.append((run.time, run.accepted))
     assert times[0] == times[1] == times[2]

@@ -86,13 +86,15 @@ class Count(IntEnum):
     SAVED = 14
     """Whether the checkpoint is written."""
     WATCHED = 15
-    """Adaptive explicit steps so far."""
+    """Steps so far that were looked at for stiffness."""
     STIFF = 16
-    """Looks that found a step bound by stability."""
+    """Explicit methods: looks that found a step bound by stability. Methods for stiff systems: so many looks
+    in a row at a step that an explicit method could take as well make one take over."""
     CALM = 17
-    """Looks in a row that did not."""
+    """Looks in a row that found no stiffness."""
     WATCHING = 18
-    """Whether the run wants to be told that it is stiff: it then pauses with ``STIFF`` at its limit."""
+    """0: the run keeps its method. Else it wants to be told where another one does better, and pauses
+    there; 1 and the number of changes so far."""
     SETTLE = 19
     """Whether the modes are still to take the values that the signals ask for: at the start."""
     PAST = 20

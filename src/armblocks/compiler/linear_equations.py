@@ -20,6 +20,8 @@ SMALL = 8
 """Up to this size the whole matrix is eliminated with pivoting: nothing else is faster."""
 FULL = 0.5
 """So it is where L and U have this part of all its entries."""
+SCALING_ROUNDS = 6
+"""Rounds in which the bound of the rates comes down to within a factor of about two, for most matrices."""
 LEFT_OVER = 1e-7
 """A relative remainder that makes the elimination without pivoting count as failed. A Rosenbrock method with
 a Jacobian this wrong is still far more accurate than the tolerances that it is chosen for."""
@@ -65,6 +67,47 @@ def emit_linear_equations(module: Module, space: LinearSpace, gamma: float) -> N
         module.define("solved_well", sparse.solved_well)
         module.define("solve_sparse", sparse.solve)
     module.define("solve_linear", writer.solve)
+
+
+def emit_rate_bound(module: Module, space: LinearSpace) -> None:
+    """Add ``double rate_bound(ptr scratch)``: no less than the magnitude of any eigenvalue of ``J``.
+
+    For any positive v, that is ``max_i (|J| v)_i / v_i`` (Collatz, Wielandt; Horn, Johnson, Matrix Analysis,
+    8.1.31 and 8.1.18). A few rounds of ``v = sqrt(v |J| v)`` make v fit the scales of the states.
+    """
+
+    def write() -> str:
+        w, n = Routine(module), str(space.n)
+        rows = constant_integers(module, "jacobian.rows", space.pattern.rows)
+        columns = constant_integers(module, "jacobian.columns", space.pattern.columns)
+        bound, zero = w.variable("double", number_text(0.0)), number_text(0.0)
+
+        def at(place: int, index: str) -> str:
+            return w.at("%scratch", w.word_op("add", index, str(place)))
+
+        def entry(k: str) -> None:
+            row, column = (w.get(w.at(table, k, "i64"), "i64") for table in (rows, columns))
+            weight = w.multiply(w.absolute(w.get(at(space.J, k))), w.get(at(space.right, column)))
+            w.put(w.add(w.get(at(space.work, row)), weight), at(space.work, row))
+
+        def compare(i: str) -> None:
+            v, u = w.get(at(space.right, i)), w.get(at(space.work, i))
+            w.put(w.maximum(w.get(bound), w.divide(u, v)), bound)
+            middle = w.square_root(w.multiply(v, u))
+            w.put(w.select(w.compare("ogt", middle, zero), middle, v), at(space.right, i))
+
+        def turn(_: str) -> None:
+            w.put(zero, bound)
+            w.count("0", n, lambda i: w.put(zero, at(space.work, i)))
+            w.count("0", str(len(space.pattern.rows)), entry)
+            w.count("0", n, compare)
+
+        w.count("0", n, lambda i: w.put(number_text(1.0), at(space.right, i)))
+        w.count("0", str(SCALING_ROUNDS), turn)
+        w.do(f"ret double {w.get(bound)}")
+        return w.text("define internal double @rate_bound(ptr %scratch) noinline")
+
+    module.define("rate_bound", write)
 
 
 def constant_integers(module: Module, symbol: str, values: Sequence[int]) -> str:

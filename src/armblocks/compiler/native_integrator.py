@@ -19,7 +19,7 @@ from armblocks.compiler.linear_equations import LinearSpace
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
 from armblocks.compiler.rosenbrock_tableau import Tableau
-from armblocks.compiler.runge_kutta import POINTERS, STIFF_LOOKS, Loop, define_loop
+from armblocks.compiler.runge_kutta import POINTERS, STABLE_LOOKS, STIFF_LOOKS, Loop, define_loop
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
@@ -115,8 +115,8 @@ class NativeIntegrator:
         most at the last double before it, and what comes after starts anew. ``step`` s: grid of a fixed-step
         method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
         ``checkpoint`` the run goes on from there, as the run that left it would have. With
-        ``watch_stiffness`` it pauses, :attr:`Integration.stiff`, where stability has held its steps short for
-        long. Nothing is checked.
+        ``watch_stiffness`` it pauses, :attr:`Integration.wants_other`, where a method for stiff systems, or
+        an explicit one again, does better. Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -140,7 +140,7 @@ class NativeIntegrator:
         run.reals[Real.MAX_STEP] = max_step
         run.reals[Real.SPAN] = stop
         run.reals[Real.PAUSE] = np.inf
-        run.counts[Count.WATCHING] = watch_stiffness
+        run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
             run.counts[Count.SAMPLE] = 1
@@ -161,7 +161,8 @@ class NativeIntegrator:
         new.reals[:head] = run.reals[:head]
         new.reals[here.z :] = run.reals[old.z :]
         new.counts[:] = run.counts
-        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.WATCHING, Count.CRAWL]] = 0
+        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.CRAWL]] = 0
+        new.watch(1 + int(run.counts[Count.WATCHING]))
         return new
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
@@ -345,11 +346,28 @@ class Integration:
         """Unknowns of the implicit equations at the point evaluated last, ``(nw,)``: NaN if not found."""
         return self._vector(self.integrator.workspace.trial_w, self.integrator.sizes.algebraic)
 
+    def watch(self, changes: int) -> None:
+        """Pause where another method does better; ``changes``: 1 and the number of changes so far, 0 for no.
+
+        A method that is not for stiff systems comes back the later, the more often it has come back before.
+        """
+        self.counts[Count.WATCHING] = changes
+        if not self._explicit:
+            self.counts[Count.STIFF] = STABLE_LOOKS * 4 ** min(10, max(0, changes - 2) // 2)
+
     @property
-    def stiff(self) -> bool:
-        """Whether it paused because stability has held its steps short for long."""
-        long = self.counts[Count.STIFF] >= STIFF_LOOKS and self.counts[Count.WATCHING] != 0
-        return bool(long) and self.status is Status.PAUSED
+    def wants_other(self) -> bool:
+        """Whether it paused because another method does better from here on: stability has held an explicit
+        one short for long, or an explicit one could for long have taken the same steps."""
+        if self.status is not Status.PAUSED or not self.counts[Count.WATCHING]:
+            return False
+        if self._explicit:
+            return bool(self.counts[Count.STIFF] >= STIFF_LOOKS)
+        return bool(self.counts[Count.CALM] >= self.counts[Count.STIFF])
+
+    @property
+    def _explicit(self) -> bool:
+        return isinstance(self.integrator.tableau, ButcherTableau)
 
     @property
     def instants(self) -> int:

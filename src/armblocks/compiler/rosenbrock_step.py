@@ -15,7 +15,7 @@ from armblocks.compiler.butcher_tableau import Row
 from armblocks.compiler.integrator_workspace import Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import number_text
-from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations
+from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations, emit_rate_bound
 from armblocks.compiler.rosenbrock_tableau import RosenbrockTableau
 from armblocks.compiler.step_writer import StepWriter
 
@@ -117,6 +117,11 @@ class RosenbrockStep(StepWriter):
         return w.select(
             w.compare("olt", between, ends), ends, w.add(between, w.multiply(ends, number_text(0.0)))
         )
+
+    def fastest_rate(self) -> str:
+        """No less than the fastest rate of the flow at the step's start, 1/s."""
+        emit_rate_bound(self.w.module, self.space)
+        return self.w.let("call double @rate_bound(ptr %scratch)")
 
     def extra_stages(self, time: str, h: str) -> None:
         """None: the stages give the values between the steps."""

@@ -30,6 +30,10 @@ NEAR_BORDER = 0.97
 STIFF_LOOKS, CALM_LOOKS = 250, 6
 """So many looks that find a step bound by stability, 4000 steps, make the system stiff; so many in a row that
 do not make it calm again."""
+STABLE_BELOW, STABLE_LOOKS = 2.0, 16
+"""A step of the method for stiff systems that times the fastest rate is less than this is one that an
+explicit method could take as well; so many looks in a row, four times as many after each return, and one
+does."""
 CRAWL_EVERY, CRAWL_BACK = 64, 8
 """Steps between two looks (a power of two), and how many looks each takes back that finds nothing wrong."""
 CRAWL_LOOKS = {True: 2048, False: 512}
@@ -298,6 +302,8 @@ class Loop:
         w.place(accepted)
         if isinstance(step, ExplicitStep) and step.butcher.measures_stiffness:
             self.emit_stiffness_watch(step)
+        if isinstance(step, RosenbrockStep) and step.space.size == self.n:
+            self.emit_return_watch(step, h)
         self.emit_crawl_watch(h)
         self.emit_next_length(w.multiply(h, w.minimum(ideal, w.get(growth))))
 
@@ -329,6 +335,28 @@ class Loop:
         w.branch(w.word_test("sge", w.get(calm, "i64"), str(CALM_LOOKS)), clear, on)
         w.place(clear)
         w.put("0", stiff, "i64")
+        w.place(on)
+
+    def emit_return_watch(self, step: RosenbrockStep, h: str) -> None:
+        """Now and then, see whether an explicit method could take as long steps; pause where it long could.
+
+        With implicit equations the rates are not those of the flow's Jacobian, and nothing returns.
+        """
+        w = self.w
+        watched, wanted, calm = (self.counts[place] for place in (Count.WATCHED, Count.STIFF, Count.CALM))
+        look, on = w.fresh("look"), w.fresh("on")
+        w.increase(watched)
+        turn = w.word_op("and", w.get(watched, "i64"), str(LOOK_EVERY - 1))
+        watching = w.get(w.at("%counts", Count.WATCHING, "i64"), "i64")
+        due = w.both(w.word_test("ne", watching, "0"), w.word_test("eq", turn, "0"))
+        w.branch(due, look, on)
+        w.place(look)
+        stable = w.compare("olt", w.multiply(h, step.fastest_rate()), number_text(STABLE_BELOW))
+        more = w.word_op("add", w.get(calm, "i64"), "1")
+        w.put(w.let(f"select i1 {stable}, i64 {more}, i64 0"), calm, "i64")
+        long = w.word_test("sge", w.get(calm, "i64"), w.get(wanted, "i64"))
+        w.put(w.let(f"select i1 {long}, i64 %max_steps, i64 {w.get(self.taken, 'i64')}"), self.taken, "i64")
+        w.jump(on)
         w.place(on)
 
     def emit_crawl_watch(self, h: str) -> None:

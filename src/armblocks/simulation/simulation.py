@@ -95,6 +95,7 @@ class Simulation:
         self._tableau = self._plan.tableau
         self._solver = self._plan.solver
         self._reason = self._plan.reason
+        self._changed_method = False
         self._resumption = ""
         self._checkpoint: Checkpoint | None = None
         self._settings = ""
@@ -188,7 +189,7 @@ class Simulation:
         budget = np.inf if wall_time is None else wall_time
         try:
             while stretch.status is Status.PAUSED and left >= 1:
-                if stretch.integration is not None and stretch.integration.stiff:
+                if stretch.integration is not None and stretch.integration.wants_other:
                     stretch.integration = self._change_method(stretch.integration)
                 started, taken = perf_counter(), self._steps_of(stretch)
                 chunk = int(min(self._chunk_of(stretch), left))
@@ -196,8 +197,8 @@ class Simulation:
                 now = perf_counter()
                 taken = self._steps_of(stretch) - taken
                 left -= taken
-                stiff = stretch.integration is not None and stretch.integration.stiff
-                if taken < chunk and not stiff:
+                other = stretch.integration is not None and stretch.integration.wants_other
+                if taken < chunk and not other:
                     break  # at the pause, or at the end
                 # Twice as many steps at most: a chunk never outgrows what the last one took by much.
                 growth = min(2.0, min(CHUNK_SECONDS, budget) / max(now - started, 1e-6))
@@ -348,7 +349,7 @@ class Simulation:
                 checkpoint = state.checkpoint
             how = "exactly as the run before" if checkpoint is not None else "started anew"
             if plan.stiff is not None and checkpoint is not None and checkpoint.method == plan.stiff.name:
-                self._tableau, self._solver = plan.stiff, plan.stiff.name
+                self._tableau, self._solver, self._changed_method = plan.stiff, plan.stiff.name, True
                 self._reason = f"auto: {plan.stiff.title}, as the run before found the system stiff"
             self._resumption = f"; goes on from {start.time:g} s, {how}"
         else:
@@ -363,7 +364,7 @@ class Simulation:
             atol=options.atol,
             max_step=plan.max_step,
             checkpoint=checkpoint,
-            watch_stiffness=plan.stiff is not None and self._tableau is plan.tableau,
+            watch_stiffness=plan.stiff is not None,
             stop=plan.instants.stop,
         )
 
@@ -377,16 +378,24 @@ class Simulation:
         return native
 
     def _change_method(self, integration: Integration) -> Integration:
-        """The run goes on by the method for stiff systems, from where it stands, and stays with it."""
+        """The run goes on by the other method of the two, from where it stands."""
         first, stiff = self._plan.tableau, self._plan.stiff
         assert first is not None and stiff is not None
-        native = self._prepared(stiff)
+        following = first if self._tableau is stiff else stiff
+        native = self._prepared(following)
         self._checkpoint = integration.checkpoint
-        self._tableau, self._solver = stiff, f"{first.name}, then {stiff.name}"
-        self._reason = (
-            f"auto: {first.title} until {integration.time:.4g} s, then {stiff.title}, because the system is "
-            f"stiff: stability, not accuracy, held the explicit steps at {integration.last_step:.2g} s"
-        )
+        when, step = f"{integration.time:.4g} s", f"{integration.last_step:.2g} s"
+        if following is first:
+            self._reason += f"; from {when} {first.title}, as steps of {step} are stable now"
+        elif self._changed_method:
+            self._reason += f"; from {when} {stiff.title}"
+        else:
+            self._reason = (
+                f"auto: {first.title} until {when}, then {stiff.title}, because the system is "
+                f"stiff: stability, not accuracy, held the explicit steps at {step}"
+            )
+        self._solver += f", then {following.name}"
+        self._tableau, self._changed_method = following, True
         return native.take_over(integration)
 
     def _rows(self, begin: int = 0) -> list[Rows]:

@@ -1,0 +1,105 @@
+"""The automatic choice goes back to the explicit method where a system is stiff no longer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from small_systems import states_of, system
+from stiff_systems import robertson, van_der_pol
+
+from armblocks.compiler.system import compile_system
+from armblocks.equations import HybridSystem, SimulationOptions, signature
+from armblocks.simulation import RunState, SimulationResult, simulate
+
+
+def lag_and_oscillator(rate: ca.SX, t: ca.SX, x: ca.SX) -> ca.SX:
+    """``sin t`` held by a lag of that rate (1/s), beside an oscillator of 10 rad/s."""
+    return ca.vertcat(ca.cos(t) - rate * (x[0] - ca.sin(t)), x[2], -100.0 * x[1])
+
+
+def fading() -> HybridSystem:
+    """The lag is fast until 5 s and slow from about 8 s on."""
+    return system(
+        "fading",
+        states=states_of("lag/x", "wave/x", "wave/v"),
+        signals=signature(("y", (3,))),
+        derivative=lambda t, x, p: lag_and_oscillator(1e5 / (1 + ca.exp(4 * (t - 5))), t, x),
+        outputs=lambda t, x, p: x,
+        initial=(0.0, 1.0, 0.0),
+    )
+
+
+def recurring() -> HybridSystem:
+    """The lag is fast for 31 s and slow for 31 s, again and again."""
+    return system(
+        "recurring",
+        states=states_of("lag/x", "wave/x", "wave/v"),
+        signals=signature(("y", (3,))),
+        derivative=lambda t, x, p: lag_and_oscillator(1e5 / (1 + ca.exp(40 * ca.cos(t / 10))), t, x),
+        outputs=lambda t, x, p: x,
+        initial=(0.0, 1.0, 0.0),
+    )
+
+
+FADING = compile_system(fading())
+STOP = 100.0
+
+
+def run(solver: str, stop: float = STOP, state: RunState | None = None) -> SimulationResult:
+    options = SimulationOptions(stop_time=stop, sample_time=0.5, solver=solver, rtol=1e-8, atol=1e-10)
+    return simulate(FADING, options, initial_state=state)
+
+
+def test_the_explicit_method_comes_back_and_the_report_says_both_changes() -> None:
+    result = run("auto")
+    assert result.run.solver == "rk45, then rodas5p, then rk45"
+    assert "because the system is stiff" in result.run.reason
+    assert "s are stable now" in result.run.reason
+    back = float(result.run.reason.split("; from ")[1].split(" s")[0])
+    assert 6.0 < back < 20.0
+    t = result.time
+    exact = np.column_stack([np.sin(t), np.cos(10 * t), -10 * np.sin(10 * t)])
+    # The oscillator's error grows with its 160 turns, under any method.
+    np.testing.assert_allclose(result["y"], exact, atol=2e-4)
+    assert result.run.evaluations < 0.6 * run("rk45").run.evaluations
+
+
+@pytest.mark.parametrize("cuts", [[5.0], [30.0], [2.0, 9.0, 60.0]])
+def test_an_interrupted_run_returns_at_the_same_step(cuts: list[float], tmp_path: Path) -> None:
+    whole = run("auto")
+    state: RunState | None = None
+    for stop in cuts:
+        state = run("auto", stop, state).final_state
+        assert state is not None
+        state.save(tmp_path / "state")
+        state = RunState.load(tmp_path / "state")
+    rest = run("auto", STOP, state)
+    assert "exactly as the run before" in rest.run.reason
+    same = np.isin(whole.time, rest.time)
+    assert same.sum() > 50
+    assert rest.signals[:, np.isin(rest.time, whole.time)].tobytes() == whole.signals[:, same].tobytes()
+
+
+def test_a_system_that_is_stiff_now_and_then_does_not_go_to_and_fro() -> None:
+    """Each return makes the next one four times as late: their number grows with the logarithm only."""
+    options = SimulationOptions(stop_time=1000.0, sample_time=10.0, rtol=1e-6, atol=1e-9)
+    compiled = compile_system(recurring())
+    result = simulate(compiled, options)
+    changes = result.run.solver.count("then")
+    assert 2 <= changes <= 6
+    stiff = simulate(compiled, SimulationOptions(stop_time=1000.0, sample_time=10.0, solver="rodas5p"))
+    assert result.run.evaluations < 3 * stiff.run.evaluations
+    np.testing.assert_allclose(result["y"][:, 0], np.sin(result.time), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("problem", "stop"),
+    [(robertson(), 1e11), (van_der_pol(1000.0), 2000.0)],
+    ids=["robertson", "van der Pol"],
+)
+def test_problems_that_stay_stiff_change_once(problem: HybridSystem, stop: float) -> None:
+    result = simulate(compile_system(problem), SimulationOptions(stop_time=stop, rtol=1e-6, atol=1e-12))
+    assert result.run.solver == "rk45, then rodas5p"
