@@ -8,7 +8,8 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -94,9 +95,9 @@ def studio(tmp_path: Path) -> Iterator[Studio]:
     started.stop()
 
 
-@pytest.fixture
-def page(browser: Browser, studio: Studio) -> Iterator[Page]:
-    """The page, logged in; it shows the first example."""
+@contextmanager
+def watched(browser: Browser, link: str) -> Generator[Page]:
+    """A page, logged in, that must say no error on its console; it shows the first example."""
     context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     page = context.new_page()
@@ -109,8 +110,28 @@ def page(browser: Browser, studio: Studio) -> Iterator[Page]:
 
     page.on("console", hear)
     page.on("pageerror", lambda error: faults.append(str(error)))
-    page.goto(studio.link)
+    page.goto(link)
     page.locator(".react-flow__node").first.wait_for()
     yield page
     context.close()
     assert not faults
+
+
+@pytest.fixture
+def page(browser: Browser, studio: Studio) -> Iterator[Page]:
+    """The page of a studio of its own."""
+    with watched(browser, studio.link) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def open_studio(browser: Browser) -> Iterator[Callable[[Path], Page]]:
+    """Start a studio that all tests of a file share, and show its page."""
+    with ExitStack() as stack:
+
+        def opened(folder: Path) -> Page:
+            started = Studio(folder)
+            stack.callback(started.stop)
+            return stack.enter_context(watched(browser, started.link))
+
+        yield opened

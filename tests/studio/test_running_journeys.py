@@ -1,0 +1,265 @@
+"""Running a model in the page: tuned, stepped, measured, compared, logged; in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+import armblocks as ab
+
+Opened = Callable[[ab.Diagram], Page]
+GAIN, LAG = 2.0, 1.0
+
+
+def lag_model(name: str) -> ab.Diagram:
+    """A step at 1 s of height 2 through a lag of 1 s, in a Scope of two inputs."""
+    builder = ab.DiagramBuilder(name, settings=ab.SimulationOptions(stop_time=10.0))
+    step = builder.add("step", ab.blocks.Step(time=1.0))
+    gain = builder.add("gain", ab.blocks.Gain(gain=GAIN), step["y"])
+    lag = builder.add("lag", ab.blocks.FirstOrderLag(time_constant=LAG), gain["y"])
+    builder.add("scope", ab.blocks.Scope(inputs=2), gain["y"], lag["y"])
+    builder.add("display", ab.blocks.Display(), lag["y"])
+    return builder.build()
+
+
+@pytest.fixture(scope="module")
+def opened(open_studio: Callable[[Path], Page], tmp_path_factory: pytest.TempPathFactory) -> Opened:
+    """One server and one page for all: each test opens a model of its own."""
+    folder = tmp_path_factory.mktemp("running")
+    page = open_studio(folder)
+    origin = page.url.partition("#")[0]
+
+    def opening(diagram: ab.Diagram) -> Page:
+        ab.save_diagram(diagram, folder / f"{diagram.name}.json")
+        page.goto("about:blank")
+        page.goto(f"{origin}#{diagram.name}.json")
+        expect(page.locator(".title")).to_have_text(diagram.name)
+        page.locator(".react-flow__node").first.wait_for()
+        return page
+
+    return opening
+
+
+def run(page: Page) -> None:
+    page.keyboard.press("Control+Enter")
+    expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
+
+
+def run_slowly(page: Page, speed: str) -> None:
+    page.get_by_role("combobox", name="Speed").click()
+    page.get_by_role("option", name=f"{speed} × real time", exact=True).click()
+    page.keyboard.press("Control+Enter")
+    expect(page.locator(".run-state")).to_contain_text("running", ignore_case=True)
+
+
+def tab(page: Page, title: str) -> None:
+    page.locator(".dock .tab").get_by_text(title, exact=True).click()
+
+
+def select(page: Page, block: str) -> None:
+    page.locator(f'.react-flow__node[data-id="{block}"]').click()
+
+
+def shown_time(page: Page) -> float:
+    return float(page.locator(".timeline .instant").inner_text().removesuffix(" s"))
+
+
+def wait_until(page: Page, true: Callable[[], bool]) -> None:
+    for _ in range(600):
+        if true():
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError("it did not come")
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-").split()[0])
+
+
+def test_a_run_is_tuned_stepped_back_and_the_value_kept(opened: Opened) -> None:
+    page = opened(lag_model("tuned"))
+    tab(page, "Tune")
+    select(page, "gain")
+    run_slowly(page, "1")
+    field = page.get_by_role("textbox", name="gain.gain", exact=True)
+    wait_until(page, lambda: shown_time(page) > 0.3)
+    field.fill("3")
+    field.press("Enter")
+    page.get_by_role("button", name="Pause").click()
+    expect(page.locator(".run-state")).to_contain_text("paused", ignore_case=True)
+    before = shown_time(page)
+    page.get_by_role("button", name="Step back").click()
+    wait_until(page, lambda: shown_time(page) < before)
+    page.get_by_role("slider", name="Time").focus()
+    page.keyboard.press("Home")
+    page.keyboard.press("ArrowRight")
+    expect(page.locator(".timeline .instant")).to_have_text("0.010 s")
+    page.get_by_role("button", name="Go back to here").click()
+    expect(page.get_by_role("button", name="Go back to here")).to_be_hidden()
+    assert shown_time(page) <= 0.02
+    page.get_by_role("combobox", name="Speed").click()
+    page.get_by_role("option", name="as fast as possible").click()
+    page.get_by_role("button", name="Resume").click()
+    expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
+    # What was tuned holds from where the run returned to.
+    expect(page.locator(".display-value")).to_have_text(re.compile(r"^(3\.000|2\.999)$"))
+    page.get_by_role("button", name="Keep in the model").click()
+    expect(page.get_by_text("not in the model")).to_be_hidden()
+    undo = page.get_by_role("button", name="Undo keep 1 tuned value (Ctrl+Z)")
+    expect(undo).to_be_enabled()
+    undo.click()
+    expect(field).to_have_value("2")
+
+
+def test_two_runs_are_compared(opened: Opened) -> None:
+    page = opened(lag_model("compared"))
+    run(page)
+    tab(page, "Tune")
+    select(page, "lag")
+    field = page.get_by_role("textbox", name="lag.time_constant", exact=True)
+    field.fill("0.5")
+    field.press("Enter")
+    run(page)
+    tab(page, "Signals")
+    expect(page.locator(".kept-run")).to_have_count(2)
+    expect(page.locator(".kept-run").first).to_contain_text("lag.time_constant = 0.5")
+    expect(page.locator(".kept-run").last).not_to_contain_text("time_constant")
+    page.get_by_role("switch", name="Difference").check(force=True)
+    model = lag_model("compared")
+    one, other = ab.simulate(model), ab.simulate(model, parameters={"lag.time_constant": 0.5})
+    apart = np.abs(other["lag/y"] - one["lag/y"])
+    row = page.locator(".signals label", has_text="lag")
+    said = row.locator(".apart")
+    expect(said).to_contain_text("✗")
+    found = re.findall(r"[\d.]+", said.inner_text())
+    np.testing.assert_allclose(float(found[0]), apart.max(), rtol=5e-3)
+    np.testing.assert_allclose(float(found[1]), one.time[apart.argmax()], rtol=5e-3)
+    expect(page.locator(".signals label", has_text="gain").locator(".apart")).to_contain_text("✓ 0")
+    page.get_by_role("textbox", name="Tolerance").fill("1")
+    expect(said).to_contain_text("✓")
+    page.get_by_role("textbox", name="Search the signals").fill("LAG")
+    expect(page.locator(".signals label")).to_have_count(1)
+    name = page.get_by_role("textbox", name="Name of Run 1")
+    name.fill("slow")
+    name.press("Enter")
+    page.get_by_role("button", name="Forget slow").click()
+    expect(page.locator(".kept-run")).to_have_count(1)
+
+
+def saved(page: Page, scope: str, entry: str) -> bytes:
+    """What a scope is exported as."""
+    page.get_by_role("button", name=f"Export {scope}", exact=True).click()
+    with page.expect_download() as download:
+        page.get_by_role("menuitem", name=entry).click()
+    return Path(download.value.path()).read_bytes()
+
+
+def measured(table: Locator, signal: str) -> dict[str, str]:
+    heads = table.locator("thead th").all_inner_texts()
+    row = table.locator("tbody tr", has=table.page.locator("th", has_text=re.compile(f"^{signal}")))
+    return dict(zip(heads[1:], row.locator("td").all_inner_texts()))
+
+
+def test_scopes_measure_what_the_closed_form_says(opened: Opened) -> None:
+    page = opened(lag_model("measured"))
+    run(page)
+    page.get_by_role("button", name="Measures of what is shown").click()
+    table = page.locator(".measures table")
+    lag = measured(table, "lag")
+    assert number(lag["min"]) == 0.0
+    np.testing.assert_allclose(number(lag["max"]), GAIN, rtol=1e-3)
+    # The step comes at 1 s: over 10 s the mean of K (1 - exp(-t/T)) is K (9 - T (1 - exp(-9/T))) / 10.
+    left = 9.0 - LAG * (1.0 - np.exp(-9.0 / LAG))
+    np.testing.assert_allclose(number(lag["mean"]), GAIN * left / 10.0, rtol=1e-3)
+    square = GAIN**2 * (9.0 - 2.0 * LAG * (1.0 - np.exp(-9.0)) + LAG / 2.0 * (1.0 - np.exp(-18.0))) / 10.0
+    np.testing.assert_allclose(number(lag["RMS"]), np.sqrt(square), rtol=1e-3)
+    np.testing.assert_allclose(number(lag["rise"]), np.log(9.0) * LAG, rtol=1e-3)
+    assert number(lag["over"]) == 0.0
+    page.get_by_role("button", name="Measuring cursors").click()
+    between = page.locator(".measures .between")
+    expect(between).to_contain_text("Δt 3.3333 s")
+    expect(between).to_contain_text("1/Δt 300.00 mHz")
+    at = {head: number(text) for head, text in measured(table, "lag").items() if head in ("A", "B", "Δ")}
+    a, b = (GAIN * (1.0 - np.exp(-(time - 1.0) / LAG)) for time in (10 / 3, 20 / 3))
+    np.testing.assert_allclose([at["A"], at["B"], at["Δ"]], [a, b, b - a], rtol=2e-3)
+    page.get_by_role("button", name="lag", exact=True).click()
+    expect(table.locator("tbody tr")).to_have_count(1)
+
+
+def test_a_scope_is_exported_whole(opened: Opened) -> None:
+    page = opened(lag_model("exported"))
+    run(page)
+    rows = list(csv.reader(io.StringIO(saved(page, "scope", "Samples as CSV").decode())))
+    assert rows[0] == ["time [s]", "gain", "lag"]
+    result = ab.simulate(lag_model("exported"))
+    wanted = np.column_stack([result.time, result["gain/y"], result["lag/y"]])
+    np.testing.assert_array_equal(np.array(rows[1:], dtype=float), wanted)
+    picture = ElementTree.fromstring(saved(page, "scope", "Picture as SVG"))
+    assert {"scope", "gain", "lag", "time, s"} <= {text.text for text in picture.iter() if text.text}
+    assert saved(page, "scope", "Picture as PNG").startswith(b"\x89PNG")
+
+
+def test_a_wire_is_logged_by_a_click_and_its_value_pinned(opened: Opened) -> None:
+    page = opened(lag_model("logged"))
+    ends = [page.locator(f'.react-flow__handle[data-nodeid="{node}"]') for node in ("gain", "lag")]
+    expect(ends[1].first).to_be_in_viewport()
+    right, left = ends[0].last.bounding_box(), ends[1].first.bounding_box()
+    assert right and left
+    page.mouse.click((right["x"] + left["x"] + left["width"]) / 2, right["y"] + right["height"] / 2)
+    page.get_by_role("button", name="Log", exact=True).click()
+    expect(page.locator(".logged-badge")).to_have_count(1)
+    page.get_by_role("button", name="Pin the value").click()
+    run(page)
+    expect(page.locator(".wire-value")).to_have_text("2.000")
+    expect(page.locator(".chart figcaption b").get_by_text("gain/y", exact=True)).to_have_count(1)
+    page.get_by_role("slider", name="Time").focus()
+    page.keyboard.press("Home")
+    expect(page.locator(".wire-value")).to_have_text("0")
+    page.keyboard.press("Space")
+    expect(page.get_by_role("button", name="Hold the playback")).to_be_visible()
+    page.keyboard.press("Space")
+    page.keyboard.press("Control+s")
+    expect(page.locator(".title")).to_have_text("logged")
+
+
+def test_configuration_parameters_are_checked_while_typed_and_kept(opened: Opened) -> None:
+    page = opened(lag_model("configured"))
+    page.keyboard.press("Control+e")
+    step = page.get_by_role("textbox", name="Fixed step")
+    step.fill("20")
+    expect(page.get_by_text("at most the stop time 10 s")).to_be_visible()
+    expect(page.get_by_role("button", name="OK", exact=True)).to_be_disabled()
+    step.fill("1/100")
+    page.get_by_role("combobox", name="Solver").select_option("rk4")
+    expect(page.get_by_role("button", name="OK", exact=True)).to_be_enabled()
+    page.get_by_role("button", name="OK", exact=True).click()
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    run(page)
+    page.keyboard.press("Control+e")
+    expect(page.get_by_text("The last run used rk4")).to_be_visible()
+    expect(step).to_have_value("0.01")
+    page.keyboard.press("Escape")
+
+
+def test_sixteen_channels_at_ten_kilohertz_arrive_whole(opened: Opened) -> None:
+    builder = ab.DiagramBuilder("channels", settings=ab.SimulationOptions(stop_time=1.0, sample_time=1e-4))
+    for k in range(16):
+        wave = builder.add(f"wave {k}", ab.blocks.SineWave(frequency=5.0 + k, amplitude=1.0 + k))
+        builder.add(f"scope {k}", ab.blocks.Scope(), wave["y"])
+    diagram = builder.build()
+    page = opened(diagram)
+    run_slowly(page, "1")
+    expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
+    result = ab.simulate(diagram)
+    for k in (0, 15):
+        table = io.StringIO(saved(page, f"scope {k}", "Samples as CSV").decode())
+        rows = np.loadtxt(table, delimiter=",", skiprows=1)
+        np.testing.assert_array_equal(rows, np.column_stack([result.time, result[f"wave {k}/y"]]))
