@@ -211,7 +211,7 @@ from armblocks.blocks.poses import (
     TransformTwist,
 )
 from armblocks.blocks.prelookup import DirectLookup, InterpolationUsingPrelookup, Prelookup
-from armblocks.blocks.python_function import PythonFunction
+from armblocks.blocks.python_function import CalledPythonFunction, PythonFunction
 from armblocks.blocks.rate_limits import RateLimiterContinuous, RateLimiterDynamic
 from armblocks.blocks.reductions import (
     CumulativeSum,
@@ -359,6 +359,7 @@ __all__ = [
     "BusCreator",
     "BusSelector",
     "CTraj",
+    "CalledPythonFunction",
     "CartesianToPolar",
     "Chirp",
     "CirclePath",

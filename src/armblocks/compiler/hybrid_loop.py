@@ -513,7 +513,22 @@ class HybridLoop(Loop):
         w.put("1", self.counts[Count.FRESH], "i64")
         w.place(same)
         w.put(str(int(Stage.INSTANT)), self.counts[Count.STARTED], "i64")
+        if self.sizes.clocks:
+            self.emit_halt(new_time)
         w.jump(self.on_instant)
+
+    def emit_halt(self, time: str) -> None:
+        """Return before the ticks of an instant that somebody waits for, all values as they are there."""
+        w = self.w
+        halt, on = w.fresh("halt"), w.fresh("no_halt")
+        halted = w.compare("oge", w.multiply(time, number_text(SAME_ABOVE)), w.get(w.at("%reals", Real.HALT)))
+        w.branch(halted, halt, on)
+        w.place(halt)
+        w.put(time, self.instant)
+        self.emit_solve(self.instant, self.at(self.places.x))
+        self.accept_unknowns()
+        self.leave(Status.PAUSED)
+        w.place(on)
 
     def emit_search(self, time: str, h: str) -> None:
         """If a guard fires within the step, go back to the first instant at which one does.

@@ -51,7 +51,9 @@ class Real(IntEnum):
     """How far apart the guards are looked at next, at most; as far as they have proved to be smooth."""
     PAUSE = 10
     """The loop returns before the first step that would begin at this time or later."""
-    END = 11
+    HALT = 11
+    """The loop returns before the ticks of the first instant at this time or later."""
+    END = 12
 
 
 class Count(IntEnum):

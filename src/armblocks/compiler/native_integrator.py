@@ -140,6 +140,7 @@ class NativeIntegrator:
         run.reals[Real.MAX_STEP] = max_step
         run.reals[Real.SPAN] = stop
         run.reals[Real.PAUSE] = np.inf
+        run.reals[Real.HALT] = np.inf
         run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
@@ -299,6 +300,24 @@ class Integration:
         self.counts[Count.SEGMENT] = 0
         self.counts[Count.SEGMENTS] = self.course[2].size
         self._take_addresses()
+
+    def halt_at(self, time: float) -> None:
+        """Return from :meth:`advance` before the ticks of the first instant at a time (s) or later."""
+        self.reals[Real.HALT] = time
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the ticks and events of the instant reached are still to come."""
+        return bool(self.counts[Count.STARTED] == Stage.INSTANT)
+
+    def next_tick(self, clock: int) -> float:
+        """When a clock ticks next, s; while the run is :attr:`waiting`, that may be now."""
+        period, offset = self.integrator.sizes.clocks[clock]
+        return float(self.counts[Count.END + clock]) * period + offset
+
+    def put_discrete(self, places: slice, values: Vector) -> None:
+        """Give some of the discrete variables other values, where the run stands."""
+        self._vector(self.integrator.workspace.z, self.integrator.sizes.discrete)[places] = values
 
     def advance(self, max_steps: int, pause: float = np.inf) -> Status:
         """Take at most ``max_steps`` accepted steps, and none that begins at ``pause`` (s) or later."""

@@ -104,6 +104,8 @@ class CompiledSystem:
         self.aliases: Mapping[str, str] = dict(description["aliases"])
         self.guard_names: tuple[str, ...] = tuple(description["guard_names"])
         self.guard_actions: tuple[str, ...] = tuple(description["guard_actions"])
+        self.called: tuple[str, ...] = tuple(description["called"])
+        """Blocks that Python works out at their ticks."""
         self.sizes = LoopSizes(
             states=self.states.size,
             discrete=self.discrete.size,
@@ -152,6 +154,10 @@ class CompiledSystem:
     @cached_property
     def _point_functions(self) -> Mapping[str, Callable[..., None]]:
         return self._functions_of(("derivative", *(("residual",) if self.sizes.algebraic else ())), 6)
+
+    @cached_property
+    def _update_function(self) -> Callable[..., None]:
+        return self._functions_of(("update",), 7)["update"]
 
     @cached_property
     def _signals(self) -> Callable[..., None]:
@@ -208,6 +214,13 @@ class CompiledSystem:
     def residual(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
         """``r``, ``(nw,)``, at one instant: zero where ``w`` solves the implicit equations."""
         return self._at_point("residual", self.algebraic.size, t, (x, z, w, p))
+
+    def updated(self, t: float, x: Vector, z: Vector, w: Vector, p: Vector, m: Vector) -> Vector:
+        """``z``, ``(nz,)``, after a tick of the clocks that ``m (nm,)`` marks with 1."""
+        result = np.empty(self.discrete.size)
+        time = np.array([t], dtype=np.float64)
+        self._update_function(*(vector.ctypes.data for vector in (time, x, z, w, p, m, result)))
+        return result
 
     def evaluate_signals(self, t: Vector, x: Vector, z: Vector, w: Vector, p: Vector) -> Vector:
         """Signals ``(ny, N)`` at many instants, several at a time.
@@ -266,6 +279,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
         "guard_actions": list(system.guard_actions),
+        "called": list(system.called),
         "delays": []
         if system.delays is None
         else list(zip(system.delays.values, system.delays.slopes, system.delays.fixed)),

@@ -75,6 +75,9 @@ class Block(ABC):
     by the choice of it. Where Newton's method has to search, it begins at ``initial_guesses``."""
     sampled: ClassVar[bool] = False
     """Whether the block works at the ticks of a clock only; it then has the parameter ``sample_time``."""
+    called: ClassVar[bool] = False
+    """Whether Python is called at each tick of a sampled block, before it: :meth:`call` is given the discrete
+    states ``port?`` of the inputs, as they are at the tick, and says what those of the outputs become."""
     virtual: ClassVar[bool] = False
     """Whether the block stands for wires only: it has no equations and is gone before a diagram is traced."""
     rated_inputs: ClassVar[tuple[str, ...]] = ()
@@ -272,6 +275,13 @@ class Block(ABC):
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         """What every discrete state of a sampled block becomes at a tick."""
+        return {}
+
+    def call(self, t: float, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
+        """What a ``called`` block gives at a tick: numbers or arrays by output port, for those by input port.
+
+        Raises ``InputError``.
+        """
         return {}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

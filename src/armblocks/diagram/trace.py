@@ -72,12 +72,11 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     ]
     guards = _guards(model, flow)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
-    m, e = {"m": symbols.m}, {"e": symbols.e}
+    m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
     def function(name: str, ends: Mapping[str, SX], **results: Sequence[SX]) -> TracedFunction:
         return _flat_function(name, ends, {key: loops.solved(parts) for key, parts in results.items()})
 
-    p = {"p": symbols.p}
     residual = function("residual", ends, r=[loops.residual])
     rates = densify(jacobian(residual.results[0], loops.w))
     return HybridSystem(
@@ -99,6 +98,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
             results=(flatten(rates, rates.shape),),
         ),
         captures=_keeps_left_limits(model),
+        called=tuple(name for name, block in diagram.blocks.items() if block.called),
         update=function("update", ends | m, z=_updated(model, symbols, flow, loops)),
         guards=function("guards", ends, g=[value for _, _, value in guards]),
         guard_directions=tuple(guard.direction for _, guard, value in guards for _ in range(value.numel())),

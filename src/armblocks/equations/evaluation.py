@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armblocks.equations.hybrid_system import Delays, HybridSystem
 from armblocks.equations.table_reading import evaluate_with_reads, reads_tables
 from armblocks.equations.traced_function import TracedFunction
+from armblocks.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,17 @@ class Slopes:
     p: Array
 
 
+def refuse_called(system: HybridSystem, what: str) -> None:
+    """Raise ``InputError`` where Python works out a part of a system: it has values, but no equations."""
+    if system.called:
+        raise InputError(
+            f"block '{system.called[0]}' calls Python, which has no {what}",
+            where=system.name,
+            allowed="blocks with equations",
+            fix="take a Python Function that can be traced, or leave the block out",
+        )
+
+
 class EvaluatedSystem:
     """A system's functions and their derivatives as numbers.
 
@@ -58,6 +70,7 @@ class EvaluatedSystem:
     def __init__(
         self, system: HybridSystem, parameters: Sequence[int] = (), signals: Sequence[int] | None = None
     ) -> None:
+        refuse_called(system, "slopes")
         self.system = system
         self._parameters = list(parameters)
         self._signals = None if signals is None else list(signals)

@@ -117,3 +117,5 @@ class HybridSystem:
     """Signals that are looked up in the past."""
     captures: bool = False
     """Whether some discrete variable keeps how things were just before an instant."""
+    called: tuple[str, ...] = ()
+    """Blocks that are no equations: Python works out at each of their ticks what they give."""

@@ -18,6 +18,7 @@ from collections.abc import Mapping, Sequence
 
 from casadi import SX, Function, densify, depends_on, dot, fabs, fmax, if_else, jacobian, jtimes, vertcat
 
+from armblocks.equations.evaluation import refuse_called
 from armblocks.equations.hybrid_system import HybridSystem
 from armblocks.equations.signatures import Signature, Slot, signature
 from armblocks.equations.symbols import flatten
@@ -64,6 +65,7 @@ def sensitivity_system(
 
 class _Augmented:
     def __init__(self, system: HybridSystem, parameters: Sequence[str], outputs: Sequence[str]) -> None:
+        refuse_called(system, "derivatives")
         self.old = system
         self.t, self.x, self.z, self.w, self.p = system.derivative.arguments
         self.outputs = [system.signals_layout[name] for name in outputs]

@@ -18,6 +18,7 @@ from armblocks.compiler.system import CompiledSystem, compile_system, recall_sys
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.face.called import called_functions
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
@@ -56,7 +57,9 @@ class CompiledDiagram:
         """Run once; see :func:`simulate`."""
         tuned, values = self._tuned(parameters)
         options = options or tuned.diagram.settings
-        result = run_to_the_end(Simulation(tuned.compiled, options, values, initial_state, log), progress)
+        calls = called_functions(tuned.diagram, tuned.compiled)
+        run = Simulation(tuned.compiled, options, values, initial_state, log, calls)
+        result = run_to_the_end(run, progress)
         if tuned._watch is None:
             tuned._watch = LimitWatch(tuned.diagram, result)
         tuned._watch.warn(result)
@@ -74,7 +77,8 @@ class CompiledDiagram:
         tuned, values = self._tuned(parameters)
         diagram = with_parameters(self.diagram, parameters) if parameters else self.diagram
         options = options or diagram.settings
-        return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state, log))
+        calls = called_functions(tuned.diagram, tuned.compiled)
+        return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state, log, calls))
 
     def _tuned(
         self, parameters: Mapping[str, object] | None

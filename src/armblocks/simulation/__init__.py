@@ -1,5 +1,6 @@
 """Runs compiled systems: integrators as tables, one call to simulate, results with names and units."""
 
+from armblocks.simulation.calls import CalledFunction
 from armblocks.simulation.plan import LogRequest
 from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult
 from armblocks.simulation.run_state import RunState
@@ -9,6 +10,7 @@ from armblocks.simulation.tableaux import TABLEAUX, find_tableau
 
 __all__ = [
     "TABLEAUX",
+    "CalledFunction",
     "LogRequest",
     "ParameterChange",
     "RunReport",

@@ -43,7 +43,8 @@ class RunReport:
 
     ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
     taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``ticks``:
-    instants at which a clock ticked; ``events``: guards that fired. ``preparation_time`` s for the native
+    instants at which a clock ticked; ``events``: guards that fired. ``calls`` of Python functions at their
+    ticks, and the ``call_time`` s spent in them. ``preparation_time`` s for the native
     code to be compiled or loaded, next to nothing when it is there; ``wall_time`` s of the run itself;
     ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop time was reached;
     ``message``: what a person should know (why it stopped, stiffness), else empty.
@@ -56,6 +57,8 @@ class RunReport:
     evaluations: int = 0
     ticks: int = 0
     events: int = 0
+    calls: int = 0
+    call_time: float = 0.0
     preparation_time: float = 0.0
     wall_time: float = 0.0
     real_time_factor: float = 0.0

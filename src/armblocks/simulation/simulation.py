@@ -17,6 +17,7 @@ from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import InputError, SimulationError
+from armblocks.simulation.calls import CalledFunction, Calls
 from armblocks.simulation.diagnosis import (
     assertion_failure,
     first_bad_signal,
@@ -80,7 +81,16 @@ class Simulation:
         parameters: Mapping[str, ArrayLike] | ArrayLike | None = None,
         initial_state: RunState | None = None,
         log: LogRequest | None = None,
+        calls: Sequence[CalledFunction] = (),
     ) -> None:
+        if {function.block for function in calls} != set(compiled.called):
+            raise InputError(
+                f"nothing says what Python calls for {', '.join(map(repr, compiled.called))}",
+                where=compiled.name,
+                allowed="one CalledFunction for each block that is called",
+                fix="run the diagram itself, by armblocks.simulate or armblocks.begin",
+            )
+        self._calls = Calls(compiled, calls) if calls else None
         self.compiled = compiled
         self.options = options
         self._p = parameter_vector(compiled, parameters)
@@ -193,7 +203,7 @@ class Simulation:
                     stretch.integration = self._change_method(stretch.integration)
                 started, taken = perf_counter(), self._steps_of(stretch)
                 chunk = int(min(self._chunk_of(stretch), left))
-                stretch.advance(chunk, pause, None if self._log is None else self._consume)
+                self._go(stretch, chunk, pause)
                 now = perf_counter()
                 taken = self._steps_of(stretch) - taken
                 left -= taken
@@ -213,6 +223,22 @@ class Simulation:
         elif stretch.status not in (Status.PAUSED, Status.DONE):
             assert integration is not None
             self._fail(integration_failure(self.compiled, integration, stretch.p))
+
+    def _go(self, stretch: Stretch, steps: int, pause: float) -> None:
+        """Take some steps; where Python functions are due on the way, they are called."""
+        consume, integration = None if self._log is None else self._consume, stretch.integration
+        if self._calls is None or integration is None:
+            stretch.advance(steps, pause, consume)
+            return
+        left = steps + self._steps_of(stretch)
+        while True:
+            try:
+                self._calls.make(integration, stretch.p)
+            except SimulationError as failure:
+                self._fail(failure)
+            stretch.advance(max(0, left - self._steps_of(stretch)), pause, consume)
+            if stretch.status is not Status.PAUSED or not self._calls.waits(integration):
+                return
 
     @staticmethod
     def _steps_of(stretch: Stretch) -> int:
@@ -493,7 +519,9 @@ class Simulation:
                 wall_time=self._spent,
                 real_time_factor=reached / self._spent,
                 complete=failure is None and self.finished and not self._stopped,
-                message=self._message,
+                calls=0 if self._calls is None else self._calls.count,
+                call_time=0.0 if self._calls is None else self._calls.seconds,
+                message=self._told(),
             ),
             final_state=None if failure is not None else self.state(),
             log=None if self._log is None else LoggedFile(path=self._log.path, rows=self._log.rows),
@@ -504,6 +532,11 @@ class Simulation:
             failure.partial = result
             raise failure
         return result
+
+    def _told(self) -> str:
+        """What a person should know, and what calls of Python cost."""
+        costs = "" if self._calls is None else self._calls.told(self._spent)
+        return ". ".join(part for part in (self._message, costs) if part)
 
     def _note(self, hint: str) -> None:
         if hint and hint not in self._message:

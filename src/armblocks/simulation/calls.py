@@ -1,0 +1,139 @@
+"""Python functions that are called at ticks of a run, which halts for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.compiler.native_integrator import Integration
+from armblocks.compiler.system import CompiledSystem
+from armblocks.equations import Shape
+from armblocks.errors import ArmblocksError, SimulationError
+
+Array = NDArray[np.float64]
+SAME_INSTANT = 1.0 + 2.0**-50
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalledFunction:
+    """A block that Python works out at the ticks of a clock.
+
+    ``inputs`` and ``outputs``: place in ``z`` and shape by port; after an update with the tick marked, the
+    places of the inputs hold what reaches them. ``call(t, inputs)`` gives the outputs.
+    """
+
+    block: str
+    clock: int
+    inputs: Mapping[str, tuple[slice, Shape]]
+    outputs: Mapping[str, tuple[slice, Shape]]
+    call: Callable[[float, Mapping[str, Any]], Mapping[str, Any]]
+
+
+class Calls:
+    """The functions of one run, in an order in which none needs a later one at the same tick.
+
+    The native loop halts just before a tick. The tick is worked out aside, to learn what reaches a function;
+    it is called; and the loop, going on, finds what it gave and does the tick. So everything that ticks at
+    that instant sees it, as it would see an equation.
+    """
+
+    def __init__(self, compiled: CompiledSystem, functions: Sequence[CalledFunction]) -> None:
+        self._compiled = compiled
+        self._functions = tuple(functions)
+        self._clocks = sorted({function.clock for function in functions})
+        self._done: dict[int, float] = {}
+        self.count = 0
+        self.seconds = 0.0
+        """What the functions took, without all that is around them."""
+
+    def waits(self, integration: Integration) -> bool:
+        """Whether the run has halted for a tick whose functions have not been called."""
+        return integration.waiting and bool(self._due(integration))
+
+    def make(self, integration: Integration, p: Array) -> None:
+        """Call what is due where the run stands, and let it halt where something is due next.
+
+        Raises ``SimulationError`` where a function fails.
+        """
+        if integration.waiting:
+            self._make_due(integration, p)
+        following = [
+            integration.next_tick(clock) for clock in self._clocks if not self._is_done(integration, clock)
+        ]
+        after = [
+            integration.next_tick(clock) + self._compiled.sizes.clocks[clock][0]
+            for clock in self._clocks
+            if self._is_done(integration, clock)
+        ]
+        integration.halt_at(min(following + after))
+
+    def told(self, wall_time: float) -> str:
+        """What the calls cost, in words."""
+        names = ", ".join(f"'{function.block}'" for function in self._functions)
+        share = 100.0 * self.seconds / wall_time if wall_time > 0.0 else 0.0
+        cost = f"{self.seconds:.3g} s, {share:.0f} % of the run"
+        return f"Python was called {self.count} times for {names}: {cost}"
+
+    def _is_done(self, integration: Integration, clock: int) -> bool:
+        return self._done.get(clock) == integration.next_tick(clock)
+
+    def _due(self, integration: Integration) -> list[int]:
+        now = integration.time * SAME_INSTANT
+        return [
+            clock
+            for clock in self._clocks
+            if integration.next_tick(clock) <= now and not self._is_done(integration, clock)
+        ]
+
+    def _make_due(self, integration: Integration, p: Array) -> None:
+        due = self._due(integration)
+        if not due:
+            return
+        time, now = integration.time, integration.time * SAME_INSTANT
+        clocks = range(len(self._compiled.sizes.clocks))
+        ticking = np.array([float(integration.next_tick(clock) <= now) for clock in clocks])
+        for function in self._functions:
+            if function.clock not in due:
+                continue
+            point = integration.point
+            z = self._compiled.updated(time, point.x, point.z, point.w, p, ticking)
+            inputs = {port: _given(z[places], shape) for port, (places, shape) in function.inputs.items()}
+            for port, value in self._called(function, time, inputs).items():
+                integration.put_discrete(function.outputs[port][0], value)
+        self._done |= {clock: integration.next_tick(clock) for clock in due}
+
+    def _called(
+        self, function: CalledFunction, time: float, inputs: Mapping[str, Any]
+    ) -> Mapping[str, Array]:
+        """What one function gives, flat; raises ``SimulationError`` where it fails."""
+        where = f"block '{function.block}' at t = {time:.9g} s"
+        began = perf_counter()
+        try:
+            given = function.call(time, inputs)
+        except ArmblocksError as error:
+            raise SimulationError(error.what, where=where, allowed=error.allowed, fix=error.fix) from error
+        self.seconds += perf_counter() - began
+        self.count += 1
+        found: dict[str, Array] = {}
+        for port, value in given.items():
+            shape = function.outputs[port][1]
+            array = np.asarray(value, dtype=np.float64)
+            if array.shape != shape or not np.isfinite(array).all():
+                raise SimulationError(
+                    f"'{port}' became {str(value)[:80]}, of shape {array.shape}",
+                    where=where,
+                    allowed=f"finite numbers of shape {shape}",
+                    fix="correct the function, or say the shapes of its results",
+                )
+            found[port] = array.ravel()
+        return found
+
+
+def _given(values: Array, shape: Shape) -> Any:
+    """An input as the function gets it: a number, or an array of its own."""
+    return values.reshape(shape).copy() if shape else float(values[0])
