@@ -103,6 +103,7 @@ export interface Change {
     | KeepTuned
     | LogSignal
     | GroupBlocks
+    | BreakLink
     | SetSettings
     | Describe;
 }
@@ -209,6 +210,13 @@ export interface GroupBlocks {
   kind: "group";
   blocks: string[];
   name: string;
+}
+/**
+ * Make a block that is linked to a library a copy of one's own, which may be changed inside.
+ */
+export interface BreakLink {
+  kind: "break_link";
+  block: string;
 }
 /**
  * Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks.
@@ -365,6 +373,9 @@ export interface Tune {
  */
 export interface TypedValue {
   kind: "typed";
+  document?: string;
+  inside?: string[];
+  block?: string;
   type: string;
   parameter: string;
   text: string;
@@ -740,6 +751,8 @@ export interface Sheet {
     [k: string]: number | string | null;
   };
   logged: string[];
+  linked: string[];
+  link: string;
 }
 /**
  * A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes.
@@ -758,6 +771,11 @@ export interface SheetBlock {
   parameters: {
     [k: string]: unknown;
   };
+  formulas: {
+    [k: string]: string;
+  };
+  mask: ParameterRule[];
+  link: string;
 }
 /**
  * A port on the edge of its block: px from the block's corner, and the direction of its wire.

@@ -32,6 +32,9 @@ export interface OpenDocument {
   blocks: Record<string, SheetBlock>
   wires: Wire[]
   settings: Sheet['settings']
+  /** The library block that the sheet belongs to, by its path; empty for a sheet of one's own. */
+  linked: string[]
+  link: string
   logged: string[]
   findings: Finding[]
   wireKinds: Record<string, WireKind>

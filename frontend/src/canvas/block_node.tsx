@@ -1,5 +1,5 @@
 import { Tooltip } from '@mantine/core'
-import { IconAlertCircleFilled } from '@tabler/icons-react'
+import { IconAlertCircleFilled, IconLink } from '@tabler/icons-react'
 import { Handle, Position, type Node, type NodeProps } from '@xyflow/react'
 import { memo, useState } from 'react'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
@@ -23,6 +23,7 @@ export const BlockNode = memo(function BlockNode({ data: { block, findings }, se
       {block.outputs.map((spot) => (
         <Port key={`o${spot.name}`} spot={spot} output faulty={false} />
       ))}
+      {block.link && <IconLink className="link" size={13} aria-label={`linked to ${block.link}`} />}
       <Name block={block} />
       {findings.length > 0 && (
         <Tooltip

@@ -1,4 +1,5 @@
 import { Anchor, Breadcrumbs, useComputedColorScheme } from '@mantine/core'
+import { IconLink } from '@tabler/icons-react'
 import {
   Background,
   BackgroundVariant,
@@ -13,7 +14,7 @@ import {
 } from '@xyflow/react'
 import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
 import type { Place, SheetBlock } from '../protocol'
-import { change, freeName, look, useStudio } from '../store'
+import { ask, change, freeName, look, useStudio } from '../store'
 import { BlockNode, type BlockNodeType } from './block_node'
 import { openQuickInsert } from '../library/quick_insert'
 import { WireValues } from '../run/wire_values'
@@ -45,11 +46,42 @@ export function Canvas() {
           ))}
         </Breadcrumbs>
       )}
+      {document.linked.length > 0 && <LibraryNote link={document.link} linked={document.linked} />}
       <ReactFlowProvider key={[state.document, ...inside].join('/')}>
         <Sheet />
       </ReactFlowProvider>
     </div>
   )
+}
+
+/** Says that a sheet is a library's, and gives a copy of one's own. */
+function LibraryNote({ link, linked }: { link: string; linked: string[] }) {
+  return (
+    <div className="library-note">
+      <IconLink size={14} aria-hidden />
+      <span>
+        <b>{linked.join(' › ')}</b> is {link.split('/').at(-1)} of a library and cannot be changed here.
+      </span>
+      <Anchor component="button" size="sm" onClick={() => void breakLink(linked)}>
+        Break the link
+      </Anchor>
+    </div>
+  )
+}
+
+/** Make the library block of this path one's own, and look at the sheet anew. */
+async function breakLink(linked: string[]): Promise<void> {
+  const { document } = useStudio.getState()
+  const block = linked.at(-1)
+  if (!document || !block) return
+  await ask({
+    kind: 'change',
+    document: document.state.document,
+    key: crypto.randomUUID(),
+    inside: linked.slice(0, -1),
+    edit: { kind: 'break_link', block },
+  })
+  look(document.inside)
 }
 
 function Sheet() {
@@ -297,10 +329,10 @@ function selectFocused({ target }: React.FocusEvent): void {
   if (name) useStudio.getState().select([name])
 }
 
-/** A double click: into a subsystem, else the parameters of a block. */
+/** A double click: into a subsystem that has no mask, else the parameters of a block. */
 function open(block: SheetBlock): void {
   const { document, edit } = useStudio.getState()
-  if (block.opens && document) look([...document.inside, block.name])
+  if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
   else edit(block.name)
 }
 

@@ -2,7 +2,7 @@ import { Button, Code, Group, Modal, NativeSelect, Stack, Switch, Text, TextInpu
 import { useEffect, useMemo, useState } from 'react'
 import { Refusal } from '../connection'
 import type { ParameterRule, SheetBlock } from '../protocol'
-import { change, line, useStudio } from '../store'
+import { change, line, look, useStudio } from '../store'
 import { valueText } from './value_text'
 
 const CHECK_DELAY_MS = 200
@@ -18,19 +18,20 @@ export function BlockDialog() {
 
 function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) {
   const kind = useStudio((s) => s.library.get(block.type))
+  const rules = useMemo(() => [...(kind?.parameters ?? []), ...block.mask], [block, kind])
   const start = useMemo(
-    () => Object.fromEntries((kind?.parameters ?? []).map((rule) => [rule.name, valueText(block.parameters[rule.name])])),
-    [block, kind],
+    () => Object.fromEntries(rules.map((rule) => [rule.name, block.formulas[rule.name] ?? valueText(valueOf(block, rule))])),
+    [block, rules],
   )
   const [typed, setTyped] = useState<Record<string, string>>(start)
   const [faults, setFaults] = useState<Record<string, string>>({})
   if (!kind) return null
-  const changed = kind.parameters.filter(({ name }) => typed[name] !== start[name])
+  const changed = rules.filter(({ name }) => typed[name] !== start[name])
   const wrong = Object.values(faults).some(Boolean)
   const apply = async () => {
     if (wrong) return false
     if (!changed.length) return true
-    const values = Object.fromEntries(changed.map((rule) => [rule.name, sent(rule, typed[rule.name] ?? '')]))
+    const values = Object.fromEntries(changed.map((rule) => [rule.name, sent(rule, typed[rule.name] ?? '', rule.name in block.formulas)]))
     return (await change({ kind: 'parameters', block: block.name, values })) !== undefined
   }
   const [summary, ...rest] = kind.documentation.split('\n\n')
@@ -66,19 +67,31 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
               ))}
             </details>
           )}
-          {kind.parameters.map((rule, index) => (
+          {rules.map((rule, index) => (
             <Field
               key={rule.name}
               rule={rule}
-              type={block.type}
+              block={block}
               text={typed[rule.name] ?? ''}
               focus={index === 0}
               onText={(text) => setTyped((now) => ({ ...now, [rule.name]: text }))}
               onFault={(fault) => setFaults((now) => (now[rule.name] === fault ? now : { ...now, [rule.name]: fault }))}
             />
           ))}
-          {kind.parameters.length === 0 && <Text size="sm">This block has no parameters.</Text>}
+          {rules.length === 0 && <Text size="sm">This block has no parameters.</Text>}
           <Group justify="flex-end" gap="xs">
+            {block.opens && (
+              <Button
+                variant="subtle"
+                mr="auto"
+                onClick={() => {
+                  onClose()
+                  look([...(useStudio.getState().document?.inside ?? []), block.name])
+                }}
+              >
+                Look under the mask
+              </Button>
+            )}
             <Button variant="default" onClick={onClose}>
               Cancel
             </Button>
@@ -97,17 +110,17 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
 
 interface FieldProps {
   rule: ParameterRule
-  type: string
+  block: SheetBlock
   text: string
   focus: boolean
   onText: (text: string) => void
   onFault: (fault: string) => void
 }
 
-function Field({ rule, type, text, focus, onText, onFault }: FieldProps) {
+function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
   const robots = useStudio((s) => s.welcome?.robots)
   const files = useStudio((s) => s.welcome?.files)
-  const { fault, value } = useCheck(rule, type, text, onFault)
+  const { fault, value } = useCheck(rule, block, text, onFault)
   const label = (
     <>
       {rule.name}
@@ -115,11 +128,12 @@ function Field({ rule, type, text, focus, onText, onFault }: FieldProps) {
     </>
   )
   const common = { label, description: rule.doc, size: 'sm' as const, 'data-autofocus': focus || undefined }
-  if (rule.kind === 'boolean')
+  const formula = rule.name in block.formulas
+  if (rule.kind === 'boolean' && !formula)
     return <Switch label={label} description={rule.doc} checked={text === 'true'} onChange={(event) => onText(String(event.currentTarget.checked))} />
-  if (rule.kind === 'choice')
+  if (rule.kind === 'choice' && !formula)
     return <NativeSelect {...common} data={rule.choices} value={text} onChange={(event) => onText(event.currentTarget.value)} />
-  if (rule.kind === 'robot') {
+  if (rule.kind === 'robot' && !formula) {
     const known = [...(robots ?? []), ...(files ?? [])]
     return <NativeSelect {...common} data={known.includes(text) ? known : [text, ...known]} value={text} onChange={(event) => onText(event.currentTarget.value)} />
   }
@@ -138,10 +152,10 @@ function Field({ rule, type, text, focus, onText, onFault }: FieldProps) {
 }
 
 /** What the server says of a text while it is typed: its value, or what is wrong with it. */
-function useCheck(rule: ParameterRule, type: string, text: string, onFault: (fault: string) => void) {
+function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault: (fault: string) => void) {
   const [state, setState] = useState({ fault: '', value: '' })
   useEffect(() => {
-    if (['boolean', 'choice', 'robot', 'table', 'function'].includes(rule.kind)) return
+    if (['boolean', 'choice', 'robot', 'table', 'function'].includes(rule.kind) && !(rule.name in block.formulas)) return
     let current = true
     const report = (fault: string, value: string) => {
       if (!current) return
@@ -149,7 +163,9 @@ function useCheck(rule: ParameterRule, type: string, text: string, onFault: (fau
       onFault(fault)
     }
     const timer = setTimeout(() => {
-      line.ask({ kind: 'typed', type, parameter: rule.name, text }).then(
+      const { document } = useStudio.getState()
+      const where = { document: document?.state.document, inside: document?.inside, block: block.name }
+      line.ask({ kind: 'typed', ...where, type: block.type, parameter: rule.name, text }).then(
         (value) => report('', valueText(value)),
         (error: unknown) => error instanceof Refusal && report(`${error.what}. Allowed: ${error.allowed}`, ''),
       )
@@ -163,6 +179,11 @@ function useCheck(rule: ParameterRule, type: string, text: string, onFault: (fau
   return state
 }
 
-function sent(rule: ParameterRule, text: string): unknown {
-  return rule.kind === 'boolean' ? text === 'true' : text
+function sent(rule: ParameterRule, text: string, formula: boolean): unknown {
+  return rule.kind === 'boolean' && !formula ? text === 'true' : text
+}
+
+/** What a parameter is: one of the block's own, or of its mask. */
+function valueOf(block: SheetBlock, rule: ParameterRule): unknown {
+  return block.mask.includes(rule) ? rule.default : block.parameters[rule.name]
 }

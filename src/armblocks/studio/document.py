@@ -13,7 +13,7 @@ from armblocks.studio import messages as say
 from armblocks.studio.aspects import Aspect, changed_aspects, clash
 from armblocks.studio.edits import Edit, applied, summary
 from armblocks.studio.history import History
-from armblocks.studio.nesting import inside, with_inside
+from armblocks.studio.nesting import check_own, inside, with_inside
 from armblocks.studio.parameter_values import ResolveRobot
 from armblocks.studio.sheet import arranged
 
@@ -70,7 +70,7 @@ class Document(History[Diagram]):
         """Carry out an edit in the diagram inside the subsystem of this path.
 
         Raises what :func:`~armblocks.studio.edits.applied` and :func:`~armblocks.studio.nesting.inside`
-        raise; nothing is then changed.
+        raise, and ``DiagramError`` for a sheet of a library; nothing is then changed.
         """
         self.perform(say.Change(document="", inside=list(path), edit=edit))
 
@@ -85,6 +85,7 @@ class Document(History[Diagram]):
 
     def _outcome(self, request: say.Change | say.ArrangeBlocks) -> tuple[str, Diagram]:
         """What the step is called, and the diagram after it."""
+        check_own(self.diagram, request.inside)
         sheet = inside(self.diagram, request.inside)
         if isinstance(request, say.Change):
             title, after = summary(request.edit), applied(request.edit, sheet, self._resolve_robot)

@@ -26,9 +26,11 @@ from armblocks.diagram import (
     PortRef,
     with_parameters,
 )
+from armblocks.diagram.diagram import block_in_scope
+from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.errors import DiagramError, UnknownNameError
-from armblocks.studio.nesting import grouped, with_block
+from armblocks.studio.nesting import grouped, unlinked, with_block
 from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
 from armblocks.studio.typed_settings import with_settings
 
@@ -140,6 +142,13 @@ class GroupBlocks(Message):
     name: str
 
 
+class BreakLink(Message):
+    """Make a block that is linked to a library a copy of one's own, which may be changed inside."""
+
+    kind: Literal["break_link"] = "break_link"
+    block: str
+
+
 class SetSettings(Message):
     """Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks."""
 
@@ -164,6 +173,7 @@ Edit = Annotated[
     | KeepTuned
     | LogSignal
     | GroupBlocks
+    | BreakLink
     | SetSettings
     | Describe,
     Field(discriminator="kind"),
@@ -197,6 +207,8 @@ def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagra
             return _log(edit, diagram)
         case GroupBlocks():
             return grouped(edit.blocks, edit.name, diagram)
+        case BreakLink():
+            return unlinked(diagram, _known(edit.block, diagram))
         case SetSettings():
             return _set_settings(edit, diagram)
         case Describe():
@@ -224,6 +236,8 @@ def summary(edit: Edit) -> str:
             return f"{'log' if edit.logged else 'stop logging'} {edit.port}"
         case GroupBlocks():
             return f"group {_counted(len(edit.blocks), 'block')}"
+        case BreakLink():
+            return f"break the link of {edit.block}"
         case SetSettings():
             return "change the settings"
         case Describe():
@@ -252,7 +266,7 @@ def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diag
     for new in edit.blocks:
         _check_free(new.name, taken, where)
         taken[folded(new.name)] = new.name
-        blocks[new.name] = _made(new, resolve_robot)
+        blocks[new.name] = _made(new, diagram.mask_values, resolve_robot)
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
     return _connect(edit.wires, added, replace=False)
@@ -270,14 +284,14 @@ def _check_free(name: str, taken: Mapping[str, str], where: str) -> None:
         )
 
 
-def _made(new: NewBlock, resolve_robot: ResolveRobot) -> Block:
+def _made(new: NewBlock, scope: Scope, resolve_robot: ResolveRobot) -> Block:
     kind = BLOCKS[new.type]
     rules = {rule.name: rule for rule in kind.parameters()}
     values: dict[str, Any] = {}
     for name, value in new.parameters.items():
         if name not in rules:
             raise UnknownNameError(f"parameter of {new.type}", name, rules, where=f"block '{new.name}'")
-        values[name] = parameter_value(rules[name], value, f"block '{new.name}'", resolve_robot)
+        values[name] = parameter_value(rules[name], value, f"block '{new.name}'", resolve_robot, scope)
     for name, rule in rules.items():
         if rule.required and name not in values:
             default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
@@ -386,14 +400,15 @@ def _rename(edit: Rename, diagram: Diagram) -> Diagram:
 
 def _set_parameters(edit: SetParameters, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
     old = diagram.blocks[_known(edit.block, diagram)]
-    rules = {rule.name: rule for rule in old.parameters()}
+    rules = {rule.name: rule for rule in old.own_parameters()}
     where = f"block '{edit.block}' ({old.title})"
     values: dict[str, Any] = {}
     for name, value in edit.values.items():
         if name not in rules:
             raise UnknownNameError("parameter", name, rules, where=where)
-        values[name] = parameter_value(rules[name], value, where, resolve_robot)
-    return with_block(diagram, edit.block, dataclasses.replace(old, **values))
+        values[name] = parameter_value(rules[name], value, where, resolve_robot, diagram.mask_values)
+    changed = block_in_scope(edit.block, old.with_parameters(**values), diagram.mask_values)
+    return with_block(diagram, edit.block, changed)
 
 
 def _set_settings(edit: SetSettings, diagram: Diagram) -> Diagram:

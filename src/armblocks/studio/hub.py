@@ -16,13 +16,15 @@ from starlette.websockets import WebSocketDisconnect
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram
+from armblocks.diagram import Diagram, ParameterFormula
+from armblocks.diagram.mask import formula_value
+from armblocks.diagram.parameter import Value
 from armblocks.errors import ArmblocksError, InertiaWarning, InputError, UnknownNameError
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
 from armblocks.studio.document_journal import Performed
-from armblocks.studio.nesting import inside, with_robot
+from armblocks.studio.nesting import inside, linked_part, with_robot
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.parameter_values import parameter_json, parameter_value
 from armblocks.studio.project_folder import ProjectFolder
@@ -169,7 +171,11 @@ class Hub:
                 raise
             path, shown = (), found.document.diagram  # what the page looked at before is gone
         page.shows[found.key] = path
-        await page.tell(say.Opened(state=found.state(), inside=list(path), sheet=sheet(shown)))
+        drawn, linked = sheet(shown), linked_part(found.document.diagram, path)
+        if linked:
+            link = inside(found.document.diagram, linked).link
+            drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
+        await page.tell(say.Opened(state=found.state(), inside=list(path), sheet=drawn))
         await self._tell_documents()
         self._check_later(found)
         return found.key
@@ -284,10 +290,17 @@ class Hub:
             self._check_later(found)
 
     def _typed(self, request: say.TypedValue) -> Any:
-        rules = {rule.name: rule for rule in BLOCKS[request.type].parameters()}
+        known, scope = BLOCKS[request.type].parameters(), dict[str, Value]()
+        if request.document:
+            level = inside(self.documents[request.document].document.diagram, request.inside)
+            known, scope = level.block(request.block).own_parameters(), dict(level.mask_values)
+        rules = {rule.name: rule for rule in known}
         if request.parameter not in rules:
             raise UnknownNameError(f"parameter of {request.type}", request.parameter, rules)
-        value = parameter_value(rules[request.parameter], request.text, request.type, self.resolve_robot)
+        rule = rules[request.parameter]
+        value = parameter_value(rule, request.text, request.type, self.resolve_robot, scope)
+        if isinstance(value, ParameterFormula):
+            value = formula_value(rule, value.text, scope, request.type)
         return parameter_json(value)
 
     # -- the background check --------------------------------------------------------------------------------

@@ -30,6 +30,19 @@ class PortSpot(Message):
     dy: int
 
 
+class ParameterRule(Message):
+    """One parameter of a type of block, as its dialog needs it."""
+
+    name: str
+    kind: str
+    doc: str
+    unit: str
+    default: Any
+    tunable: bool
+    choices: list[str]
+    allowed: str
+
+
 class SheetBlock(Message):
     """A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes."""
 
@@ -46,6 +59,12 @@ class SheetBlock(Message):
     """Whether there is a sheet inside."""
     parameters: dict[str, Any]
     """Values in the form of :func:`~armblocks.studio.parameter_values.parameter_json`."""
+    formulas: dict[str, str]
+    """The texts of those that are formulas."""
+    mask: list[ParameterRule]
+    """The parameters that the diagram inside declares; ``default`` is what they are here."""
+    link: str
+    """The entry of a library that the block is, ``file#name``; ``""`` for one of its own."""
 
 
 class Sheet(Message):
@@ -58,6 +77,10 @@ class Sheet(Message):
     settings: dict[str, float | str | None]
     logged: list[str]
     """Outputs, ``block/port``, that are seen without a Scope."""
+    linked: list[str]
+    """The way to the library block that the sheet belongs to, so that it cannot be changed."""
+    link: str
+    """The entry of the library that this block is."""
 
 
 class SheetChange(Message):
@@ -87,19 +110,6 @@ class WireKind(Message):
 
     shape: list[int]
     unit: str
-
-
-class ParameterRule(Message):
-    """One parameter of a type of block, as its dialog needs it."""
-
-    name: str
-    kind: str
-    doc: str
-    unit: str
-    default: Any
-    tunable: bool
-    choices: list[str]
-    allowed: str
 
 
 class BlockType(Message):
@@ -388,6 +398,10 @@ class TypedValue(Message):
     """Ask what a text typed into a parameter's field means: its value, or what is wrong with it."""
 
     kind: Literal["typed"] = "typed"
+    document: str = ""
+    inside: list[str] = Field(default_factory=list[str])
+    block: str = ""
+    """The block, where it is on a sheet: formulas may name parameters of the sheet's mask."""
     type: str
     parameter: str
     text: str

@@ -7,7 +7,17 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
-from armblocks.diagram import Block, Connection, Diagram, Inport, Outport, Placement, PortRef, Subsystem
+from armblocks.diagram import (
+    Block,
+    Connection,
+    Diagram,
+    DiagramBlock,
+    Inport,
+    Outport,
+    Placement,
+    PortRef,
+    Subsystem,
+)
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
 from armblocks.robot import Robot
@@ -23,11 +33,46 @@ def inside(diagram: Diagram, path: Sequence[str]) -> Diagram:
     """
     for name in path:
         block = diagram.blocks.get(name)
-        if not isinstance(block, Subsystem):
-            known = [key for key, other in diagram.blocks.items() if isinstance(other, Subsystem)]
+        if not isinstance(block, DiagramBlock):
+            known = [key for key, other in diagram.blocks.items() if isinstance(other, DiagramBlock)]
             raise UnknownNameError("subsystem", name, known, where=f"diagram '{diagram.name}'")
         diagram = block.diagram
     return diagram
+
+
+def linked_part(diagram: Diagram, path: Sequence[str]) -> tuple[str, ...]:
+    """The path of the library block that the sheet of a path belongs to; empty for a sheet of one's own."""
+    depths = range(1, len(path) + 1)
+    return next((tuple(path[:depth]) for depth in depths if inside(diagram, path[:depth]).link), ())
+
+
+def check_own(diagram: Diagram, path: Sequence[str]) -> None:
+    """Raise ``DiagramError`` for a sheet that belongs to a library: its link has to be broken first."""
+    linked = linked_part(diagram, path)
+    if linked:
+        raise DiagramError(
+            f"the sheet belongs to the library block '{inside(diagram, linked).link}'",
+            where=f"block '{'/'.join(linked)}'",
+            allowed="changes of its parameters, from outside",
+            fix="break the link first",
+        )
+
+
+def unlinked(diagram: Diagram, name: str) -> Diagram:
+    """The diagram with a copy of its own in the place of a library block.
+
+    Raises ``DiagramError`` for a block that is none.
+    """
+    block = diagram.block(name)
+    if not isinstance(block, DiagramBlock) or not block.diagram.link:
+        raise DiagramError(
+            "the block is not linked to a library",
+            where=f"block '{name}' ({block.title})",
+            allowed="blocks with a link",
+            fix="choose another block",
+        )
+    own = dataclasses.replace(block.diagram, link="")
+    return with_block(diagram, name, dataclasses.replace(block, diagram=own))
 
 
 def with_inside(diagram: Diagram, path: Sequence[str], inner: Diagram) -> Diagram:
@@ -35,7 +80,7 @@ def with_inside(diagram: Diagram, path: Sequence[str], inner: Diagram) -> Diagra
     if not path:
         return inner
     block = diagram.blocks[path[0]]
-    assert isinstance(block, Subsystem)
+    assert isinstance(block, DiagramBlock)
     changed = dataclasses.replace(block, diagram=with_inside(block.diagram, path[1:], inner))
     return with_block(diagram, path[0], changed)
 

@@ -119,7 +119,13 @@ class OpenDocuments:
                 return found
         data, on_disk = self.folder.read_known(path)
         diagram = formats.diagram_from_bytes(
-            data, place.name, BLOCKS, self._resolve_robot, folder=place.parent, draft=True
+            data,
+            place.name,
+            BLOCKS,
+            self._resolve_robot,
+            folder=place.parent,
+            draft=True,
+            read_library=self.folder.read_library,
         )
         self.kept.use(path)
         return self._add(self._document(diagram), path=path, on_disk=on_disk, key=key)
@@ -134,7 +140,13 @@ class OpenDocuments:
     def open_bytes(self, data: bytes, name: str) -> OpenDocument:
         """A new document that begins as the content of a file from elsewhere."""
         diagram = formats.diagram_from_bytes(
-            data, name, BLOCKS, self._resolve_robot, folder=self.folder.root, draft=True
+            data,
+            name,
+            BLOCKS,
+            self._resolve_robot,
+            folder=self.folder.root,
+            draft=True,
+            read_library=self.folder.read_library,
         )
         return self._add(self._document(diagram))
 
@@ -241,7 +253,13 @@ class OpenDocuments:
         data, on_disk = self.folder.read_known(found.path)
         place = self.folder.path(found.path)
         read = formats.diagram_from_bytes(
-            data, place.name, BLOCKS, self._resolve_robot, folder=place.parent, draft=True
+            data,
+            place.name,
+            BLOCKS,
+            self._resolve_robot,
+            folder=place.parent,
+            draft=True,
+            read_library=self.folder.read_library,
         )
         self.replace(found, "reload", placed(read))
         document = found.document

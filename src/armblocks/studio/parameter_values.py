@@ -7,12 +7,14 @@ read by the interpreter of MATLAB scripts, which knows plain values only: nothin
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
 
-from armblocks.diagram import Parameter, ParameterKind, TimeTable, UserFunction
+from armblocks.diagram import Parameter, ParameterFormula, ParameterKind, TimeTable, UserFunction
+from armblocks.diagram.mask import Scope, formula_value
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import read_script
 from armblocks.robot import Robot
@@ -22,20 +24,29 @@ ResolveRobot = Callable[[str], Robot]
 
 LONGEST_TEXT = 100_000
 """Characters of one field."""
+_NAME = re.compile(r"[A-Za-z_]\w*")
 _NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
 _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 
 
-def parameter_value(rule: Parameter, typed: Any, where: str, resolve_robot: ResolveRobot) -> Any:
+def parameter_value(
+    rule: Parameter, typed: Any, where: str, resolve_robot: ResolveRobot, scope: Scope | None = None
+) -> Any:
     """The checked value of a parameter from what the page sends; ``None`` is the default.
 
-    Raises ``InputError`` with the place ``where`` (a block) and the parameter's name.
+    A text that names parameters of the diagram's mask, ``scope``, is a formula and stays one. Raises
+    ``InputError`` with the place ``where`` (a block) and the parameter's name.
     """
     place = f"{where}, parameter '{rule.name}'"
     if typed is None and not rule.required:
         return rule.default
     if rule.kind is ParameterKind.ROBOT:
         return _robot(rule, typed, place, resolve_robot)
+    if isinstance(typed, str) and scope and set(_NAME.findall(typed)) & set(scope):
+        bare = typed.strip() in scope
+        if bare or rule.kind in (*_NUMERIC, ParameterKind.INTEGER):
+            formula_value(rule, typed, scope, where)
+            return ParameterFormula(typed.strip())
     if rule.kind in _NUMERIC or rule.kind is ParameterKind.INTEGER:
         typed = number_value(typed, place) if isinstance(typed, str) else _with_infinities(typed)
         if rule.kind is ParameterKind.INTEGER and isinstance(typed, float) and typed.is_integer():
@@ -73,7 +84,9 @@ def tuned_value(typed: Any, where: str) -> Any:
 
 
 def parameter_json(value: Any) -> Any:
-    """A checked value as the page gets it: infinities as text, robots, tables and functions by name."""
+    """A checked value as the page gets it: infinities and formulas as text, robots and such by name."""
+    if isinstance(value, ParameterFormula):
+        return value.text
     if isinstance(value, Robot):
         return {"robot": value.name, "source": value.source}
     if isinstance(value, TimeTable):

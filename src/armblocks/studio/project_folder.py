@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import read_bounded, write_atomically
+from armblocks.formats.robot_files import shipped_folder
 
 READABLE = (".json", ".m")
 """Suffixes of files that can be opened: diagrams, robots and scripts."""
@@ -99,6 +100,16 @@ class ProjectFolder:
         status = path.stat() if path.is_file() else None
         data = read_bounded(path, MOST_BYTES)
         return data, Fingerprint.of(status or path.stat(), data)
+
+    def read_library(self, path: Path) -> bytes:
+        """The library that a diagram is linked to, by its resolved path: a shipped one, or of the project."""
+        if path.parent != shipped_folder("libraries").resolve() and not path.is_relative_to(self.root):
+            raise FormatError(
+                f"the library '{path.name}' lies outside of the project folder",
+                allowed="shipped libraries, and files of the project folder",
+                fix="copy the library into the project",
+            )
+        return read_bounded(path, MOST_BYTES)
 
     def write(self, relative: str, data: bytes) -> Fingerprint:
         """Replace a file, all or nothing; folders on the way are made."""

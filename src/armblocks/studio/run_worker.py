@@ -31,6 +31,7 @@ from armblocks.simulation import SimulationResult
 from armblocks.studio import messages as say
 from armblocks.studio.frames import sample_frame
 from armblocks.studio.parameter_values import tuned_value
+from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.run_history import RunHistory
 from armblocks.studio.tunables import tunables
 
@@ -91,7 +92,12 @@ class _Run:
 
     def _go(self) -> None:
         diagram = formats.diagram_from_bytes(
-            self.source.encode(), "model", BLOCKS, formats.load_robot, folder=self.folder
+            self.source.encode(),
+            "model",
+            BLOCKS,
+            formats.load_robot,
+            folder=self.folder,
+            read_library=ProjectFolder(self.folder).read_library,
         )
         history = RunHistory(CompiledDiagram(diagram))
         for path, value in self.tuned.items():

@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Block, Connection, Diagram, ParameterKind, Placement, Subsystem
+from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
 from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
@@ -24,7 +24,7 @@ from armblocks.studio.parameter_values import parameter_json
 def placed(diagram: Diagram) -> Diagram:
     """The diagram with a place for every block: its own where all have one, else laid out; subsystems too."""
     for name, block in diagram.blocks.items():
-        if isinstance(block, Subsystem) and (inner := placed(block.diagram)) is not block.diagram:
+        if isinstance(block, DiagramBlock) and (inner := placed(block.diagram)) is not block.diagram:
             changed = dataclasses.replace(block, diagram=inner)
             diagram = dataclasses.replace(diagram, blocks={**diagram.blocks, name: changed})
     return diagram if set(diagram.blocks) <= set(diagram.layout) else arranged(diagram)
@@ -40,6 +40,8 @@ def arranged(diagram: Diagram) -> Diagram:
 def sheet(diagram: Diagram) -> Sheet:
     """The whole drawing of a diagram whose blocks all have a place."""
     return Sheet(
+        linked=[],
+        link="",
         name=diagram.name,
         description=diagram.description,
         blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
@@ -87,19 +89,21 @@ def _block_type(kind: type[Block]) -> BlockType:
         height=box.height,
         face=_face(box),
         parameters=[
-            ParameterRule(
-                name=rule.name,
-                kind=rule.kind.value,
-                doc=rule.doc,
-                unit=rule.unit,
-                default=parameter_json(block.parameter_value(rule.name)),
-                tunable=rule.tunable,
-                choices=list(rule.choices),
-                allowed=rule.describe(),
-            )
-            for rule in kind.parameters()
-            if rule.kind is not ParameterKind.DIAGRAM
+            _rule(rule, block) for rule in kind.parameters() if rule.kind is not ParameterKind.DIAGRAM
         ],
+    )
+
+
+def _rule(rule: Parameter, block: Block) -> ParameterRule:
+    return ParameterRule(
+        name=rule.name,
+        kind=rule.kind.value,
+        doc=rule.doc,
+        unit=rule.unit,
+        default=parameter_json(block.parameter_value(rule.name)),
+        tunable=rule.tunable,
+        choices=list(rule.choices),
+        allowed=rule.describe(),
     )
 
 
@@ -138,7 +142,10 @@ def _drawn(block: Block, width: float | None, height: float | None, flipped: boo
         face=_face(box),
         inputs=_spots(box, into, inputs=True),
         outputs=_spots(box, out, inputs=False),
-        opens=isinstance(block, Subsystem),
+        opens=isinstance(block, DiagramBlock),
+        formulas=dict(block.formulas),
+        mask=[_rule(rule, block) for rule in block.diagram.mask] if isinstance(block, DiagramBlock) else [],
+        link=block.diagram.link if isinstance(block, DiagramBlock) else "",
         parameters=_parameters(block),
     )
 

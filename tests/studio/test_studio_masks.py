@@ -1,0 +1,99 @@
+"""Masks and libraries in the studio: what a page is shown, what it may change, what stays a formula."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_studio_hub import Told, talk
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import DiagramBlock
+from armblocks.errors import ArmblocksError, DiagramError, FormatError, InputError
+from armblocks.formats import load_diagram, load_robot
+from armblocks.studio.document import Document
+from armblocks.studio.edits import BreakLink, SetParameters
+from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.sheet import placed, sheet
+
+
+@pytest.fixture
+def document() -> Document:
+    return Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
+
+
+def test_a_page_sees_mask_formulas_and_link(document: Document) -> None:
+    block = sheet(document.diagram).blocks["servo 2"]
+    assert block.link == "joint_servos#JointServo"
+    assert block.formulas == {"w": "w"}
+    assert [rule.name for rule in block.mask] == ["w", "G", "Jm", "B", "limit", "q0"]
+    assert block.mask[0].default == 20.0
+    assert block.mask[0].unit == "rad/s"
+    assert block.opens
+    assert not sheet(document.diagram).linked
+
+
+def test_values_that_name_the_mask_stay_formulas(document: Document) -> None:
+    document.edit(SetParameters(block="servo 1", values={"w": "2 * w", "G": "-60"}))
+    block = document.diagram.blocks["servo 1"]
+    assert dict(block.formulas) == {"w": "2 * w"}
+    assert block.parameter_value("w") == 40.0
+    assert block.parameter_value("G") == -60.0
+    document.edit(SetParameters(block="servo 1", values={"w": "15"}))
+    assert document.diagram.blocks["servo 1"].formulas == ()
+    with pytest.raises(ArmblocksError, match=r"named 'ww'"):
+        document.edit(SetParameters(block="servo 1", values={"w": "w*ww"}))
+    with pytest.raises(InputError, match=r"block 'servo 1'.*parameter 'w': the value is -20.0"):
+        document.edit(SetParameters(block="servo 1", values={"w": "-w"}))
+    document.undo()
+    assert dict(document.diagram.blocks["servo 1"].formulas) == {"w": "2 * w"}
+
+
+def test_a_library_is_read_only_until_the_link_is_broken(document: Document) -> None:
+    inner = SetParameters(block="rotor", values={"gain": "2"})
+    with pytest.raises(
+        DiagramError, match=r"belongs to the library block 'joint_servos#JointServo'.*break the"
+    ):
+        document.edit(inner, ["servo 1"])
+    document.edit(BreakLink(block="servo 1"))
+    assert document.undo_title == "break the link of servo 1"
+    document.edit(inner, ["servo 1"])
+    block, other = document.diagram.blocks["servo 1"], document.diagram.blocks["servo 2"]
+    assert isinstance(block, DiagramBlock)
+    assert isinstance(other, DiagramBlock)
+    assert block.diagram.blocks["rotor"].parameter_value("gain") == 2.0
+    assert other.diagram.blocks["rotor"].parameter_value("gain") == 5000.0
+    with pytest.raises(DiagramError, match="the block is not linked to a library"):
+        document.edit(BreakLink(block="motion"))
+
+
+def test_pages_look_inside_and_try_formulas(tmp_path: Path) -> None:
+    async def talking(hub: Any, ask: Any, told: Told) -> None:
+        key = await ask("open", example="puma560_servos")
+        where = {"document": key, "inside": [], "block": "servo 1", "type": "Subsystem"}
+        assert await ask("typed", **where, parameter="w", text="w/2 + 1") == 11.0
+        await ask("look", document=key, inside=["servo 1"])
+        opened = [event for event in told if event["kind"] == "opened"][-1]
+        assert opened["sheet"]["linked"] == ["servo 1"]
+        assert opened["sheet"]["link"] == "joint_servos#JointServo"
+        with pytest.raises(InputError, match="belongs to the library block"):
+            await ask("arrange", document=key, inside=["servo 1"])
+        await ask("save", document=key, path="mine.json")
+        assert '"library": "joint_servos#JointServo"' in (tmp_path / "mine.json").read_text()
+        again = await ask("open", path="mine.json")
+        assert again == key
+
+    talk(tmp_path, talking)
+
+
+def test_libraries_outside_of_the_project_are_not_read(tmp_path: Path) -> None:
+    (tmp_path / "project").mkdir()
+    servo = ab.load_library("joint_servos")["JointServo"]
+    ab.save_library({"Servo": servo}, tmp_path / "outside.json")
+    folder = ProjectFolder(tmp_path / "project")
+    with pytest.raises(FormatError, match=r"the library 'outside.json' lies outside of the project folder"):
+        folder.read_library((tmp_path / "outside.json").resolve())
+    ab.save_library({"Servo": servo}, tmp_path / "project" / "own.json")
+    assert folder.read_library(folder.root / "own.json")
