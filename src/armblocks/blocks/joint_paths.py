@@ -29,7 +29,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.errors import InputError
-from armblocks.spatial.orientation import from_quaternion, to_angle_axis
+from armblocks.spatial.orientation import from_quaternion, part_of_turn, to_quaternion
 from armblocks.trajectories import Quintic
 
 
@@ -212,9 +212,8 @@ class CTraj(Block):
         else:
             s = Quintic(q0=SX(0.0), qf=SX(1.0), tmax=p["tmax"]).at(t).q
         T0, T1 = u["T0"], u["T1"]
-        angle, axis = to_angle_axis(mtimes(T0[:3, :3].T, T1[:3, :3]))
-        half = s * angle / 2.0
-        R = mtimes(T0[:3, :3], from_quaternion(vertcat(cos(half), sin(half) * axis)))
+        whole = to_quaternion(mtimes(T0[:3, :3].T, T1[:3, :3]))
+        R = mtimes(T0[:3, :3], from_quaternion(part_of_turn(whole, s)))
         return {"T": pose(R, T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3])), "s": s}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:

@@ -124,6 +124,19 @@ def to_angle_axis(R: SX) -> tuple[SX, SX]:
     return 2.0 * atan2(length, quaternion[0]), axis
 
 
+def part_of_turn(quaternion: SX, s: SX) -> SX:
+    """The quaternion (4, 1) of ``s`` times the turn of a unit quaternion, about the same axis.
+
+    Smooth also where there is no turn and so no axis: its vector grows by ``s`` there.
+    """
+    vector = quaternion[1:]
+    square = dot(vector, vector)
+    none = square < 1e-16
+    length = sqrt(if_else(none, 1.0, square))
+    half = s * atan2(length, quaternion[0])
+    return vertcat(if_else(none, 1.0, cos(half)), if_else(none, s, sin(half) / length) * vector)
+
+
 def quaternion_product(left: SX, right: SX) -> SX:
     """Hamilton's product (4, 1): R(left right) = R(left) R(right)."""
     a, b, c, d = (left[k] for k in range(4))
