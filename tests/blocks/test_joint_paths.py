@@ -7,7 +7,8 @@ import pytest
 from block_evaluation import evaluate
 from scipy.spatial.transform import Rotation, Slerp
 
-from armblocks.blocks import CirclePath, CTraj, JTraj, MultiSegment, Trapezoidal
+import armblocks as ab
+from armblocks.blocks import CirclePath, Constant, CTraj, JTraj, MultiSegment, Trapezoidal
 from armblocks.diagram import Block
 from armblocks.errors import InputError
 
@@ -99,3 +100,21 @@ def test_what_does_not_fit_is_said() -> None:
         CirclePath(centre=[0, 0])
     with pytest.raises(InputError, match=r"'q0' has shape \(2,\) and 'qf' has shape \(3,\)"):
         Trapezoidal(q0=[0, 0], qf=[1, 2, 3])
+
+
+def test_a_straight_path_of_one_orientation_has_a_slope() -> None:
+    """Where nothing turns, T0 + s (T1 - T0); half of a small turn is s of it, about any axis."""
+    start, end = np.eye(4), np.eye(4)
+    end[:3, 3] = (0.5, 0.2, 0.1)
+    builder = ab.DiagramBuilder("straight")
+    poses = [builder.add(name, Constant(value=value)) for name, value in (("T0", start), ("T1", end))]
+    builder.add("path", CTraj(tmax=2.0), *poses)
+    for time, s in ((0.0, 0.0), (1.0, 0.5), (2.0, 1.0)):
+        system = ab.linearize(builder.build(), "T1", "path/T", at=time)
+        gain = system.D.reshape(4, 4, 4, 4)
+        for row in range(3):
+            np.testing.assert_allclose(gain[row, 3, row, 3], s, atol=1e-12)
+        # a turn dR = skew(a) of the end turns the path by s a
+        turn = np.zeros((4, 4))
+        turn[0, 1], turn[1, 0] = -1.0, 1.0
+        np.testing.assert_allclose(np.einsum("ijkl,kl->ij", gain, turn), s * turn, atol=1e-12)

@@ -1,8 +1,10 @@
 """The equations of a block inside a conditional subsystem: the block's own, gated by what controls it.
 
 While the control is off, continuous states stand still and sampled ones keep their values. At a restart all
-states take their start values. A triggered block works when the trigger fires, as a sampled one does at a
-tick. The block is asked for its equations as always; only what becomes of them is changed here.
+states take their start values. When the control goes on, modes settle by the values of that instant, as they
+do at the start of a run, and guards are looked at from then on. A triggered block works when the trigger
+fires, as a sampled one does at a tick. The block is asked for its equations as always; only what becomes of
+them is changed here.
 """
 
 from __future__ import annotations
@@ -19,7 +21,9 @@ from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State
 ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
 """Hidden inputs: whether the block works; whether its states start anew now; whether the trigger fires now;
 and the time since it fired before, s."""
-_DONE = "?done"
+_DONE, _WORKS, _TURNED = "?done", "?works", "?turned"
+"""Kept and guarded beside the block's own: whether this tick has restarted it; whether its modes have settled
+since the control is on; and the guard of the control itself."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +47,7 @@ class ConditionalBlock(Block):
         """Nothing to check: the block inside is checked."""
 
     def _plain(self, values: Mapping[str, SX]) -> dict[str, SX]:
-        return {name: value for name, value in values.items() if name not in self.hidden and name != _DONE}
+        return {name: value for name, value in values.items() if name not in (*self.hidden, _DONE, _WORKS)}
 
     def _shapes(self, shapes: Shapes) -> Shapes:
         return {name: shape for name, shape in shapes.items() if name not in self.hidden}
@@ -86,10 +90,13 @@ class ConditionalBlock(Block):
         return (*own, *noted) if self._notes_restarts else own
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self.block.modes(self._shapes(inputs))
+        own = self.block.modes(self._shapes(inputs))
+        return (*own, State(_WORKS, (), "whether the modes follow")) if own and ON in self.hidden else own
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self.block.guards(self._shapes(inputs))
+        own = self.block.guards(self._shapes(inputs))
+        settles = self.block.modes(self._shapes(inputs)) and ON in self.hidden
+        return (*own, Guard(_TURNED, (), "the control")) if settles else own
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return self.block.conditions(self._shapes(inputs))
@@ -119,10 +126,15 @@ class ConditionalBlock(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         # A guard that is zero keeps its side, so that nothing fires while the block is off.
-        return self._while_on(u, self.block.guard_values(*self._arguments(t, x, u, p)))
+        found = self._while_on(u, self.block.guard_values(*self._arguments(t, x, u, p)))
+        if _WORKS not in x:
+            return found
+        settled = {name: if_else(x[_WORKS] != 0.0, value, 0.0) for name, value in found.items()}
+        return {**settled, _TURNED: u[ON] - 0.5}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self.block.mode_values(*self._arguments(t, x, u, p))
+        found = self.block.mode_values(*self._arguments(t, x, u, p))
+        return {**found, _WORKS: u[ON] != 0.0} if _WORKS in x else found
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         captured = self.block.captures(*self._arguments(t, x, u, p))
@@ -151,6 +163,11 @@ class ConditionalBlock(Block):
                 again = logic_and(again, x[_DONE] == 0.0)
             for name, start in self.block.initial_states(p).items():
                 after[name] = if_else(again, start, after.get(name, x[name]))
+        if _WORKS in x:
+            begins = logic_and(u[ON] != 0.0, x[_WORKS] == 0.0)
+            for name, value in self.mode_values(t, {**x, **after}, u, p).items():
+                after[name] = if_else(begins, value, after.get(name, x[name]))
+            after[_WORKS] = u[ON] != 0.0
         return after
 
     def _while_on(self, u: Signals, values: Signals, otherwise: Signals | None = None) -> Signals:

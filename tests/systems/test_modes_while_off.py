@@ -1,0 +1,133 @@
+"""Blocks that switch, inside subsystems that are off: their modes follow what happened meanwhile."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks import blocks as bl
+from armblocks.diagram import Block
+
+RUNS: list[dict[str, Any]] = [
+    {"solver": "rk45", "rtol": 1e-9, "atol": 1e-12},
+    {"solver": "rodas5p", "rtol": 1e-9, "atol": 1e-12},
+    {"solver": "rk4", "step": 0.01},
+]
+
+
+def inside(block: Block, end: str = "") -> ab.Diagram:
+    """A subsystem of one block with one input."""
+    inner = ab.DiagramBuilder("inside")
+    handle = inner.add("block", block, inner.input("u"))
+    inner.output("o", handle[end] if end else handle)
+    return inner.build()
+
+
+def enabled(block: Block, source: Block, enable: Block, *, end: str = "", when: str = "held") -> ab.Diagram:
+    builder = ab.DiagramBuilder("enabled")
+    fed = builder.add("source", source)
+    control = builder.add("control", enable)
+    subsystem = bl.EnabledSubsystem(diagram=inside(block, end), states_when_enabling=when)
+    held = builder.add("sub", subsystem, fed, enable=control)
+    builder.add("total", bl.Integrator(), held)
+    return builder.build()
+
+
+@pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
+@pytest.mark.parametrize(
+    ("block", "expected"),
+    [
+        (bl.Saturation(lower=-0.3, upper=0.3), 0.3),
+        (bl.DeadZone(), 0.5),
+        (bl.Relay(), 1.0),
+        (bl.Quantizer(interval=0.5), 1.0),
+        (bl.Abs(), 1.0),
+        (bl.Sign(), 1.0),
+        (bl.CompareToZero(relation=">"), 1.0),
+        (bl.CoulombFriction(offset=2.0, gain=3.0), 5.0),
+        (bl.LookupTable1D(positions=(-2.0, 0.0, 2.0), table=(4.0, 0.0, 1.0)), 0.5),
+    ],
+    ids=lambda value: value.type_name() if isinstance(value, Block) else None,
+)
+def test_a_jump_before_a_subsystem_is_first_on_is_seen(
+    block: Block, expected: float, settings: dict[str, Any]
+) -> None:
+    """The input jumps from -1 to 1 after 0.2 s; the subsystem is on from 0.5 s."""
+    diagram = enabled(block, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
+    found = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
+    assert found["sub/o"].tolist() == pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
+    assert found["total"][-1] == pytest.approx(0.5 * expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
+@pytest.mark.parametrize("sampled", [False, True])
+def test_a_limiter_that_is_on_now_and_then(sampled: bool, settings: dict[str, Any]) -> None:
+    """While it is on, it limits; the times between are the wave's own business."""
+    builder = ab.DiagramBuilder("now and then")
+    wave = builder.add("wave", bl.SineWave(frequency=3.0, phase=-0.1))
+    control = builder.add("control", bl.PulseGenerator(period=1.0, width=30.0, delay=0.37))
+    if sampled:
+        control = builder.add("hold", bl.ZeroOrderHold(sample_time=0.11), control)
+    limiter = bl.EnabledSubsystem(diagram=inside(bl.Saturation(lower=-0.3, upper=0.3)))
+    builder.add("total", bl.Integrator(), builder.add("sub", limiter, wave, enable=control))
+    found = ab.simulate(builder.build(), stop_time=8.0, sample_time=0.05, **settings)
+    on = found["hold" if sampled else "control"] > 0.0
+    assert 20 < on.sum() < on.size - 20
+    np.testing.assert_allclose(found["sub/o"][on], np.clip(found["wave"], -0.3, 0.3)[on], atol=1e-12)
+
+
+@pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
+def test_a_relay_within_its_band_keeps_its_side_while_it_is_off(settings: dict[str, Any]) -> None:
+    """On at 0.25 s by 1, off from 0.4 s; the input falls to 0.1, inside the band: it is still on at 0.8 s."""
+    source = bl.FromTable(times=(0.0, 0.2, 0.3, 0.5, 0.6, 2.0), values=(0.0, 0.0, 1.0, 1.0, 0.1, 0.1))
+    control = bl.FromTable(times=(0.0, 0.4, 0.8), values=(1.0, 0.0, 1.0), method="flat")
+    found = ab.simulate(
+        enabled(bl.Relay(on_value=2.0, off_value=-1.0), source, control),
+        stop_time=1.0,
+        sample_time=0.1,
+        **settings,
+    )
+    assert found["sub/o"].tolist() == [-1.0] * 3 + [2.0] * 8
+
+
+@pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
+def test_a_sliding_mass_stands_still_in_time_while_it_is_off(settings: dict[str, Any]) -> None:
+    """3 m/s against 2 N on 1 kg last 1.5 s; the mass is off from 0.5 to 1.5 s: it rests after 2.5 s."""
+    block = bl.StickSlipFriction(coulomb=2.0, static=2.5, initial_speed=3.0)
+    control = bl.FromTable(times=(0.0, 0.5, 1.5), values=(1.0, 0.0, 1.0), method="flat")
+    diagram = enabled(block, bl.Constant(value=0.0), control, end="v")
+    found = ab.simulate(diagram, stop_time=4.0, sample_time=0.1, **settings)
+    passed = np.minimum(found.time, 0.5) + np.maximum(found.time - 1.5, 0.0)
+    np.testing.assert_allclose(found["sub/o"], np.maximum(3.0 - 2.0 * passed, 0.0), atol=1e-9)
+    assert not found["sub/o"][found.time > 2.51].any()
+
+
+@pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
+def test_a_limited_integrator_that_starts_anew_leaves_its_limit(settings: dict[str, Any]) -> None:
+    """It climbs by 1 a second to 0.2 and waits there; each time it is on it begins at 0 again."""
+    block = bl.IntegratorLimited(lower=-0.2, upper=0.2)
+    control = bl.PulseGenerator(period=1.0, width=50.0)
+    diagram = enabled(block, bl.Constant(value=1.0), control, end="y", when="reset")
+    found = ab.simulate(diagram, stop_time=3.0, sample_time=0.05, **settings)
+    since = found.time - np.floor(found.time + 1e-9)
+    np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.2), atol=1e-9)
+
+
+def test_what_is_asked_while_a_subsystem_is_off_changes_nothing() -> None:
+    """Comparisons are located also while nobody looks: events, and the same numbers as without them."""
+    wave, control = bl.SineWave(frequency=50.0), bl.Step(time=0.7)
+    located = ab.simulate(enabled(bl.CompareToZero(), wave, control), stop_time=1.0, sample_time=0.01)
+    assert located.run.events > 10
+    off = located.time < 0.7 - 1e-9
+    assert not located["sub/o"][off].any()
+    expected = np.sin(50.0 * located.time) <= 0.0
+    assert located["sub/o"][~off].tolist() == expected[~off].astype(float).tolist()
+    # Off from 0: the integral is of what follows 0.7 s alone.
+    edges = np.arange(0, 20) * math.pi / 50.0
+    low = [(edges[k], edges[k + 1]) for k in range(1, 19, 2)]
+    exact = sum(max(0.0, min(b, 1.0) - max(a, 0.7)) for a, b in low)
+    assert located["total"][-1] == pytest.approx(exact, abs=1e-9)
