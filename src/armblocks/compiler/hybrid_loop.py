@@ -22,6 +22,7 @@ zero right after it fired, or at the start, counts with the sign it takes first.
 
 from __future__ import annotations
 
+from armblocks.compiler.happenings import SAME_ABOVE, SAME_BELOW, Happenings
 from armblocks.compiler.hybrid_functions import emit_functions
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_text import Module, number_text
@@ -29,8 +30,6 @@ from armblocks.compiler.linear_equations import LinearSpace
 from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.runge_kutta import Loop
 
-SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
-"""Two times within these factors of one another are the same instant."""
 HIGH_ORDER = 7
 """From this order on, steps are too long for one quintic of the past."""
 FINEST = 2.0**-12
@@ -62,6 +61,7 @@ class HybridLoop(Loop):
         self.piece_end = self.end
         self.segment_end = w.variable("double", number_text(0.0))
         self.on_instant = w.fresh("instant")
+        self.happenings = Happenings(self)
 
     # Evaluations.
 
@@ -196,11 +196,11 @@ class HybridLoop(Loop):
         if self.delays:
             w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         if self.sizes.captures:
-            self.emit_captures(time)
-        self.emit_ticks(time, until)
+            self.happenings.captures(time)
+        self.happenings.ticks(time, until)
         if self.guards:
-            self.emit_settling(time)
-            self.emit_events(time)
+            self.happenings.settle(time)
+            self.happenings.fire(time)
         else:
             w.put(time, self.instant)
             self.emit_solve(self.instant, self.at(self.places.x))
@@ -212,156 +212,12 @@ class HybridLoop(Loop):
         self.accept_unknowns()
         self.emit_samples(time, until, None)
         if self.sizes.stops:
-            self.emit_stop(time)
+            self.happenings.stop(time)
         finished = w.word_test("slt", w.get(self.counts[Count.SEGMENT], "i64"), self.segments)
         self.leave_unless(finished, Status.DONE)
         self.emit_piece()
         w.put(str(int(Stage.START)), self.counts[Count.STARTED], "i64")
         w.jump(self.on_start)
-
-    def emit_ticks(self, time: str, until: str) -> None:
-        """Mark the clocks that tick and update ``z``."""
-        if not self.sizes.clocks:
-            return
-        w = self.w
-        any_ticks: str | None = None
-        for clock in range(len(self.sizes.clocks)):
-            ticks = w.compare("ole", self.tick_time(clock), until)
-            place = w.at("%counts", Count.END + clock, "i64")
-            w.put(w.word_op("add", w.get(place, "i64"), w.let(f"zext i1 {ticks} to i64")), place, "i64")
-            marked = w.select(ticks, number_text(1.0), number_text(0.0))
-            w.put(marked, self.at(self.places.ticking + clock))
-            any_ticks = ticks if any_ticks is None else w.either(any_ticks, ticks)
-        assert any_ticks is not None
-        tick, on = w.fresh("tick"), w.fresh("ticked")
-        w.branch(any_ticks, tick, on)
-        w.place(tick)
-        w.increase(self.counts[Count.INSTANTS])
-        w.put(time, self.instant)
-        self.emit_update()
-        w.place(on)
-
-    def emit_captures(self, time: str) -> None:
-        """What keeps how things were just before this instant, from the flow with the old ``z``."""
-        w, places = self.w, self.places
-        zero = number_text(0.0)
-        for clock in range(len(self.sizes.clocks)):
-            w.put(zero, self.at(places.ticking + clock))
-        before = w.from_bits(w.word_op("sub", w.bits(time), "1"))
-        w.put(w.select(w.compare("ogt", time, zero), before, time), self.instant)
-        self.emit_update()
-
-    def emit_update(self) -> None:
-        """``z`` becomes what ``update`` gives for the clocks that are marked."""
-        w, places = self.w, self.places
-        self.emit_solve(self.instant, self.at(places.x))
-        arguments = (places.x, places.z, places.trial_w)
-        x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
-        m, new = (f"ptr {self.at(place)}" for place in (places.ticking, places.new_z))
-        w.do(f"call void @update(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {m}, {new})")
-        self.copy(places.new_z, places.z, self.sizes.discrete)
-
-    def emit_stop(self, time: str) -> None:
-        """Where a guard that ends the run is positive, record this instant, if it is not, and leave."""
-        w, places, sample = self.w, self.places, self.counts[Count.SAMPLE]
-        stop, write, leave, on = (w.fresh(stem) for stem in ("stop", "write", "leave", "on"))
-        signs = [w.get(self.at(places.signs + k)) for k in self.sizes.stops]
-        positive = w.compare("ogt", signs[0], number_text(0.0))
-        for sign in signs[1:]:
-            positive = w.either(positive, w.compare("ogt", sign, number_text(0.0)))
-        w.branch(positive, stop, on)
-        w.place(stop)
-        number = w.get(sample, "i64")
-        before = w.word_op("sub", number, "1")
-        first = w.word_test("slt", before, "0")
-        latest = w.get(w.at("%samples", w.let(f"select i1 {first}, i64 0, i64 {before}")))
-        later = w.compare("olt", latest, w.multiply(time, number_text(SAME_BELOW)))
-        w.branch(w.both(w.word_test("slt", number, self.samples), w.either(first, later)), write, leave)
-        w.place(write)
-        w.put(time, w.at("%samples", number))
-        row = w.at("%out", w.word_op("mul", number, str(self.n)))
-        w.for_each(self.n, lambda i: w.put(self.step.read(places.x, i), w.at(row, i)))
-        self.emit_record(time, number, row)
-        w.increase(sample)
-        w.place(leave)
-        self.leave(Status.STOPPED)
-        w.place(on)
-
-    def emit_settling(self, time: str) -> None:
-        """At the start, resets without events: modes and states take the values that the signals ask for.
-
-        A mode may move a signal on which another one depends, so this is repeated until nothing changes, at
-        most as often as there are guards.
-        """
-        w, places = self.w, self.places
-        settle, turn, on = w.fresh("settle"), w.fresh("turn"), w.fresh("on")
-        place = w.at("%counts", Count.SETTLE, "i64")
-        w.branch(w.word_test("ne", w.get(place, "i64"), "0"), settle, on)
-        w.place(settle)
-        w.put(time, self.instant)
-        zero = number_text(0.0)
-        w.for_each(self.guards, lambda i: w.put(zero, self.step.element(places.fired, i)))
-        w.put(str(self.guards), place, "i64")
-        w.jump(turn)
-        w.place(turn)
-        self.emit_solve(self.instant, self.at(places.x))
-        arguments = (places.x, places.z, places.trial_w, places.fired, places.new_x, places.new_z)
-        x, z, unknowns, e, new_x, new_z = (f"ptr {self.at(place)}" for place in arguments)
-        w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
-        same = w.variable("double", number_text(1.0))
-
-        def compare(i: str, before: int, after: int) -> None:
-            old, new = (self.step.read(where, i) for where in (before, after))
-            w.put(w.select(w.compare("une", old, new), number_text(0.0), w.get(same)), same)
-
-        w.put(number_text(1.0), same)
-        w.for_each(self.n, lambda i: compare(i, places.x, places.new_x))
-        w.for_each(self.sizes.discrete, lambda i: compare(i, places.z, places.new_z))
-        self.copy(places.new_x, places.x, self.n)
-        self.copy(places.new_z, places.z, self.sizes.discrete)
-        left = w.word_op("sub", w.get(place, "i64"), "1")
-        w.put(left, place, "i64")
-        again = w.both(w.compare("oeq", w.get(same), number_text(0.0)), w.word_test("sgt", left, "0"))
-        done = w.fresh("done")
-        w.branch(again, turn, done)
-        w.place(done)
-        w.put("0", place, "i64")
-        w.jump(on)
-        w.place(on)
-
-    def emit_events(self, time: str) -> None:
-        """Fire guards until none fires any more."""
-        w, places = self.w, self.places
-        turn, fire, settled, on = (w.fresh(stem) for stem in ("guards", "fire", "settled", "on"))
-        w.place(turn)
-        fired = self.watch(time, places.x)
-        w.do("call void @take_signs(ptr %reals, i1 false)")
-        self.copy(places.guards, places.guards_before, self.guards)
-        unknown = number_text(float("nan"))
-        w.for_each(self.guards, lambda i: w.put(unknown, self.step.element(places.guard_slopes, i)))
-        w.branch(w.word_test("eq", fired, "0"), settled, fire)
-        w.place(fire)
-        w.put("1", self.counts[Count.FRESH], "i64")
-        bound = w.let(f"call double @note_events(double {time}, ptr %reals, ptr %counts)")
-        w.put(bound, self.kept[Real.BOUND])
-        # A negative bound is how the count of events says that there is no end to them.
-        self.leave_unless(w.compare("oge", bound, number_text(0.0)), Status.ENDLESS_EVENTS)
-        arguments = (places.x, places.z, places.trial_w)
-        x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
-        e, new_x, new_z = (f"ptr {self.at(place)}" for place in (places.fired, places.new_x, places.new_z))
-        w.do(f"call void @reset(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
-        self.copy(places.new_x, places.x, self.n)
-        self.copy(places.new_z, places.z, self.sizes.discrete)
-        # Guards that fired take the sign that the reset gives them; the others keep theirs, to be compared.
-        self.emit_solve(self.instant, self.at(places.x))
-        arguments = (places.x, places.z, places.trial_w)
-        x, z, unknowns = (f"ptr {self.at(place)}" for place in arguments)
-        g = f"ptr {self.at(places.guards)}"
-        w.do(f"call void @guards(ptr {self.instant}, {x}, {z}, {unknowns}, ptr %p, {g})")
-        w.do("call void @take_signs(ptr %reals, i1 true)")
-        w.jump(turn)
-        w.place(settled)
-        w.place(on)
 
     def emit_first_step(self, time: str) -> None:
         """The length of the step after a start; after a tick, the length that was to come next."""
