@@ -12,9 +12,12 @@ import { Configuration } from './run/configuration'
 import { Timeline } from './run/timeline'
 import { TunePanel } from './run/tune_panel'
 import { Shortcuts } from './shortcuts'
+import { DropZone } from './robot/drop'
+import { useDesk } from './robot/editor/desk'
 import { SignalInspector } from './scopes/inspector'
 import { Scopes } from './scopes/scopes'
 
+const RobotEditor = lazy(() => import('./robot/editor/robot_editor'))
 const RobotView = lazy(() => import('./robot/robot_view'))
 
 const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
@@ -65,23 +68,32 @@ function arrange({ api }: DockviewReadyEvent): void {
 
 export function App() {
   const scheme = useComputedColorScheme('light')
+  const editing = useDesk((s) => s.current !== null)
   return (
     <div className="studio">
-      <TopBar />
-      <main className="dock">
-        <DockviewReact
-          className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'}
-          components={panels}
-          defaultTabComponent={Tab}
-          onReady={arrange}
-        />
-      </main>
-      <Timeline />
+      <div className={editing ? 'behind' : 'sheets'} inert={editing}>
+        <TopBar />
+        <main className="dock">
+          <DockviewReact
+            className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'}
+            components={panels}
+            defaultTabComponent={Tab}
+            onReady={arrange}
+          />
+        </main>
+        <Timeline />
+      </div>
       <BlockDialog />
       <Configuration />
       <QuickInsert />
       <ConnectDialog />
       <Shortcuts />
+      {editing && (
+        <Suspense fallback={<p className="robot-editor empty">Loading the robot editor …</p>}>
+          <RobotEditor />
+        </Suspense>
+      )}
+      <DropZone />
       <Notices />
     </div>
   )

@@ -597,7 +597,8 @@ export interface ServerMessage {
     | RunTuned
     | RunRewound
     | RunProgress
-    | RobotShown;
+    | RobotShown
+    | RobotOpened;
   values?: Opening | RobotTables | Readings | null;
 }
 /**
@@ -968,6 +969,13 @@ export interface RobotFinding {
   columns: string[];
   what: string;
   fix: string;
+}
+/**
+ * A page has opened robots: they come to its screen. It was told of each before.
+ */
+export interface RobotOpened {
+  kind: "robot_opened";
+  opening: Opening;
 }
 /**
  * The answer to what opens: the robots or the diagram of a file, and what was said about it.

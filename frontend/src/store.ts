@@ -17,6 +17,7 @@ import type {
   Wire,
   WireKind,
 } from './protocol'
+import { attachAgain, leaveEditor, robotOpened, robotShown } from './robot/editor/desk'
 import * as runs from './run/runs'
 import { samples } from './samples'
 
@@ -136,6 +137,7 @@ function receive(event: ServerEvent): void {
         recoveries: event.recoveries,
       })
       void showAgain(event)
+      attachAgain()
       break
     }
     case 'documents':
@@ -156,7 +158,10 @@ function receive(event: ServerEvent): void {
         },
         ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
       })
-      if (!same) runs.forget()
+      if (!same) {
+        runs.forget()
+        leaveEditor()
+      }
       remember(state, inside)
       break
     }
@@ -213,7 +218,13 @@ function receive(event: ServerEvent): void {
             reason: event.reason ?? '',
           },
         })
-      if (event.fault) notify(event.fault)
+      if (event.fault) refuse(event.fault)
+      break
+    case 'robot':
+      robotShown(event)
+      break
+    case 'robot_opened':
+      robotOpened(event.opening)
       break
     case 'reply':
       break
@@ -255,7 +266,7 @@ export const line = new Connection(
 let notices = 0
 
 /** Show what was refused, or why a run ended, in words. */
-function notify({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix'>): void {
+export function refuse({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix'>): void {
   const notice = { id: ++notices, what: where ? `${where}: ${what}` : what, fix }
   useStudio.setState((s) => ({ notices: [...s.notices.slice(-4), notice] }))
 }
@@ -266,7 +277,7 @@ export async function ask<T = unknown>(request: Request): Promise<T | undefined>
     return await line.ask<T>(request)
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
-    notify(error)
+    refuse(error)
     return undefined
   }
 }

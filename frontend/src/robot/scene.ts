@@ -1,12 +1,48 @@
-import { BufferAttribute, BufferGeometry } from 'three'
+import { BufferAttribute, BufferGeometry, Matrix4 } from 'three'
+
+/** A joint as the server describes it: where it stands in the frame that carries it, and in that of its own link. */
+export interface SceneJoint {
+  name: string
+  row: number
+  turns: boolean
+  limits: [number, number] | null
+  carrier: number
+  /** 4×4 row by row, in the carrier's frame: z is the joint's axis, x where the joint stands at zero. */
+  frame: number[]
+  /** The same in the link's own frame: how far its x has turned (its origin slid) is where the joint stands. */
+  moving: number[]
+  offset: number
+  radius: number
+}
 
 /** What the server says of a robot's bodies: see `robot_scene.py`. */
 export interface RobotScene {
   name: string
   reach: number
+  /** How far the bodies of the base reach below its frame, m: there is the floor. */
+  foot: number
   rows: number
-  bodies: { row: number; material: 'paint' | 'joint' | 'flange'; corners: string; normals: string }[]
-  joints: { name: string; row: number; turns: boolean; limits: [number, number] | null }[]
+  bodies: { row: number; material: Material; corners: string; normals: string }[]
+  joints: SceneJoint[]
+}
+
+export type Material = 'paint' | 'joint' | 'flange' | 'base'
+
+/** Where the rows of an arm are: 16 numbers each, row by row; undefined while it is not known. */
+export type Poses = (row: number, k: number) => number
+
+/** Poses as the server lists them: (rows, 4, 4). */
+export function listed(poses: number[][][]): Poses {
+  return (row, k) => poses[row]![k >> 2]![k & 3]!
+}
+
+export function matrixAt(poses: Poses, row: number, into: Matrix4): Matrix4 {
+  const at = (k: number) => poses(row, k)
+  return into.set(at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), at(10), at(11), 0, 0, 0, 1)
+}
+
+export function matrixOf(numbers: number[]): Matrix4 {
+  return new Matrix4().fromArray(numbers).transpose()
 }
 
 function numbers(packed: string): Float32Array {

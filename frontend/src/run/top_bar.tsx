@@ -139,7 +139,7 @@ function Tool({ label, icon: Icon, disabled, onClick }: { label: string; icon: R
 
 function FileMenu() {
   const welcome = useStudio((s) => s.welcome)
-  const diagrams = welcome?.files.filter((file) => file.endsWith('.json')) ?? []
+  const diagrams = welcome?.files ?? []
   return (
     <Menu position="bottom-start" shadow="md" width={320}>
       <Menu.Target>
@@ -149,11 +149,18 @@ function FileMenu() {
       </Menu.Target>
       <Menu.Dropdown mah="80vh" style={{ overflow: 'auto' }}>
         <Menu.Item onClick={() => void ask({ kind: 'new' })}>New diagram</Menu.Item>
+        <Menu.Item onClick={() => void ask({ kind: 'robot_open' })}>New robot</Menu.Item>
         <Menu.Label>Files of this folder</Menu.Label>
         {diagrams.length === 0 && <Menu.Item disabled>none</Menu.Item>}
         {diagrams.slice(0, 30).map((path) => (
           <Menu.Item key={path} onClick={() => void ask({ kind: 'open', path })}>
             {path}
+          </Menu.Item>
+        ))}
+        <Menu.Label>Robots</Menu.Label>
+        {(welcome?.robots ?? []).map((shipped) => (
+          <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>
+            {shipped}
           </Menu.Item>
         ))}
         <Menu.Label>Examples</Menu.Label>

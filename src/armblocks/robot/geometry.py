@@ -68,6 +68,11 @@ def robot_shapes(robot: Robot) -> tuple[tuple[Shape, ...], ...]:
     return tuple(tuple(shapes) for shapes in rows)
 
 
+def drum_radii(robot: Robot) -> dict[str, float]:
+    """The radius (m) of the drum on each link's joint, by the link's name."""
+    return _Plan.of(robot).radius
+
+
 @lru_cache(maxsize=32)
 def reach(robot: Robot) -> float:
     """An upper bound of the distance from base to tip with sliding joints at rest, m; at least 0.1."""

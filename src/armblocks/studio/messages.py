@@ -12,7 +12,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from armblocks.studio.edits import Edit, Message, Place, Wire
-from armblocks.studio.robot_messages import Opening, Readings, RobotRequest, RobotShown, RobotTables
+from armblocks.studio.robot_messages import (
+    Opening,
+    Readings,
+    RobotOpened,
+    RobotRequest,
+    RobotShown,
+    RobotTables,
+)
 
 # -- what a page shows ---------------------------------------------------------------------------------------
 
@@ -593,7 +600,7 @@ class RunProgress(Message):
 RunEvent = Annotated[RunStarted | RunTuned | RunRewound | RunProgress, Field(discriminator="kind")]
 """What the process of a run has to say, besides its samples."""
 Event = Annotated[
-    Reply | Welcome | Documents | Opened | Changed | Checked | RunEvent | RobotShown,
+    Reply | Welcome | Documents | Opened | Changed | Checked | RunEvent | RobotShown | RobotOpened,
     Field(discriminator="kind"),
 ]
 

@@ -146,7 +146,9 @@ class RobotDesk:
             self._shows.setdefault(page, set()).add(found.key)
             await page.tell(found.shown())
         spots = [say.RobotSpot(robot=found.key, name=found.robot.name) for found in opened]
-        return say.Opening(robots=spots, document="", notes=list(notes))
+        opening = say.Opening(robots=spots, document="", notes=list(notes))
+        await page.tell(say.RobotOpened(opening=opening))
+        return opening
 
     async def _open(self, page: Page, request: say.RobotOpen) -> say.Opening:
         if request.shipped:

@@ -233,6 +233,13 @@ class Opening(Message):
     notes: list[str]
 
 
+class RobotOpened(Message):
+    """A page has opened robots: they come to its screen. It was told of each before."""
+
+    kind: Literal["robot_opened"] = "robot_opened"
+    opening: Opening
+
+
 class Readings(Message):
     """What an arm does in one configuration; m, rad, N m, world axes."""
 

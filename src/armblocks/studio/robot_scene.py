@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import InputError
-from armblocks.robot import Robot
-from armblocks.robot.geometry import link_frames, reach, robot_bodies
+from armblocks.robot import Link, Robot
+from armblocks.robot.geometry import drum_radii, link_frames, reach, robot_bodies
+from armblocks.spatial import Transform, rotation_about, trotx
 
 
 def scene_of(robot: Robot) -> dict[str, Any]:
@@ -19,12 +21,21 @@ def scene_of(robot: Robot) -> dict[str, Any]:
 
     ``bodies``: for each the ``row`` of ``link_poses`` that it moves with (0 the base, then the links), its
     ``material``, and its triangles: ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) as base64 of
-    little-endian float32. ``joints``: name, row, whether it turns, limits (rad or m). ``reach`` m.
+    little-endian float32. ``joints``: name, row, whether it turns, limits (rad or m), and where the joint
+    stands: ``frame`` in the frame of row ``carrier``, ``moving`` in the link's own, each a pose (16,) row by
+    row whose z is the joint's axis; the x of ``moving`` has turned from that of ``frame`` by q + ``offset``
+    (its origin has slid so far). ``radius`` m: of the drum that is drawn on the joint. ``reach`` m; ``foot``
+    m: how far the base's bodies reach below its frame.
     """
-    rows = {link.name: row for row, link in enumerate(robot.links, start=1)}
+    rows: dict[str | None, int] = {link.name: row for row, link in enumerate(robot.links, start=1)}
+    rows[None] = 0
+    radii = drum_radii(robot)
+    bodies = robot_bodies(robot)
+    feet = [float(body.mesh.corners[..., 2].min()) for body in bodies if body.row == 0]
     return {
         "name": robot.name,
         "reach": reach(robot),
+        "foot": max(0.0, -min(feet, default=0.0)),
         "rows": len(robot.links) + 2,
         "bodies": [
             {
@@ -33,7 +44,7 @@ def scene_of(robot: Robot) -> dict[str, Any]:
                 "corners": _packed(body.mesh.corners),
                 "normals": _packed(body.mesh.normals),
             }
-            for body in robot_bodies(robot)
+            for body in bodies
         ],
         "joints": [
             {
@@ -41,10 +52,24 @@ def scene_of(robot: Robot) -> dict[str, Any]:
                 "row": rows[link.name],
                 "turns": bool(link.joint.turn),
                 "limits": list(link.joint.limits.position) if link.joint.limits.position else None,
+                "carrier": rows[link.parent],
+                "frame": (link.before @ _along(link)).matrix.ravel().tolist(),
+                "moving": (link.after.inverse() @ _along(link)).matrix.ravel().tolist(),
+                "offset": link.joint.offset,
+                "radius": radii[link.name],
             }
             for link in robot.moving_links
         ],
     }
+
+
+def _along(link: Link) -> Transform:
+    """The turn of the joint's frame that brings z onto the joint's axis."""
+    x, y, z = link.joint.axis
+    sine = math.hypot(x, y)
+    if sine < 1e-12:
+        return Transform() if z > 0 else trotx(math.pi)
+    return Transform(rotation=rotation_about((-y / sine, x / sine, 0.0), math.atan2(sine, z)))
 
 
 def link_frames_of(robot: Robot, q: Sequence[float]) -> list[Any]:

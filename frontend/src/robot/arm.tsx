@@ -1,0 +1,69 @@
+import { useFrame } from '@react-three/fiber'
+import { useEffect, useMemo, useRef } from 'react'
+import { type BufferGeometry, Matrix4, type Group } from 'three'
+import { geometry, matrixAt, type Material, type Poses, type RobotScene } from './scene'
+
+export const MATERIALS: Record<Material, { color: string; metalness: number; roughness: number }> = {
+  paint: { color: '#e8711a', metalness: 0.0, roughness: 0.38 },
+  joint: { color: '#33373d', metalness: 0.25, roughness: 0.55 },
+  flange: { color: '#c3c7cc', metalness: 0.9, roughness: 0.28 },
+  base: { color: '#4a4f57', metalness: 0.2, roughness: 0.6 },
+}
+
+export interface Body {
+  row: number
+  material: Material
+  geometry: BufferGeometry
+}
+
+/** The bodies of a scene as geometry, given back when the scene goes. */
+export function useBodies(scene: RobotScene): Body[] {
+  const bodies = useMemo(() => scene.bodies.map((body) => ({ row: body.row, material: body.material, geometry: geometry(body) })), [scene])
+  useEffect(() => () => bodies.forEach((body) => body.geometry.dispose()), [bodies])
+  return bodies
+}
+
+interface ArmProps {
+  rows: number
+  bodies: Body[]
+  poses: () => Poses | undefined
+  /** A ghost: the colour of a pose that the arm has left or will reach. */
+  ghost?: string
+}
+
+/** The bodies where the poses of the moment say. */
+export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
+  const groups = useRef<(Group | null)[]>([])
+  const matrix = useMemo(() => new Matrix4(), [])
+  useFrame(() => {
+    const now = poses()
+    groups.current.forEach((group, row) => {
+      if (!group) return
+      group.visible = Boolean(now)
+      if (!now) return
+      group.matrix.copy(matrixAt(now, row, matrix))
+      group.matrixWorldNeedsUpdate = true
+    })
+  })
+  return (
+    <group name={ghost ? 'ghost' : 'arm'}>
+      {Array.from({ length: rows }, (_, row) => (
+        <group key={row} ref={(group) => void (groups.current[row] = group)} matrixAutoUpdate={false}>
+          {bodies
+            .filter((body) => body.row === row)
+            .map((body, k) =>
+              ghost ? (
+                <mesh key={k} geometry={body.geometry} renderOrder={2}>
+                  <meshBasicMaterial color={ghost} transparent opacity={0.13} depthWrite={false} />
+                </mesh>
+              ) : (
+                <mesh key={k} geometry={body.geometry} castShadow receiveShadow>
+                  <meshStandardMaterial {...MATERIALS[body.material]} />
+                </mesh>
+              ),
+            )}
+        </group>
+      ))}
+    </group>
+  )
+}

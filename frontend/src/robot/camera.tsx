@@ -1,0 +1,158 @@
+import { CameraControls } from '@react-three/drei'
+import { useFrame, useThree } from '@react-three/fiber'
+import { useEffect, useMemo, useRef } from 'react'
+import { Box3, BufferGeometry, Matrix4, Mesh, Vector3, type Object3D, type PerspectiveCamera } from 'three'
+import { matrixAt, type Poses, type RobotScene } from './scene'
+import { useViewOptions } from './view_options'
+
+/** Directions from which an arm is looked at; "tool" stands behind the tool and rides with it. */
+export const PRESETS = {
+  iso: [0.62, -0.68, 0.42],
+  front: [1, 0, 0.06],
+  side: [0, -1, 0.06],
+  top: [0.001, 0, 1],
+} as const
+
+export type Preset = keyof typeof PRESETS | 'tool'
+
+/** What the buttons of a view ask its camera. */
+export interface CameraHandle {
+  look: (preset: Preset) => void
+  fit: () => void
+  turn: (right: number, up: number) => void
+  zoom: (factor: number) => void
+}
+
+const MARGIN = 1.14
+
+/** The corners of the boxes around the bodies, each box in the axes of its own link. */
+function cornersOf(arm: Object3D): Vector3[] {
+  const corners: Vector3[] = []
+  arm.traverse((one) => {
+    if (!(one instanceof Mesh) || !(one.geometry instanceof BufferGeometry)) return
+    one.geometry.computeBoundingBox()
+    const { min, max } = one.geometry.boundingBox!
+    for (let k = 0; k < 8; k++) corners.push(new Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).applyMatrix4(one.matrixWorld))
+  })
+  return corners
+}
+
+interface CameraProps {
+  scene: RobotScene
+  poses: () => Poses | undefined
+  floor: number
+  handle: React.RefObject<CameraHandle | null>
+}
+
+export function ViewCamera({ scene, poses, floor, handle }: CameraProps) {
+  const controls = useRef<CameraControls>(null)
+  const mounted = useRef(false)
+  const touched = useRef(false)
+  const invalidate = useThree((s) => s.invalidate)
+  const world = useThree((s) => s.scene)
+  const camera = useThree((s) => s.camera) as PerspectiveCamera
+  const follow = useViewOptions((s) => s.follow)
+  const scratch = useMemo(() => ({ matrix: new Matrix4(), tool: new Vector3(), last: new Vector3(), eye: new Vector3(), to: new Vector3() }), [])
+
+  const toolAt = (into: Vector3): boolean => {
+    const now = poses()
+    if (!now) return false
+    into.setFromMatrixPosition(matrixAt(now, scene.rows - 1, scratch.matrix))
+    return true
+  }
+
+  const fit = (direction: Vector3, smooth: boolean) => {
+    const arm = world.getObjectByName('arm')
+    if (!arm || !controls.current) return
+    world.updateMatrixWorld(true)
+    const corners = cornersOf(arm)
+    const box = new Box3().setFromPoints(corners)
+    if (box.isEmpty()) return
+    corners.push(new Vector3(0, 0, floor))
+    box.expandByPoint(new Vector3(0, 0, floor))
+    const centre = box.getCenter(new Vector3())
+    const d = direction.clone().normalize()
+    const right = new Vector3(0, 0, 1).cross(d)
+    if (right.lengthSq() < 1e-6) right.set(0, 1, 0)
+    right.normalize()
+    const up = d.clone().cross(right)
+    const tall = Math.tan(((camera.fov / 2) * Math.PI) / 180) / MARGIN
+    const wide = tall * camera.aspect
+    let distance = 0.1 * scene.reach
+    for (const corner of corners) {
+      const p = corner.sub(centre)
+      distance = Math.max(distance, p.dot(d) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall))
+    }
+    const eye = centre.clone().addScaledVector(d, distance)
+    mounted.current = false
+    void controls.current.setLookAt(eye.x, eye.y, eye.z, centre.x, centre.y, centre.z, smooth)
+    invalidate()
+  }
+
+  handle.current = {
+    look: (preset) => {
+      touched.current = true
+      if (preset === 'tool') {
+        mounted.current = true
+        invalidate()
+      } else fit(new Vector3(...PRESETS[preset]), true)
+    },
+    fit: () => fit(camera.position.clone().sub(controls.current!.getTarget(new Vector3())), true),
+    turn: (right, up) => {
+      mounted.current = false
+      touched.current = true
+      void controls.current?.rotate(right, up, true)
+      invalidate()
+    },
+    zoom: (factor) => {
+      const now = controls.current
+      touched.current = true
+      if (now) void now.dollyTo(now.distance * factor, true)
+      invalidate()
+    },
+  }
+
+  // As long as nobody has moved the view, it fits whatever size it has.
+  const size = useThree((s) => s.size)
+  useEffect(() => {
+    if (!touched.current) fit(new Vector3(...PRESETS.iso), false)
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [size.width, size.height, floor])
+
+  // Another robot, or the first one: all of it is to be seen. Edits of a robot leave the camera where it is.
+  useEffect(() => {
+    touched.current = false
+    const timer = setTimeout(() => fit(new Vector3(...PRESETS.iso), false), 0)
+    return () => clearTimeout(timer)
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [scene.name])
+
+  useEffect(() => {
+    if (follow) toolAt(scratch.last)
+    // eslint-disable-next-line react-hooks/exhaustive-deps
+  }, [follow])
+
+  useFrame(() => {
+    const now = controls.current
+    if (!now || (!follow && !mounted.current) || !toolAt(scratch.tool)) return
+    const { matrix, tool, last, eye, to } = scratch
+    if (mounted.current) {
+      // A hand camera: behind the tool and a little above, looking where the tool points.
+      eye.set(-0.16 * scene.reach, 0, -0.3 * scene.reach).applyMatrix4(matrix)
+      to.set(0, 0, 0.35 * scene.reach).applyMatrix4(matrix)
+      void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
+      return
+    }
+    const shift = tool.clone().sub(last)
+    last.copy(tool)
+    if (shift.lengthSq() === 0) return
+    now.getPosition(eye).add(shift)
+    now.getTarget(to).add(shift)
+    void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
+  })
+
+  return <CameraControls ref={controls} makeDefault minDistance={0.08 * scene.reach} maxDistance={15 * scene.reach} smoothTime={0.12} draggingSmoothTime={0.04} onControlStart={() => {
+        mounted.current = false
+        touched.current = true
+      }} />
+}

@@ -1,0 +1,64 @@
+import { Text } from '@mantine/core'
+import { IconFileImport } from '@tabler/icons-react'
+import { useEffect, useState } from 'react'
+import { ask, refuse } from '../store'
+import './robot.css'
+
+const MOST_BYTES = 5 * 2 ** 20
+const KINDS = ['.m', '.json']
+
+/** Files dropped anywhere on the page: robot scripts, robots, diagrams. */
+export function DropZone() {
+  const [over, setOver] = useState(false)
+  useEffect(() => {
+    const brings = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false
+    const enter = (event: DragEvent) => {
+      if (!brings(event)) return
+      event.preventDefault()
+      setOver(true)
+    }
+    const leave = (event: DragEvent) => {
+      if (!event.relatedTarget) setOver(false)
+    }
+    const drop = (event: DragEvent) => {
+      if (!brings(event)) return
+      event.preventDefault()
+      setOver(false)
+      for (const file of event.dataTransfer?.files ?? []) void open(file)
+    }
+    addEventListener('dragenter', enter)
+    addEventListener('dragover', enter)
+    addEventListener('dragleave', leave)
+    addEventListener('drop', drop)
+    return () => {
+      removeEventListener('dragenter', enter)
+      removeEventListener('dragover', enter)
+      removeEventListener('dragleave', leave)
+      removeEventListener('drop', drop)
+    }
+  }, [])
+  if (!over) return null
+  return (
+    <div className="drop-zone">
+      <IconFileImport size={34} />
+      <Text fw={600}>Drop it to open it</Text>
+      <Text size="sm">a robot script (.m), a robot or a diagram (.json)</Text>
+    </div>
+  )
+}
+
+/** Send a file to the server, which reads it as data: nothing of it is run. */
+export async function open(file: File): Promise<void> {
+  if (!KINDS.some((kind) => file.name.toLowerCase().endsWith(kind))) {
+    refuse({ what: 'this kind of file cannot be opened', where: file.name, fix: 'drop a robot script (.m), a robot or a diagram (.json)' })
+    return
+  }
+  if (file.size > MOST_BYTES) {
+    refuse({ what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`, where: file.name, fix: 'put it into the folder of the studio and open it there' })
+    return
+  }
+  const bytes = new Uint8Array(await file.arrayBuffer())
+  let text = ''
+  for (let k = 0; k < bytes.length; k += 0x8000) text += String.fromCharCode(...bytes.subarray(k, k + 0x8000))
+  await ask({ kind: 'drop', name: file.name, content: btoa(text) })
+}

@@ -1,0 +1,64 @@
+import { useCallback, useEffect, useRef, useState } from 'react'
+import { Refusal } from '../../connection'
+import { ask, line } from '../../store'
+import { listed, type Poses, type RobotScene } from '../scene'
+import { Stage } from '../stage'
+import { useDesk } from './desk'
+
+/** The robot of the editor as its tables say it and its sliders hold it. */
+export default function ArmPanel() {
+  const current = useDesk((s) => s.current)
+  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const [scene, setScene] = useState<RobotScene | null>(null)
+  const poses = useRef<Poses | undefined>(undefined)
+  const moves = useRef(0)
+  const version = shown?.version
+
+  useEffect(() => {
+    if (!current || version === undefined) return
+    let alive = true
+    let under = false
+    let wanted = true
+    // Of many configurations while one is answered only the last is asked for.
+    const move = async () => {
+      wanted = true
+      if (under) return
+      under = true
+      while (wanted && alive) {
+        wanted = false
+        const q = useDesk.getState().joints[current]?.q
+        if (!q) break
+        try {
+          const found = await line.ask<number[][][]>({ kind: 'robot_pose', robot: current, q })
+          if (!alive) break
+          poses.current = listed(found)
+          moves.current++
+        } catch (error) {
+          if (!(error instanceof Refusal)) throw error
+        }
+      }
+      under = false
+    }
+    void move()
+    void ask<RobotScene>({ kind: 'robot_bodies', robot: current }).then((found) => {
+      if (alive && found) setScene(found)
+    })
+    const leave = useDesk.subscribe((now, before) => {
+      if (now.joints[current] !== before.joints[current]) void move()
+    })
+    return () => {
+      alive = false
+      leave()
+    }
+  }, [current, version])
+
+  const posesNow = useCallback((): Poses | undefined => poses.current, [])
+  const state = useCallback(() => `${current} ${moves.current}`, [current])
+  const drawing = useCallback(async () => {
+    const { joints } = useDesk.getState()
+    const theme = document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light'
+    return current ? ask<string>({ kind: 'robot_picture', robot: current, q: joints[current]?.q ?? [], theme }) : undefined
+  }, [current])
+  if (!scene) return <p className="empty">Loading the robot …</p>
+  return <Stage key={current} scene={scene} poses={posesNow} state={state} drawing={drawing} />
+}

@@ -1,0 +1,184 @@
+import { create } from 'zustand'
+import { Refusal, type EventOf } from '../../connection'
+import type { CellColumn, Opening, Readings, RobotTables } from '../../protocol'
+import { ask, line } from '../../store'
+
+export type RobotShown = EventOf<'robot'>
+export type RobotEdit = Extract<Parameters<typeof line.ask>[0], { kind: 'robot_change' }>['edit']
+export type Angles = 'deg' | 'rad'
+
+/** How the joints of a robot stand and move on the page: rad, m and per second. */
+export interface Joints {
+  q: number[]
+  qd: number[]
+  qdd: number[]
+}
+
+interface Desk {
+  robots: Record<string, RobotShown>
+  /** The robot in the editor; null while the diagram is on the screen. */
+  current: string | null
+  tables: RobotTables | null
+  joints: Record<string, Joints>
+  readings: Readings | null
+  /** The latest readings are of another form or configuration than the one on the screen. */
+  reading: boolean
+  angles: Angles
+  /** What was said about the file that was opened last. */
+  opening: Opening | null
+}
+
+/** The robots that are open, and the one in the editor. */
+export const useDesk = create<Desk>(() => ({
+  robots: {},
+  current: null,
+  tables: null,
+  joints: {},
+  readings: null,
+  reading: false,
+  angles: 'deg',
+  opening: null,
+}))
+
+/** A robot as the server says it is now. */
+export function robotShown(shown: RobotShown): void {
+  const { robots, joints } = useDesk.getState()
+  const moving = shown.links.filter(({ moves }) => moves)
+  const before = joints[shown.robot]
+  const fits = before && before.q.length === moving.length
+  useDesk.setState({
+    robots: { ...robots, [shown.robot]: shown },
+    joints: fits ? joints : { ...joints, [shown.robot]: atRest(shown) },
+  })
+  if (useDesk.getState().current === shown.robot) readSoon()
+}
+
+/** A file was opened: its first robot comes to the screen. */
+export function robotOpened(opening: Opening): void {
+  const first = opening.robots[0]
+  if (!first) return
+  useDesk.setState({ current: first.robot, opening, readings: null })
+  if (!useDesk.getState().tables) void ask<RobotTables>({ kind: 'robot_form' }).then((tables) => tables && useDesk.setState({ tables }))
+  readSoon()
+}
+
+/** Back to the diagram. */
+export function leaveEditor(): void {
+  useDesk.setState({ current: null, opening: null })
+}
+
+/** After the line was broken: show again what was on the screen. */
+export function attachAgain(): void {
+  const { current } = useDesk.getState()
+  if (current) void ask({ kind: 'robot_attach', robot: current }).then((found) => found === undefined && leaveEditor())
+}
+
+/** All joints at zero, or as near to it as their ranges allow. */
+export function atRest(shown: RobotShown): Joints {
+  const moving = shown.links.filter(({ moves }) => moves)
+  const zero = moving.map(() => 0)
+  const q = moving.map(({ cells }) => {
+    const [low, high] = [cells['lowest'], cells['highest']]
+    return typeof low === 'number' && typeof high === 'number' ? Math.min(Math.max(0, low), high) : 0
+  })
+  return { q, qd: zero, qdd: zero }
+}
+
+export function setJoints(change: Partial<Joints>): void {
+  const { current, joints } = useDesk.getState()
+  if (!current || !joints[current]) return
+  useDesk.setState({ joints: { ...joints, [current]: { ...joints[current], ...change } } })
+  readSoon()
+}
+
+/** Carry out an edit; the refusal where there was one. Refusals belong to the cell, not to the notices. */
+export async function edit(change: RobotEdit, gesture = ''): Promise<Refusal | undefined> {
+  const { current } = useDesk.getState()
+  if (!current) return undefined
+  try {
+    await line.ask({ kind: 'robot_change', robot: current, key: crypto.randomUUID(), gesture, edit: change })
+    return undefined
+  } catch (error) {
+    if (error instanceof Refusal) return error
+    throw error
+  }
+}
+
+let wanted = false
+let under = false
+
+/** Read the arm as it stands now; of requests that come while one is answered, only the last counts. */
+function readSoon(): void {
+  wanted = true
+  if (under) return
+  under = true
+  useDesk.setState({ reading: true })
+  void readOn()
+}
+
+async function readOn(): Promise<void> {
+  while (wanted) {
+    wanted = false
+    const { current, joints } = useDesk.getState()
+    const now = current && joints[current]
+    if (!now) break
+    try {
+      const readings = await line.ask<Readings>({ kind: 'robot_read', robot: current, ...now })
+      if (useDesk.getState().current === current) useDesk.setState({ readings })
+    } catch (error) {
+      // A joint came or went meanwhile: the next form asks again. What cannot be read shows nothing.
+      if (!(error instanceof Refusal)) throw error
+      useDesk.setState({ readings: null })
+    }
+  }
+  under = false
+  useDesk.setState({ reading: false })
+}
+
+// -- numbers as people read them ----------------------------------------------------------------------------------
+
+/** Whether a column of a joint that turns or slides holds an angle. */
+export function isAngle(column: CellColumn, turns: boolean): boolean {
+  return column.quantity === 'angle' || (turns && (column.quantity === 'coordinate' || column.quantity === 'rate'))
+}
+
+/** The unit of a cell as it is shown. */
+export function unitOf(column: CellColumn, angles: Angles, turns?: boolean): string {
+  if (column.quantity === 'angle') return angles === 'deg' ? '°' : 'rad'
+  if (column.quantity === 'coordinate' || column.quantity === 'rate') {
+    const per = column.quantity === 'rate' ? '/s' : ''
+    const angle = (angles === 'deg' ? '°' : 'rad') + per
+    return turns === undefined ? `${angle}, m${per}` : turns ? angle : `m${per}`
+  }
+  return column.unit
+}
+
+const PARTS = [1, 2, 3, 4, 6, 12]
+
+/** An SI value as the text of its cell. */
+export function cellText(value: number | string | null | undefined, angle: boolean, angles: Angles): string {
+  if (value === null || value === undefined) return ''
+  if (typeof value === 'string') return value
+  if (!angle) return plain(value)
+  if (angles === 'deg') return plain(Number(((value * 180) / Math.PI).toPrecision(12)))
+  for (const part of PARTS) {
+    const times: number = (value / Math.PI) * part
+    if (times !== 0 && Math.abs(times) <= 24 && Math.abs(times - Math.round(times)) < 1e-12 && value === (Math.round(times) * Math.PI) / part) {
+      const top = Math.abs(Math.round(times)) === 1 ? 'pi' : `${Math.abs(Math.round(times))}*pi`
+      return `${times < 0 ? '-' : ''}${top}${part === 1 ? '' : `/${part}`}`
+    }
+  }
+  return plain(value)
+}
+
+function plain(value: number): string {
+  return String(Object.is(value, -0) ? 0 : value).replace('e+', 'e')
+}
+
+/** A reading with as many digits as an eye can use. */
+export function shortNumber(value: number, digits = 4): string {
+  const size = Math.abs(value)
+  if (size < 0.5 * 10 ** -digits) return (0).toFixed(Math.min(digits, 3))
+  if (size >= 1e5) return value.toExponential(2)
+  return value.toFixed(Math.max(0, Math.min(digits, digits - Math.floor(Math.log10(Math.max(size, 1))))))
+}

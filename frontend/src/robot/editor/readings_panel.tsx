@@ -1,0 +1,110 @@
+import { IconAlertTriangle } from '@tabler/icons-react'
+import { shortNumber, useDesk } from './desk'
+
+const ROWS = ['vx', 'vy', 'vz', 'ωx', 'ωy', 'ωz']
+
+/** What the arm does as it stands: pose of the tool, Jacobian, torques, all worked out by the server. */
+export function ReadingsPanel() {
+  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const readings = useDesk((s) => s.readings)
+  const angles = useDesk((s) => s.angles)
+  if (!shown) return null
+  const names = shown.links.filter(({ moves }) => moves).map(({ name }) => name)
+  const turns = shown.links.filter(({ moves }) => moves).map((link) => link.turns)
+  if (!names.length) return <p className="empty">No joint moves: there is nothing to read.</p>
+  if (!readings) return <p className="empty">Compiling the arm …</p>
+  const { pose, position, rpy, jacobian, gravload, torque, manipulability, singular, limits } = readings
+  const angle = (value: number) => (angles === 'deg' ? `${shortNumber((value * 180) / Math.PI, 3)}°` : `${shortNumber(value)} rad`)
+  const warnings = [...(singular ? [singular] : []), ...limits.map((words) => `${words}.`)]
+  return (
+    <div className="readings" role="group" aria-label="Read-outs" tabIndex={0}>
+      <section aria-label="Pose of the tool">
+        <h3>Tool in the world</h3>
+        <dl className="pairs numbers">
+          {position.map((value, k) => (
+            <div key={k}>
+              <dt>{'xyz'[k]}</dt>
+              <dd>{shortNumber(value)} m</dd>
+            </div>
+          ))}
+          {rpy.map((value, k) => (
+            <div key={k}>
+              <dt>{['roll', 'pitch', 'yaw'][k]}</dt>
+              <dd>{angle(value)}</dd>
+            </div>
+          ))}
+        </dl>
+        <Matrix label="Transform T" rows={pose} />
+      </section>
+      {warnings.length > 0 && (
+        <ul className="said" aria-label="Notices">
+          {warnings.map((words) => (
+            <li key={words}>
+              <IconAlertTriangle size={14} aria-hidden /> {words}
+            </li>
+          ))}
+        </ul>
+      )}
+      <section aria-label="Torques">
+        <h3>Joint torques</h3>
+        <table className="numbers">
+          <thead>
+            <tr>
+              <th />
+              <th scope="col">gravity</th>
+              <th scope="col">rne</th>
+              <th />
+            </tr>
+          </thead>
+          <tbody>
+            {names.map((name, k) => (
+              <tr key={name}>
+                <th scope="row">{name}</th>
+                <td>{shortNumber(gravload[k] ?? 0, 3)}</td>
+                <td>{shortNumber(torque[k] ?? 0, 3)}</td>
+                <td className="unit">{turns[k] ? 'N m' : 'N'}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+      <section aria-label="Jacobian">
+        <h3>
+          Jacobian <small>world axes; manipulability {shortNumber(manipulability)}</small>
+        </h3>
+        <Matrix label="Jacobian J" rows={jacobian} heads={ROWS} columns={names} />
+      </section>
+    </div>
+  )
+}
+
+function Matrix({ label, rows, heads, columns }: { label: string; rows: number[][]; heads?: string[]; columns?: string[] }) {
+  return (
+    <div className="scrolled">
+      <table className="matrix numbers" aria-label={label}>
+        {columns && (
+          <thead>
+            <tr>
+              <th />
+              {columns.map((column) => (
+                <th key={column} scope="col">
+                  {column}
+                </th>
+              ))}
+            </tr>
+          </thead>
+        )}
+        <tbody>
+          {rows.map((row, i) => (
+            <tr key={i}>
+              {heads && <th scope="row">{heads[i]}</th>}
+              {row.map((value, j) => (
+                <td key={j}>{shortNumber(value, 3)}</td>
+              ))}
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </div>
+  )
+}

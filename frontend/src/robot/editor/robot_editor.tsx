@@ -1,0 +1,254 @@
+import { ActionIcon, Alert, Button, Menu, SegmentedControl, Text, Tooltip, useComputedColorScheme } from '@mantine/core'
+import { IconAlertTriangle, IconArrowBackUp, IconArrowForwardUp, IconArrowLeft, IconChevronDown, IconDeviceFloppy, IconPlus } from '@tabler/icons-react'
+import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
+import { lazy, Suspense, useEffect } from 'react'
+import { ask, useStudio } from '../../store'
+import { edit, leaveEditor, useDesk, type Angles, type RobotShown } from './desk'
+import { JointsPanel } from './joints_panel'
+import { ReadingsPanel } from './readings_panel'
+import { RobotFields } from './robot_fields'
+import { LinkTable } from './table'
+import { saveRobot, SaveDialog } from './save_dialog'
+
+const ArmPanel = lazy(() => import('./arm_panel'))
+const TALL = 1000
+
+const panels: Record<string, React.FunctionComponent> = {
+  arm: () => (
+    <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
+      <ArmPanel />
+    </Suspense>
+  ),
+  joints: JointsPanel,
+  readings: ReadingsPanel,
+  kinematics: () => <Table which="kinematics" />,
+  dynamics: () => <Table which="dynamics" />,
+  robot: () => <Table which="robot" />,
+}
+
+function Tab({ api }: IDockviewPanelHeaderProps) {
+  return <span className="tab">{api.title}</span>
+}
+
+/** The first arrangement: arm, joints and read-outs above, the tables below. */
+function arrange({ api }: DockviewReadyEvent): void {
+  const tall = innerHeight > TALL
+  api.addPanel({ id: 'arm', component: 'arm', title: 'Arm' })
+  api.addPanel({ id: 'readings', component: 'readings', title: 'Read-outs', position: { referencePanel: 'arm', direction: 'right' } })
+  api.addPanel({ id: 'joints', component: 'joints', title: 'Joints', position: { referencePanel: 'arm', direction: 'right' } })
+  api.addPanel({ id: 'kinematics', component: 'kinematics', title: 'Kinematics', position: { direction: 'below' }, initialHeight: tall ? 0.26 * innerHeight : Math.max(250, 0.37 * innerHeight) })
+  api.addPanel({
+    id: 'dynamics',
+    component: 'dynamics',
+    title: 'Dynamics',
+    inactive: true,
+    ...(tall ? { position: { referencePanel: 'kinematics', direction: 'below' }, initialHeight: 0.24 * innerHeight } : { position: { referencePanel: 'kinematics' } }),
+  })
+  api.addPanel({ id: 'robot', component: 'robot', title: 'Robot, base, tool', inactive: true, position: { referencePanel: tall ? 'dynamics' : 'kinematics' } })
+  // Widths last: what comes beside a group takes from it.
+  const widths: [string, number, number][] = [
+    ['joints', 300, 0.2],
+    ['readings', 376, 0.24],
+  ]
+  for (const [id, least, share] of widths) api.getPanel(id)?.group.api.setSize({ width: Math.min(Math.max(least, share * innerWidth), 1.5 * least) })
+}
+
+function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
+  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const tables = useDesk((s) => s.tables)
+  if (!shown || !tables) return <p className="empty">Loading the tables …</p>
+  if (which === 'robot') return <RobotFields shown={shown} columns={tables.robot} />
+  return <LinkTable shown={shown} columns={tables[which]} actions={which === 'kinematics'} />
+}
+
+/** A robot as a document: its tables, the arm that they make, and what it does. */
+export default function RobotEditor() {
+  const scheme = useComputedColorScheme('light')
+  const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const key = shown?.robot
+  useEffect(() => {
+    if (!key) return
+    // On the document, so that the keys of the sheet and of its toolbar (on the window) do not hear them too.
+    const onKey = (event: KeyboardEvent) => {
+      event.stopPropagation()
+      const pressed = event.key.toLowerCase()
+      if (!(event.ctrlKey || event.metaKey)) return
+      if (pressed === 's') saveRobot()
+      else if (pressed === 'z' && !event.shiftKey) undo(key)
+      else if (pressed === 'y' || (pressed === 'z' && event.shiftKey)) redo(key)
+      else return
+      event.preventDefault()
+    }
+    document.addEventListener('keydown', onKey)
+    return () => document.removeEventListener('keydown', onKey)
+  }, [key])
+  if (!shown) return null
+  return (
+    <div className="robot-editor" role="region" aria-label={`Robot ${shown.name}`}>
+      <Bar shown={shown} />
+      <Notes />
+      <div className="robot-dock">
+        <DockviewReact className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'} components={panels} defaultTabComponent={Tab} onReady={arrange} />
+      </div>
+      <SaveDialog />
+    </div>
+  )
+}
+
+/** A cell that is being typed into keeps its letters; leaving it first makes its text a step of its own. */
+function leaveCell(): void {
+  if (document.activeElement instanceof HTMLElement) document.activeElement.blur()
+}
+
+function undo(robot: string): void {
+  leaveCell()
+  void ask({ kind: 'robot_undo', robot })
+}
+
+function redo(robot: string): void {
+  leaveCell()
+  void ask({ kind: 'robot_redo', robot })
+}
+
+function Bar({ shown }: { shown: RobotShown }) {
+  const angles = useDesk((s) => s.angles)
+  const others = useDesk((s) => s.robots)
+  const model = useStudio((s) => s.document?.state.title)
+  const last = shown.links.at(-1)!
+  return (
+    <header className="top-bar">
+      <Button size="compact-sm" variant="default" leftSection={<IconArrowLeft size={14} />} onClick={leaveEditor}>
+        {model ?? 'Diagram'}
+      </Button>
+      <Menu position="bottom-start" shadow="md">
+        <Menu.Target>
+          <Button size="compact-sm" variant="subtle" color="gray" rightSection={<IconChevronDown size={13} />} className="title" aria-label={`Robot ${shown.name}: other robots`}>
+            {shown.name}
+            {shown.dirty && <span aria-label="changed">&nbsp;•</span>}
+          </Button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          {Object.values(others).map(({ robot, name, path }) => (
+            <Menu.Item key={robot} onClick={() => void ask({ kind: 'robot_attach', robot })}>
+              {name} <span className="unit">{path ?? 'not saved'}</span>
+            </Menu.Item>
+          ))}
+          <Menu.Divider />
+          <RobotItems />
+        </Menu.Dropdown>
+      </Menu>
+      <Text size="xs" c="dimmed" className="file">
+        {shown.path ?? (shown.shipped ? `a copy of ${shown.shipped}` : 'not saved yet')}
+      </Text>
+      <Tool label={shown.undo ? `Undo ${shown.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!shown.undo} onClick={() => undo(shown.robot)} />
+      <Tool label={shown.redo ? `Redo ${shown.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!shown.redo} onClick={() => redo(shown.robot)} />
+      <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} onClick={() => saveRobot()} />
+      <Tool label="Add a joint at the end" icon={IconPlus} onClick={() => void edit({ kind: 'add', after: last.name })} />
+      <span className="spring" />
+      <Findings shown={shown} />
+      <Convention shown={shown} />
+      <SegmentedControl
+        size="xs"
+        aria-label="Angles"
+        data={[
+          { value: 'deg', label: 'deg' },
+          { value: 'rad', label: 'rad' },
+        ]}
+        value={angles}
+        onChange={(value) => useDesk.setState({ angles: value as Angles })}
+      />
+    </header>
+  )
+}
+
+function Tool({ label, icon: Icon, disabled = false, onClick }: { label: string; icon: React.ComponentType<{ size: number }>; disabled?: boolean; onClick: () => void }) {
+  return (
+    <Tooltip label={label} openDelay={400}>
+      <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={disabled} onClick={onClick}>
+        <Icon size={17} />
+      </ActionIcon>
+    </Tooltip>
+  )
+}
+
+/** New robots, and copies of the shipped ones: for the menus. */
+export function RobotItems() {
+  const robots = useStudio((s) => s.welcome?.robots) ?? []
+  return (
+    <>
+      <Menu.Item onClick={() => void ask({ kind: 'robot_open' })}>New robot</Menu.Item>
+      <Menu.Label>Shipped robots</Menu.Label>
+      {robots.map((shipped) => (
+        <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>
+          {shipped}
+        </Menu.Item>
+      ))}
+    </>
+  )
+}
+
+function Findings({ shown }: { shown: RobotShown }) {
+  if (!shown.findings.length) return null
+  const count = shown.findings.length
+  return (
+    <Menu position="bottom-end" shadow="md" width={380}>
+      <Menu.Target>
+        <Button size="compact-sm" variant="default" leftSection={<IconAlertTriangle size={13} />} className="findings">
+          {count === 1 ? '1 warning' : `${count} warnings`}
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        {shown.findings.map(({ link, what, fix }, k) => (
+          <Menu.Item key={k} component="div" closeMenuOnClick={false}>
+            <b>{link}</b>: {what} <span className="unit">{fix}</span>
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  )
+}
+
+/** Standard or modified rows: the same numbers read the other way, or the same arm written the other way. */
+function Convention({ shown }: { shown: RobotShown }) {
+  if (!shown.convention) return null
+  const other = shown.convention === 'standard' ? 'modified' : 'standard'
+  const change = (keep_arm: boolean) => void edit({ kind: 'convention', convention: other, keep_arm })
+  return (
+    <Menu position="bottom-end" shadow="md" width={330}>
+      <Menu.Target>
+        <Button size="compact-sm" variant="default" rightSection={<IconChevronDown size={13} />} disabled={!shown.chain}>
+          {shown.convention} D-H
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Item onClick={() => change(true)}>
+          Write the same arm as {other} D-H
+          <Text size="xs" c="dimmed">
+            The numbers change, the arm and its torques stay.
+          </Text>
+        </Menu.Item>
+        <Menu.Item onClick={() => change(false)}>
+          Read these numbers as {other} D-H
+          <Text size="xs" c="dimmed">
+            The numbers stay, the arm changes.
+          </Text>
+        </Menu.Item>
+      </Menu.Dropdown>
+    </Menu>
+  )
+}
+
+/** What was said while the file was read. */
+function Notes() {
+  const opening = useDesk((s) => s.opening)
+  if (!opening?.notes.length) return null
+  return (
+    <Alert color="yellow" variant="light" p="xs" withCloseButton closeButtonLabel="Close the notes" onClose={() => useDesk.setState({ opening: null })} icon={<IconAlertTriangle size={16} />}>
+      {opening.notes.map((note) => (
+        <Text size="xs" key={note}>
+          {note}
+        </Text>
+      ))}
+    </Alert>
+  )
+}

@@ -1,0 +1,28 @@
+import type { CellColumn } from '../../protocol'
+import { unitOf, useDesk, type RobotShown } from './desk'
+import { Cell } from './table'
+
+/** What there is once of a robot: its name, base, tool, gravity and friction. */
+export function RobotFields({ shown, columns }: { shown: RobotShown; columns: CellColumn[] }) {
+  const angles = useDesk((s) => s.angles)
+  const groups = [...new Set(columns.map(({ group }) => group))]
+  return (
+    <div className="robot-fields">
+      {groups.map((group) => (
+        <fieldset key={group} className={group ? undefined : 'texts'}>
+          <legend>{group || 'Robot'}</legend>
+          {columns
+            .filter((column) => column.group === group)
+            .map((column) => (
+              <label key={column.name} title={column.doc}>
+                <span>
+                  {column.title} {unitOf(column, angles) && <span className="unit">{unitOf(column, angles)}</span>}
+                </span>
+                <Cell owner="" turns={false} value={shown.fields[column.name] ?? null} column={column} angles={angles} />
+              </label>
+            ))}
+        </fieldset>
+      ))}
+    </div>
+  )
+}

@@ -1,0 +1,78 @@
+import { Button, Group, Modal, Stack, Text, TextInput } from '@mantine/core'
+import { create } from 'zustand'
+import { Refusal } from '../../connection'
+import { line, useStudio } from '../../store'
+import { useDesk } from './desk'
+
+interface Saving {
+  robot: string | null
+  path: string
+  refused: string
+}
+
+const useSaving = create<Saving>(() => ({ robot: null, path: '', refused: '' }))
+
+/** Save under the present name; asks for one where there is none. */
+export function saveRobot(): void {
+  const { current, robots } = useDesk.getState()
+  const shown = current ? robots[current] : undefined
+  if (!shown) return
+  if (shown.path) void write(shown.robot, '', false)
+  else useSaving.setState({ robot: shown.robot, path: `${shown.name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`, refused: '' })
+}
+
+async function write(robot: string, path: string, overwrite: boolean): Promise<void> {
+  try {
+    await line.ask({ kind: 'robot_save', robot, path, overwrite })
+    useSaving.setState({ robot: null })
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error
+    const now = path || useDesk.getState().robots[robot]?.path || ''
+    useSaving.setState({ robot, path: now, refused: error.what })
+  }
+}
+
+export function SaveDialog() {
+  const { robot, path, refused } = useSaving()
+  const files = useStudio((s) => s.welcome?.files) ?? []
+  const close = () => useSaving.setState({ robot: null })
+  return (
+    <Modal opened={robot !== null} onClose={close} title="Save the robot" size="sm">
+      <form
+        onSubmit={(event) => {
+          event.preventDefault()
+          if (robot) void write(robot, path.endsWith('.json') ? path : `${path}.json`, false)
+        }}
+      >
+        <Stack gap="sm">
+          <TextInput
+            label="File in this folder"
+            description="A robot file, .json; folders on the way are made."
+            data-autofocus
+            value={path}
+            error={refused || undefined}
+            onChange={(event) => useSaving.setState({ path: event.currentTarget.value, refused: '' })}
+          />
+          {files.includes(path) && !refused && (
+            <Text size="xs" c="dimmed">
+              There is a file of this name.
+            </Text>
+          )}
+          <Group justify="flex-end" gap="xs">
+            <Button variant="default" onClick={close}>
+              Cancel
+            </Button>
+            {refused && robot && (
+              <Button color="red" variant="light" onClick={() => void write(robot, path, true)}>
+                Overwrite
+              </Button>
+            )}
+            <Button type="submit" disabled={!path.trim()}>
+              Save
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  )
+}

@@ -1,0 +1,58 @@
+import type { WebGLRenderer } from 'three'
+
+/** The renderer of a view and how it draws one frame. */
+export interface Shot {
+  gl: WebGLRenderer
+  draw: () => void
+}
+
+const FRAMES_PER_SECOND = 30
+const FILMS = ['video/mp4;codecs=avc1', 'video/webm;codecs=vp9', 'video/webm;codecs=vp8', 'video/webm']
+
+function download(data: Blob, name: string): void {
+  const link = document.createElement('a')
+  link.href = URL.createObjectURL(data)
+  link.download = name
+  link.click()
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000)
+}
+
+/** Save what the view shows as a PNG, with two pixels a point at least. */
+export function takePicture(shot: React.RefObject<Shot | null>, name: string): void {
+  const now = shot.current
+  if (!now) return
+  const before = now.gl.getPixelRatio()
+  now.gl.setPixelRatio(Math.max(2, before))
+  now.draw()
+  now.gl.domElement.toBlob((data) => {
+    if (data) download(data, `${name}.png`)
+    now.gl.setPixelRatio(before)
+    now.draw()
+  }, 'image/png')
+}
+
+/** The kind of film that this browser can record; undefined where it records none. */
+export function filmKind(): string | undefined {
+  return typeof MediaRecorder === 'undefined' ? undefined : FILMS.find((kind) => MediaRecorder.isTypeSupported(kind))
+}
+
+/** Film the view while something plays; the returned function ends the film early. */
+export function takeFilm(shot: React.RefObject<Shot | null>, name: string, play: () => Promise<void>, ended: () => void): () => void {
+  const kind = filmKind()
+  const canvas = shot.current?.gl.domElement
+  if (!kind || !canvas) {
+    ended()
+    return () => {}
+  }
+  const recorder = new MediaRecorder(canvas.captureStream(FRAMES_PER_SECOND), { mimeType: kind, videoBitsPerSecond: 8_000_000 })
+  const parts: Blob[] = []
+  recorder.ondataavailable = ({ data }) => void parts.push(data)
+  recorder.onstop = () => {
+    download(new Blob(parts, { type: kind.split(';')[0]! }), `${name}.${kind.includes('mp4') ? 'mp4' : 'webm'}`)
+    ended()
+  }
+  const stop = () => recorder.state !== 'inactive' && recorder.stop()
+  recorder.start()
+  void play().then(stop)
+  return stop
+}

@@ -1,0 +1,264 @@
+import { useComputedColorScheme } from '@mantine/core'
+import { Environment, Grid, Lightformer } from '@react-three/drei'
+import { Canvas, useFrame, useThree } from '@react-three/fiber'
+import { useEffect, useRef, useState } from 'react'
+import { Arm, MATERIALS, useBodies } from './arm'
+import { ViewCamera, type CameraHandle } from './camera'
+import { Frames, JointAxes, Limits } from './overlays'
+import { takePicture, type Shot } from './pictures'
+import type { Poses, RobotScene } from './scene'
+import { StaticArm } from './static_arm'
+import { ToolPath, type Way } from './tool_path'
+import { toggle, useViewOptions } from './view_options'
+import { ViewTools } from './view_tools'
+
+const COLOURS = {
+  light: { background: '#f1eeea', cell: '#e2dcd4', section: '#cbc3b8', shadow: 0.24, start: '#635d55', goal: '#0072b2' },
+  dark: { background: '#151a20', cell: '#262d36', section: '#39424d', shadow: 0.5, start: '#a3adba', goal: '#3d9fdc' },
+}
+
+/** Poses that are shown beside the arm: where it came from, where it goes. */
+export interface Ghosts {
+  start: () => Poses | undefined
+  goal: () => Poses | undefined
+}
+
+interface StageProps {
+  scene: RobotScene
+  poses: () => Poses | undefined
+  /** Changes whenever the poses do: what is not changed is not drawn again. */
+  state: () => string
+  way?: () => Way | undefined
+  ghosts?: Ghosts
+  /** The drawing that stands in where there is no WebGL. */
+  drawing: () => Promise<string | undefined>
+  /** Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film. */
+  film?: () => Promise<void>
+  /** Buttons of its own that stand before the others. */
+  children?: React.ReactNode
+}
+
+const TURN = Math.PI / 24
+
+/** An arm on its floor, with light, shadow, camera and the tools of a view. */
+export function Stage(props: StageProps) {
+  const { scene, poses, drawing, film, children } = props
+  const scheme = useComputedColorScheme('light')
+  const camera = useRef<CameraHandle>(null)
+  const shot = useRef<Shot | null>(null)
+  const [works] = useState(hasWebGl)
+  if (!works) return <StaticArm name={scene.name} drawing={drawing} />
+  const onKeyDown = (event: React.KeyboardEvent) => {
+    const view = camera.current
+    if (!view || event.ctrlKey || event.metaKey || event.altKey) return
+    const turns: Record<string, [number, number]> = { ArrowLeft: [-TURN, 0], ArrowRight: [TURN, 0], ArrowUp: [0, -TURN], ArrowDown: [0, TURN] }
+    const turn = turns[event.key]
+    if (turn) view.turn(...turn)
+    else if (event.key === '+' || event.key === '=') view.zoom(0.85)
+    else if (event.key === '-') view.zoom(1 / 0.85)
+    else if (event.key === 'Home') view.look('iso')
+    else if (event.key === ' ') view.fit()
+    else return
+    event.preventDefault()
+    event.stopPropagation()
+  }
+  return (
+    <div className="robot">
+      <div
+        className="stage"
+        role="application"
+        aria-label={`The robot ${scene.name}. Arrow keys turn the view, plus and minus bring it nearer or farther, space shows all of the arm.`}
+        tabIndex={0}
+        onKeyDown={onKeyDown}
+      >
+        <Canvas shadows="percentage" frameloop="demand" dpr={[1, 2]} camera={{ position: [1.6 * scene.reach, -1.9 * scene.reach, 1.35 * scene.reach], up: [0, 0, 1], fov: 32, near: 0.02 * scene.reach, far: 60 * scene.reach }} aria-hidden>
+          <Inside {...props} scheme={scheme} camera={camera} shot={shot} />
+        </Canvas>
+      </div>
+      <ViewTools
+        camera={camera}
+        onPicture={() => takePicture(shot, scene.name)}
+        film={film && (() => film())}
+        shot={shot}
+        name={scene.name}
+        hasPath={Boolean(props.way)}
+        hasGhosts={Boolean(props.ghosts)}
+        onToggle={toggle}
+      >
+        {children}
+      </ViewTools>
+      <Instant poses={poses} rows={scene.rows} state={props.state} />
+    </div>
+  )
+}
+
+interface InsideProps extends StageProps {
+  scheme: 'light' | 'dark'
+  camera: React.RefObject<CameraHandle | null>
+  shot: React.RefObject<Shot | null>
+}
+
+function Inside({ scene, poses, state, way, ghosts, scheme, camera, shot }: InsideProps) {
+  const options = useViewOptions()
+  const bodies = useBodies(scene)
+  const colours = COLOURS[scheme]
+  const dark = scheme === 'dark'
+  const { reach } = scene
+  const foot = (poses()?.(0, 11) ?? 0) - scene.foot
+  const floor = useFloor(scene, poses, foot)
+  useDrawnWhenChanged(state)
+  const invalidate = useThree((s) => s.invalidate)
+  useEffect(() => invalidate(), [options, bodies, scheme, invalidate])
+  const three = useThree()
+  useEffect(() => {
+    shot.current = { gl: three.gl, draw: () => three.gl.render(three.scene, three.camera) }
+    return () => void (shot.current = null)
+  }, [three.gl, three.scene, three.camera, shot])
+  const overlay = { scene, poses, dark }
+  return (
+    <>
+      <color attach="background" args={[colours.background]} />
+      <Environment resolution={64} environmentIntensity={dark ? 0.42 : 0.6}>
+        <color attach="background" args={[dark ? '#39424d' : '#b9b4ad']} />
+        <Lightformer form="rect" intensity={3.2} color="#fff6ec" position={[3, -4, 6]} scale={[6, 4, 1]} target={[0, 0, 0]} />
+        <Lightformer form="rect" intensity={1.2} color="#dfe8f5" position={[-6, 3, 3]} scale={[5, 6, 1]} target={[0, 0, 0]} />
+        <Lightformer form="rect" intensity={1.6} color="#ffffff" position={[0, 6, 4]} scale={[8, 1, 1]} target={[0, 0, 0]} />
+      </Environment>
+      <directionalLight
+        position={[1.9 * reach, -1.4 * reach, 3.4 * reach]}
+        intensity={dark ? 1.9 : 2.1}
+        castShadow
+        shadow-mapSize={[1024, 1024]}
+        shadow-radius={5}
+        shadow-camera-left={-1.5 * reach}
+        shadow-camera-right={1.5 * reach}
+        shadow-camera-top={1.5 * reach}
+        shadow-camera-bottom={-1.5 * reach}
+        shadow-camera-far={9 * reach}
+        shadow-normalBias={0.006 * reach}
+        shadow-bias={-0.0004}
+      />
+      <directionalLight position={[-2.4 * reach, 1.8 * reach, 1.6 * reach]} intensity={0.55} color="#dfe8f5" />
+      <Arm rows={scene.rows} bodies={bodies} poses={poses} />
+      {options.ghosts && ghosts && <Arm rows={scene.rows} bodies={bodies} poses={ghosts.start} ghost={colours.start} />}
+      {options.ghosts && ghosts && <Arm rows={scene.rows} bodies={bodies} poses={ghosts.goal} ghost={colours.goal} />}
+      {options.frames && <Frames {...overlay} />}
+      {options.axes && <JointAxes {...overlay} />}
+      {options.limits && <Limits {...overlay} />}
+      {options.path && way && <ToolPath way={way} dark={dark} background={colours.background} />}
+      <Pedestal from={floor} to={foot} reach={reach} poses={poses} />
+      <Ground height={floor} reach={reach} colours={colours} />
+      <ViewCamera scene={scene} poses={poses} floor={floor} handle={camera} />
+    </>
+  )
+}
+
+/** The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it has reached. */
+function useFloor(scene: RobotScene, poses: () => Poses | undefined, foot: number): number {
+  const [lowest, setLowest] = useState<{ name: string; floor: number }>({ name: scene.name, floor: Infinity })
+  const step = (scene.reach > 1 ? 0.5 : 0.1) * Math.max(1, Math.round(0.12 * scene.reach))
+  useFrame(() => {
+    const now = poses()
+    if (!now) return
+    let low = Infinity
+    for (let row = 1; row < scene.rows; row++) low = Math.min(low, now(row, 11))
+    low -= 0.06 * scene.reach
+    const floor = low < foot ? step * Math.floor(low / step) : Infinity
+    if (lowest.name !== scene.name || floor < lowest.floor - 1e-9) setLowest({ name: scene.name, floor })
+  })
+  return lowest.name === scene.name ? Math.min(foot, lowest.floor) : foot
+}
+
+/** A column under an arm that reaches below its foot. */
+function Pedestal({ from, to, reach, poses }: { from: number; to: number; reach: number; poses: () => Poses | undefined }) {
+  const now = poses()
+  if (to - from < 0.01 * reach || !now || now(0, 10) < 0.7) return null
+  const r = 0.06 * reach
+  const along = Math.PI / 2
+  return (
+    <group position={[now(0, 3), now(0, 7), 0]}>
+      <mesh position={[0, 0, (from + to) / 2]} rotation={[along, 0, 0]} castShadow receiveShadow>
+        <cylinderGeometry args={[1.25 * r, 1.4 * r, to - from, 40]} />
+        <meshStandardMaterial {...MATERIALS.base} />
+      </mesh>
+      <mesh position={[0, 0, from + 0.08 * r]} rotation={[along, 0, 0]} castShadow receiveShadow>
+        <cylinderGeometry args={[2.1 * r, 2.2 * r, 0.16 * r, 48]} />
+        <meshStandardMaterial {...MATERIALS.base} />
+      </mesh>
+    </group>
+  )
+}
+
+/** Draws a frame when something moved, and none while all stands still. */
+function useDrawnWhenChanged(state: () => string): void {
+  const invalidate = useThree((s) => s.invalidate)
+  useEffect(() => {
+    let seen = ''
+    let frame = 0
+    const look = () => {
+      const now = state()
+      if (now !== seen) {
+        seen = now
+        invalidate()
+      }
+      frame = requestAnimationFrame(look)
+    }
+    frame = requestAnimationFrame(look)
+    return () => cancelAnimationFrame(frame)
+  }, [state, invalidate])
+}
+
+function Ground({ height, reach, colours }: { height: number; reach: number; colours: (typeof COLOURS)['light'] }) {
+  return (
+    <>
+      <mesh position={[0, 0, height - 0.001 * reach]} receiveShadow>
+        <planeGeometry args={[12 * reach, 12 * reach]} />
+        <shadowMaterial opacity={colours.shadow} />
+      </mesh>
+      <Grid
+        key={colours.cell}
+        position={[0, 0, height]}
+        rotation={[Math.PI / 2, 0, 0]}
+        args={[8 * reach, 8 * reach]}
+        cellSize={reach > 1 ? 0.25 : 0.1}
+        cellThickness={0.7}
+        sectionSize={reach > 1 ? 1 : 0.5}
+        sectionThickness={1.1}
+        cellColor={colours.cell}
+        sectionColor={colours.section}
+        fadeDistance={7 * reach}
+        fadeStrength={1.5}
+        infiniteGrid
+      />
+    </>
+  )
+}
+
+/** Where the tool is, in a corner. */
+function Instant({ poses, rows, state }: { poses: () => Poses | undefined; rows: number; state: () => string }) {
+  const text = useRef<HTMLOutputElement>(null)
+  useEffect(() => {
+    let frame = 0
+    let seen = ''
+    const look = () => {
+      const key = state()
+      if (key !== seen && text.current) {
+        seen = key
+        const now = poses()
+        text.current.textContent = now ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m' : ''
+      }
+      frame = requestAnimationFrame(look)
+    }
+    frame = requestAnimationFrame(look)
+    return () => cancelAnimationFrame(frame)
+  }, [poses, rows, state])
+  return <output ref={text} className="instant numbers" aria-label="Position of the tool" />
+}
+
+function hasWebGl(): boolean {
+  try {
+    return Boolean(document.createElement('canvas').getContext('webgl2'))
+  } catch {
+    return false
+  }
+}

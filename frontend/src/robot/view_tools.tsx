@@ -1,0 +1,110 @@
+import { ActionIcon, Menu, Tooltip } from '@mantine/core'
+import {
+  IconArrowsMaximize,
+  IconCamera,
+  IconEye,
+  IconPlayerStopFilled,
+  IconVideo,
+  IconViewfinder,
+} from '@tabler/icons-react'
+import { useRef, useState } from 'react'
+import type { CameraHandle, Preset } from './camera'
+import { filmKind, takeFilm, type Shot } from './pictures'
+import { useViewOptions, type ViewOptions } from './view_options'
+
+const PRESET_LABELS: [Preset, string][] = [
+  ['iso', 'From a corner'],
+  ['front', 'From the front'],
+  ['side', 'From the side'],
+  ['top', 'From above'],
+  ['tool', 'From the tool'],
+]
+
+const OPTION_LABELS: [keyof ViewOptions, string][] = [
+  ['frames', 'Frames of the links'],
+  ['axes', 'Axes of the joints'],
+  ['limits', 'Ranges of the joints'],
+  ['path', 'Path of the tool'],
+  ['ghosts', 'Start and goal'],
+  ['follow', 'Follow the tool'],
+]
+
+interface ViewToolsProps {
+  camera: React.RefObject<CameraHandle | null>
+  shot: React.RefObject<Shot | null>
+  name: string
+  onPicture: () => void
+  film: (() => Promise<void>) | undefined
+  hasPath: boolean
+  hasGhosts: boolean
+  onToggle: (option: keyof ViewOptions) => void
+  children?: React.ReactNode
+}
+
+/** Camera, what is shown, picture and film: the buttons over an arm. */
+export function ViewTools({ camera, shot, name, onPicture, film, hasPath, hasGhosts, onToggle, children }: ViewToolsProps) {
+  const options = useViewOptions()
+  const [filming, setFilming] = useState(false)
+  const stop = useRef<() => void>(() => {})
+  const offered = OPTION_LABELS.filter(([option]) => (option !== 'path' || hasPath) && (option !== 'ghosts' || hasGhosts))
+  return (
+    <div className="view-tools" role="toolbar" aria-label="Robot view">
+      {children}
+      <Menu position="bottom-end" shadow="md">
+        <Menu.Target>
+          <Button label="Camera" icon={IconViewfinder} />
+        </Menu.Target>
+        <Menu.Dropdown>
+          {PRESET_LABELS.map(([preset, label]) => (
+            <Menu.Item key={preset} onClick={() => camera.current?.look(preset)}>
+              {label}
+            </Menu.Item>
+          ))}
+        </Menu.Dropdown>
+      </Menu>
+      <Button label="Show all of the arm (Space)" icon={IconArrowsMaximize} onClick={() => camera.current?.fit()} />
+      <Menu position="bottom-end" shadow="md">
+        <Menu.Target>
+          <Button label="What is shown" icon={IconEye} />
+        </Menu.Target>
+        <Menu.Dropdown>
+          {offered.map(([option, label]) => (
+            <Menu.CheckboxItem key={option} checked={options[option]} onChange={() => onToggle(option)}>
+              {label}
+            </Menu.CheckboxItem>
+          ))}
+        </Menu.Dropdown>
+      </Menu>
+      <Button label="Save a picture (PNG)" icon={IconCamera} onClick={onPicture} />
+      {film && filmKind() && (
+        <Button
+          label={filming ? 'End the film' : 'Film the run from its start'}
+          icon={filming ? IconPlayerStopFilled : IconVideo}
+          onClick={() => {
+            if (filming) {
+              stop.current()
+              return
+            }
+            setFilming(true)
+            stop.current = takeFilm(shot, name, film, () => setFilming(false))
+          }}
+        />
+      )}
+    </div>
+  )
+}
+
+interface ButtonProps extends React.ComponentPropsWithRef<'button'> {
+  label: string
+  icon: React.ComponentType<{ size: number }>
+}
+
+export function Button({ label, icon: Icon, ...rest }: ButtonProps) {
+  return (
+    <Tooltip label={label} openDelay={400} disabled={rest['aria-expanded'] === true}>
+      <ActionIcon variant="subtle" color="gray" aria-label={label} {...(rest as object)}>
+        <Icon size={16} />
+      </ActionIcon>
+    </Tooltip>
+  )
+}
