@@ -101,7 +101,7 @@ function posesAt(path: string, rows: number, index: number): Poses | undefined {
 
 /** Play the run from its start; done when it has come to its end, or is held. */
 function playOnce(): Promise<void> {
-  useCursor.setState({ time: 0, playing: false })
+  useCursor.setState({ time: samples.time[0] ?? 0, playing: false, loop: false })
   play()
   return new Promise((resolve) => {
     const stop = useCursor.subscribe(({ playing }) => {

@@ -15,6 +15,7 @@ import {
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
 import { openQuickInsert } from '../library/quick_insert'
+import { useDesk } from '../robot/editor/desk'
 import { alter, ask, change, useStudio } from '../store'
 import { openConfiguration } from './configuration'
 import { stepCursor, useCursor } from './cursor'
@@ -137,6 +138,22 @@ function Tool({ label, icon: Icon, disabled, onClick }: { label: string; icon: R
   )
 }
 
+/** Robots that are open in the editor, saved or not. */
+function OpenRobots() {
+  const open = Object.values(useDesk((s) => s.robots))
+  if (!open.length) return null
+  return (
+    <>
+      <Menu.Label>Open robots</Menu.Label>
+      {open.map(({ robot, name, path }) => (
+        <Menu.Item key={robot} onClick={() => void ask({ kind: 'robot_attach', robot })}>
+          {name} <span className="unit">{path ?? 'not saved'}</span>
+        </Menu.Item>
+      ))}
+    </>
+  )
+}
+
 function FileMenu() {
   const welcome = useStudio((s) => s.welcome)
   const diagrams = welcome?.files ?? []
@@ -157,6 +174,7 @@ function FileMenu() {
             {path}
           </Menu.Item>
         ))}
+        <OpenRobots />
         <Menu.Label>Robots</Menu.Label>
         {(welcome?.robots ?? []).map((shipped) => (
           <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>

@@ -95,6 +95,7 @@ class Hub:
                 recoveries=self.documents.recoveries(),
             )
         )
+        await self.robots.welcome(page)
 
     def leave(self, page: Page) -> None:
         """A page has gone; what it showed stays open for when it returns."""

@@ -89,6 +89,12 @@ class RobotDesk:
         self._drawings = drawings
         self._shows: dict[Page, set[str]] = {}
 
+    async def welcome(self, page: Page) -> None:
+        """A page has come: it is told of every open robot, so that none is lost by a reload."""
+        self._shows[page] = set(self.robots)
+        for found in self.robots.values():
+            await page.tell(found.shown())
+
     def leave(self, page: Page) -> None:
         """A page has gone; the robots stay open."""
         self._shows.pop(page, None)
