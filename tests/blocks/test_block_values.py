@@ -138,7 +138,10 @@ def test_operators_are_times_and_divide(operators: str) -> None:
 def test_state_space_matrices_fit_each_other() -> None:
     with pytest.raises(InputError, match=r"A is \(1, 1\), B is \(2, 1\).*A \(n, n\), B \(n, m\)"):
         StateSpace(B=[[1.0], [2.0]])
-    with pytest.raises(InputError, match=r"StateSpace: initial has shape \(2,\). Allowed: \(\) or \(1,\)"):
+    with pytest.raises(
+        InputError,
+        match=r"StateSpace: initial has shape \(2,\). Allowed: \(\) or \(1,\). Fix: give one",
+    ):
         StateSpace(initial=[1.0, 2.0])
 
 

@@ -332,3 +332,14 @@ def test_the_sampled_and_the_continuous_one_fire_alike() -> None:
         builder.add("late", UnitDelay(sample_time=T), trigger)
         result = ab.simulate(builder.build(), stop_time=5.0, sample_time=T)
         assert result["continuous/y"] == pytest.approx(result["sampled/y"], abs=1e-9)
+
+
+def test_a_start_value_that_does_not_fit_is_told_apart_from_its_parameter() -> None:
+    builder = DiagramBuilder("d")
+    block = DiscreteIntegrator(initial_condition_source="external", initial=[1.0, 2.0], sample_time=T)
+    builder.add(
+        "block", block, builder.add("u", Constant(value=1.0)), builder.add("x0", Constant(value=[1.0] * 3))
+    )
+    says = r"'initial' has shape \(3,\) and 'parameter initial' has shape \(2,\)"
+    with pytest.raises(DiagramError, match=says):
+        builder.build()

@@ -96,7 +96,7 @@ def test_what_does_not_fit_is_said() -> None:
         MultiSegment(durations=[1.0])
     with pytest.raises(InputError, match=r"corners of 2 s do not fit into a segment of 1 s"):
         MultiSegment(blend=2.0)
-    with pytest.raises(InputError, match=r"CirclePath: the centre has 2 numbers"):
+    with pytest.raises(InputError, match=r"CirclePath.centre: the centre has 2 numbers"):
         CirclePath(centre=[0, 0])
     with pytest.raises(InputError, match=r"'q0' has shape \(2,\) and 'qf' has shape \(3,\)"):
         Trapezoidal(q0=[0, 0], qf=[1, 2, 3])

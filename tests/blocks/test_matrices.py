@@ -91,5 +91,5 @@ def test_what_does_not_fit_is_said() -> None:
         evaluate(Reshape(output="matrix", rows=4), A)
     with pytest.raises(DiagramError, match=r"the parts have shapes \(2, 3\), \(3, 3\)"):
         evaluate(MatrixConcatenate(), A, np.ones((3, 3)))
-    with pytest.raises(DiagramError, match=r"the diagonal has shape \(2, 3\)"):
+    with pytest.raises(DiagramError, match=r"the diagonal 'u' has shape \(2, 3\)"):
         evaluate(DiagonalMatrix(), A)

@@ -51,9 +51,6 @@ class DegreesToRadians(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the same angle in radians", "rad"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"] * (pi / 180.0)}
 
@@ -75,9 +72,6 @@ class RadiansToDegrees(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the same angle in degrees", "deg"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"] * (180.0 / pi)}
@@ -163,9 +157,6 @@ class AngleDifference(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "a - b, at least -pi and below pi", "rad"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return turn_modes(broadcast(inputs)) if self.zero_crossing else ()

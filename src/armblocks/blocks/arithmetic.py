@@ -26,10 +26,8 @@ from armblocks.diagram import (
     Shapes,
     Signals,
     WorkedExample,
-    broadcast,
     made,
     parameter,
-    shape_of,
 )
 
 _ROOTS: Mapping[str, Callable[[SX], SX]] = {
@@ -57,9 +55,6 @@ class Abs(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "its absolute value"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
@@ -79,6 +74,7 @@ class Bias(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Bias"
+    spreads: ClassVar[tuple[str, ...]] = ("bias",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine, 1 higher.",
         parameters={"bias": 1.0},
@@ -91,9 +87,6 @@ class Bias(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the shifted signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "bias": shape_of(self.bias)})}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -117,9 +110,6 @@ class UnaryMinus(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "its negative"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -145,9 +135,6 @@ class Sign(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "its sign"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         above = Condition("positive", inputs["u"], "1 where u > 0", closed=False)
@@ -181,9 +168,6 @@ class Sqrt(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the root"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": _ROOTS[self.function](u["u"])}
 
@@ -206,9 +190,6 @@ class Hypot(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the hypotenuse"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}
@@ -233,9 +214,6 @@ class Divide(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the quotient"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["dividend"] / u["divisor"]}
@@ -265,9 +243,6 @@ class Polynomial(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value of the polynomial"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         c = p["coefficients"]

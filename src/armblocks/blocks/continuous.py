@@ -18,7 +18,6 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     integral_unit,
     made,
     parameter,
@@ -34,6 +33,7 @@ class Integrator(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Integrator"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of a sine that starts at 0: 1 - cos t.",
     )
@@ -48,9 +48,6 @@ class Integrator(Block):
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", self.output_shapes(inputs)["y"], "the integral"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}
@@ -88,9 +85,6 @@ class Derivative(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "its rate of change"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": rate_unit(inputs["u"])}

@@ -47,6 +47,7 @@ class UnitDelay(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Unit Delay"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine as it was one tick ago, held until the next.",
     )
@@ -63,9 +64,6 @@ class UnitDelay(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}
@@ -97,6 +95,7 @@ class Memory(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Memory"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sampled sine one tick late: the sample time is that of what feeds it.",
         parameters={"sample_time": -1.0},
@@ -115,9 +114,6 @@ class Memory(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}
@@ -348,9 +344,6 @@ class ZeroOrderHold(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"]}
 
@@ -380,9 +373,6 @@ class RateTransition(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (OUTPUT,)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"]}

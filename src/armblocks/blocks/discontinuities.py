@@ -202,9 +202,6 @@ class Quantizer(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the nearest step"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
@@ -263,9 +260,6 @@ class Switch(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "one of the two"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u1"] if inputs["u1"] == inputs["u3"] else ""}

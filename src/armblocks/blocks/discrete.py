@@ -29,11 +29,9 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     made,
     parameter,
     sample_time_parameter,
-    shape_of,
 )
 
 INPUT = Port("u", "what is sampled")
@@ -53,6 +51,7 @@ class DiscreteIntegrator(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete-Time Integrator"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of a sine by the rule of Euler: rectangles, one a tick.",
     )
@@ -84,12 +83,6 @@ class DiscreteIntegrator(Block):
             *((saturated,) if self.saturation_port else ()),
             *((Port("state", "the sum before a reset"),) if self.state_port else ()),
         )
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        wide = {name: shape for name, shape in inputs.items() if name != "reset"}
-        own = {"gain": shape_of(self.gain), "initial value": shape_of(self.initial)}
-        shape = broadcast({**wide, **own})
-        return {port.name: shape for port in self.output_ports()}
 
     def assumed_output_shapes(self) -> Shapes:
         return self.output_shapes({})
@@ -147,6 +140,7 @@ class Difference(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Difference"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="What the sine has gained since the last tick.",
     )
@@ -160,9 +154,6 @@ class Difference(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the difference"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
@@ -183,6 +174,7 @@ class DiscreteDerivative(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Discrete Derivative"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The slope of the sine as two samples tell it: half a tick late.",
     )
@@ -197,10 +189,6 @@ class DiscreteDerivative(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the rate of change"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        own = {"gain": shape_of(self.gain), "initial": shape_of(self.initial)}
-        return {"y": broadcast({**inputs, **own})}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
@@ -221,6 +209,7 @@ class RateLimiter(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Rate Limiter"
+    spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Pulses whose edges may not be steeper than 1 a second upwards and 2 downwards.",
         parameters={"falling": -2.0, "sample_time": 0.05},
@@ -242,10 +231,6 @@ class RateLimiter(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        names = ("rising", "falling", "initial")
-        return {"y": broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", self.output_shapes(inputs)["y"], "the output at the tick before"),)

@@ -73,7 +73,7 @@ class DiscreteStateSpace(Block):
         if shape_of(self.initial) not in ((), A[:1]):
             raise InputError(
                 f"initial has shape {shape_of(self.initial)}",
-                where="DiscreteStateSpace",
+                where="DiscreteStateSpace.initial",
                 allowed=f"() or {A[:1]}",
                 fix="give one number for each row of A, or one for all",
             )

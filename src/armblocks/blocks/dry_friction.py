@@ -100,9 +100,6 @@ class Backlash(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the driven part"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 

@@ -23,7 +23,6 @@ from armblocks.diagram import (
     broadcast,
     made,
     parameter,
-    shape_of,
 )
 
 
@@ -59,9 +58,6 @@ class SaturationDynamic(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -99,9 +95,6 @@ class DeadZoneDynamic(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "what exceeds the zone"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
@@ -121,6 +114,7 @@ class WrapToZero(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Wrap To Zero"
+    spreads: ClassVar[tuple[str, ...]] = ("threshold",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A ramp that falls to 0 once it exceeds 5.",
         parameters={"threshold": 5.0},
@@ -135,9 +129,6 @@ class WrapToZero(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the signal, or 0"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "threshold": shape_of(self.threshold)})}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -163,6 +154,7 @@ class HitCrossing(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Hit Crossing"
+    spreads: ClassVar[tuple[str, ...]] = ("offset",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine crosses 0.5 upwards and downwards: the count steps at each crossing.",
         parameters={"offset": 0.5},
@@ -176,10 +168,6 @@ class HitCrossing(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("count", "crossings so far"), Port("last", "time of the last one; 0 before any", "s"))
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        shape = broadcast({**inputs, "offset": shape_of(self.offset)})
-        return {"count": shape, "last": shape}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["count"]

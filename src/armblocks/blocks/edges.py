@@ -47,6 +47,7 @@ class EdgeDetection(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Edge Detection"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 at each tick at which the sine has become positive.",
@@ -63,9 +64,6 @@ class EdgeDetection(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 at the edge, else 0"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("before", self.output_shapes(inputs)["y"], "the input at the tick before"),)
@@ -346,8 +344,9 @@ class VariableIntegerDelay(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         if len(inputs["u"]) > 1:
             raise InputError(
-                f"a delay of variable length got an input of shape {inputs['u']}",
+                f"'u' has shape {inputs['u']}",
                 allowed="a scalar or a vector",
+                fix="put a Reshape before the block",
             )
         return {"y": inputs["u"]}
 

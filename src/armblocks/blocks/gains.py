@@ -22,7 +22,6 @@ from armblocks.diagram import (
     made,
     parameter,
     sample_time_parameter,
-    shape_of,
 )
 from armblocks.errors import InputError
 
@@ -61,9 +60,6 @@ class SliderGain(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the product"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["gain"] * u["u"]}
 
@@ -74,6 +70,7 @@ class WeightedSampleTime(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Weighted Sample Time Math"
+    spreads: ClassVar[tuple[str, ...]] = ("weight",)
     sampled: ClassVar[bool] = True
 
     operation: str = parameter("+", choices=tuple(_OPERATIONS), doc="what is done")
@@ -85,9 +82,6 @@ class WeightedSampleTime(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the result"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "weight": shape_of(self.weight)})}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": _OPERATIONS[self.operation](u["u"], p["weight"] * p["T"])}

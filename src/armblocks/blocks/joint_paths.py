@@ -240,7 +240,10 @@ class CirclePath(Block):
     def check(self) -> None:
         if shape_of(self.centre) != (3,):
             raise InputError(
-                f"the centre has {shape_of(self.centre)[0]} numbers", where="CirclePath", allowed="3: x, y, z"
+                f"the centre has {shape_of(self.centre)[0]} numbers",
+                where="CirclePath.centre",
+                allowed="3: x, y, z",
+                fix="give the middle of the circle in m",
             )
 
     def output_ports(self) -> tuple[Port, ...]:

@@ -16,13 +16,10 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     made,
     parameter,
     sample_time_parameter,
-    shape_of,
 )
-from armblocks.equations import Shape
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +28,7 @@ class FirstOrderLag(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "First-Order Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "time_constant", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response: 63 % after one time constant of 2 s.",
         parameters={"time_constant": 2.0},
@@ -47,11 +45,8 @@ class FirstOrderLag(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the lagging output"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _common(self, inputs)}
-
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("y", _common(self, inputs), "the output"),)
+        return (State("y", self.output_shapes(inputs)["y"], "the output"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["y"]}
@@ -69,6 +64,7 @@ class SecondOrderLag(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Second-Order Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "natural_frequency", "damping")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response with a damping of 0.3: it overshoots and swings in.",
         parameters={"natural_frequency": 2.0, "damping": 0.3},
@@ -89,12 +85,8 @@ class SecondOrderLag(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the lagging output"), Port("rate", "its rate of change"))
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        shape = _common(self, inputs)
-        return {"y": shape, "rate": shape}
-
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        shape = _common(self, inputs)
+        shape = self.output_shapes(inputs)["y"]
         return (State("y", shape, "the output"), State("rate", shape, "its rate of change"))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -118,6 +110,7 @@ class LeadLag(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Lead-Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "lead_time", "lag_time")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A lead answers a step with more than its final value, and comes back to it.",
         parameters={"lead_time": 2.0, "lag_time": 1.0},
@@ -134,11 +127,8 @@ class LeadLag(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the compensated signal"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _common(self, inputs)}
-
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", _common(self, inputs), "the input, lagging by T2"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the input, lagging by T2"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ratio = p["lead_time"] / p["lag_time"]
@@ -157,6 +147,7 @@ class TransferFunctionFirstOrder(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Transfer Fcn First Order"
+    spreads: ClassVar[tuple[str, ...]] = ("pole", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response: every tick goes a fifth of the way that is left.",
         parameters={"pole": 0.8},
@@ -174,11 +165,8 @@ class TransferFunctionFirstOrder(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the lagging output"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _common(self, inputs)}
-
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", _common(self, inputs), "the output at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the output at the tick before"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["pole"] * x["x"] + (1.0 - p["pole"]) * u["u"]}
@@ -202,6 +190,7 @@ class TransferFunctionLeadOrLag(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Transfer Fcn Lead or Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("pole", "zero", "initial", "initial_input")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response goes from 1 to (1 - zero) / (1 - pole) = 2.5.",
         parameters={"pole": 0.8, "zero": 0.5},
@@ -221,11 +210,8 @@ class TransferFunctionLeadOrLag(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the compensated signal"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _common(self, inputs)}
-
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", _common(self, inputs), "pole y - zero u of the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "pole y - zero u of the tick before"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["x"] + u["u"]}
@@ -246,6 +232,7 @@ class TransferFunctionRealZero(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Transfer Fcn Real Zero"
+    spreads: ClassVar[tuple[str, ...]] = ("zero", "initial_input")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response: 1 for one tick, then 1 - zero = 0.25.",
         inputs={"u": made("Step")},
@@ -262,11 +249,8 @@ class TransferFunctionRealZero(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the input, its past taken off"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _common(self, inputs)}
-
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", _common(self, inputs), "the input at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"] - p["zero"] * x["x"]}
@@ -276,11 +260,3 @@ class TransferFunctionRealZero(Block):
 
     def initial_states(self, p: Signals) -> Signals:
         return {"x": p["initial_input"]}
-
-
-def _common(block: Block, inputs: Shapes) -> Shape:
-    """The shape of the input and of all tunable parameters; scalars spread."""
-    own = {
-        rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.parameters() if rule.tunable
-    }
-    return broadcast({**inputs, **own})

@@ -192,6 +192,7 @@ class IntegratorLimited(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Integrator Limited"
+    spreads: ClassVar[tuple[str, ...]] = ("initial", "lower", "upper")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The integral of a sine would reach 2; it stays at the limit 1 and leaves it as soon as "
@@ -213,10 +214,6 @@ class IntegratorLimited(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the integral"), _SATURATED)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        shape = broadcast({**inputs, "a parameter": parameters_shape(self, "initial", "lower", "upper")})
-        return {"y": shape, "saturated": shape}
 
     def assumed_output_shapes(self) -> Shapes:
         return self.output_shapes({})

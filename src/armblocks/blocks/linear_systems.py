@@ -51,7 +51,10 @@ def complex_roots(given: ArrayLike, where: str, name: str) -> Roots:
     values = np.asarray(given, dtype=np.float64)
     if values.ndim == 2 and values.shape[1] != 2:
         raise InputError(
-            f"{name} has shape {values.shape}", where=where, allowed="(n,), or (n, 2): real, imaginary"
+            f"{name} has shape {values.shape}",
+            where=where,
+            allowed="(n,), or (n, 2): real, imaginary",
+            fix="give a row of two numbers for each complex root",
         )
     roots = values.astype(np.complex128) if values.ndim == 1 else values[:, 0] + 1j * values[:, 1]
     above, below = roots[roots.imag > 0.0], roots[roots.imag < 0.0]

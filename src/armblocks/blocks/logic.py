@@ -67,9 +67,6 @@ class RelationalOperator(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
 
@@ -106,9 +103,6 @@ class LogicalOperator(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         conditions = [value != 0.0 for value in u.values()]
         if self.operator == "NOT":
@@ -124,6 +118,7 @@ class CompareToConstant(Block):
 
     family: ClassVar[str] = "logic"
     title: ClassVar[str] = "Compare To Constant"
+    spreads: ClassVar[tuple[str, ...]] = ("constant",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is above 0.5.",
         parameters={"relation": ">", "constant": 0.5},
@@ -138,9 +133,6 @@ class CompareToConstant(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "constant": shape_of(self.constant)})}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
@@ -170,9 +162,6 @@ class CompareToZero(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
@@ -249,9 +238,6 @@ class IntervalTestDynamic(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]

@@ -24,7 +24,6 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     made,
     parameter,
     shape_of,
@@ -62,9 +61,6 @@ class LookupTable1D(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions")
@@ -127,9 +123,6 @@ class LookupTable2D(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions1", "positions2")
@@ -205,9 +198,6 @@ class LookupTableND(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions")

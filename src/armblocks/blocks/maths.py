@@ -37,6 +37,7 @@ class Gain(Block):
 
     family: ClassVar[str] = "maths"
     title: ClassVar[str] = "Gain"
+    spreads: ClassVar[tuple[str, ...]] = ("gain",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Half the sine.",
         parameters={"gain": 0.5},
@@ -50,9 +51,6 @@ class Gain(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the product"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "gain": shape_of(self.gain)})}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["gain"] * u["u"]}
@@ -114,9 +112,6 @@ class Sum(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the sum"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}
 
@@ -155,9 +150,6 @@ class Product(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the product"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         first, *others = zip(self.operators, u.values())
@@ -259,9 +251,6 @@ class MathFunction(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value of the function"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": _FUNCTIONS[self.function](u["u"])}
 
@@ -284,9 +273,6 @@ class Trigonometry(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value of the function"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": _TRIGONOMETRY[self.function](u["u"])}
@@ -336,9 +322,6 @@ class Power(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the power"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["base"] ** u["exponent"]}
 
@@ -362,9 +345,6 @@ class MinMax(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the least or the greatest"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}

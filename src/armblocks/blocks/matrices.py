@@ -338,7 +338,11 @@ class DiagonalMatrix(Block):
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         if len(inputs["u"]) > 1:
-            raise InputError(f"the diagonal has shape {inputs['u']}", allowed="a scalar or a vector")
+            raise InputError(
+                f"the diagonal 'u' has shape {inputs['u']}",
+                allowed="a scalar or a vector",
+                fix="put an ExtractDiagonal before the block",
+            )
         return {"y": (math.prod(inputs["u"]),) * 2}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

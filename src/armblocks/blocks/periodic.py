@@ -22,7 +22,6 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     made,
     parameter,
     shape_of,
@@ -69,6 +68,7 @@ class FirstOrderHold(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "First Order Hold"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine, sampled every second, as straight lines from sample to sample, one second late.",
         parameters={"method": "interpolation", "period": 1.0},
@@ -87,9 +87,6 @@ class FirstOrderHold(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the straight lines"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}

@@ -22,7 +22,6 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     made,
     parameter,
     shape_of,
@@ -157,9 +156,6 @@ class InterpolationUsingPrelookup(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         shape = shape_of(self.table)
         entries = flatten(p["table"], shape)
@@ -209,9 +205,6 @@ class DirectLookup(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the entry"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         shape = shape_of(self.table)

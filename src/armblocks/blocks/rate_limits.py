@@ -13,7 +13,6 @@ from typing import ClassVar
 from casadi import SX, fabs, fmax, if_else, logic_and, logic_or
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.switching import JUST
 from armblocks.diagram import (
     Block,
@@ -24,10 +23,8 @@ from armblocks.diagram import (
     Signals,
     State,
     WorkedExample,
-    broadcast,
     made,
     parameter,
-    shape_of,
 )
 from armblocks.equations import Shape
 
@@ -45,6 +42,7 @@ class RateLimiterContinuous(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Rate Limiter (continuous)"
+    spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine of which the rise is limited to 0.5 a second and the fall to 0.8.",
@@ -65,10 +63,6 @@ class RateLimiterContinuous(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        own = parameters_shape(self, "rising", "falling", "initial")
-        return {"y": broadcast({**inputs, "a parameter": own})}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -111,6 +105,7 @@ class RateLimiterDynamic(Block):
 
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Rate Limiter Dynamic"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine that may rise faster and faster, and fall by 0.8 a second.",
@@ -133,9 +128,6 @@ class RateLimiterDynamic(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}

@@ -49,6 +49,7 @@ def check_joint_values(block: Block, robot: Robot, name: str) -> None:
     if shape not in ((), (robot.n,)):
         raise InputError(
             f"{name} has {shape[0]} joints",
-            where=block.type_name(),
+            where=f"{block.type_name()}.{name}",
             allowed=f"{robot.n}, as '{robot.name}' has, or one number for all",
+            fix="give one number for each joint of the robot",
         )

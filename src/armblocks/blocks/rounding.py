@@ -79,9 +79,6 @@ class Rounding(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "integers"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": inputs["u"]}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
@@ -139,9 +136,6 @@ class Modulo(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the remainder"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}

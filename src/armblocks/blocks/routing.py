@@ -37,7 +37,11 @@ class Mux(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         for name, shape in inputs.items():
             if len(shape) > 1:
-                raise InputError(f"'{name}' has shape {shape}", allowed="scalars and vectors")
+                raise InputError(
+                    f"'{name}' has shape {shape}",
+                    allowed="scalars and vectors",
+                    fix="put a Reshape before it, or take a MatrixConcatenate",
+                )
         return {"y": (sum(math.prod(shape) for shape in inputs.values()),)}
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:

@@ -324,9 +324,6 @@ class ManualSwitch(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the chosen input"),)
 
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast(inputs)}
-
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}
 

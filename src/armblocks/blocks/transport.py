@@ -40,6 +40,7 @@ class TransportDelay(Block):
 
     family: ClassVar[str] = "continuous"
     title: ClassVar[str] = "Transport Delay"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A step and a sine, both one second later.",
@@ -54,9 +55,6 @@ class TransportDelay(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the input some time ago"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": broadcast({**inputs, "initial": shape_of(self.initial)})}
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}

@@ -12,8 +12,9 @@ from typing import Any, ClassVar, Self
 from casadi import SX
 
 from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formula_value
-from armblocks.diagram.parameter import Parameter, Value
+from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View
+from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 from armblocks.errors import UnknownNameError
@@ -80,6 +81,8 @@ class Block(ABC):
     states ``port?`` of the inputs, as they are at the tick, and says what those of the outputs become."""
     virtual: ClassVar[bool] = False
     """Whether the block stands for wires only: it has no equations and is gone before a diagram is traced."""
+    spreads: ClassVar[tuple[str, ...]] = ()
+    """Array parameters whose shape the outputs share with the inputs, scalars spreading over it."""
     rated_inputs: ClassVar[tuple[str, ...]] = ()
     """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
     example: ClassVar[WorkedExample] = WorkedExample()
@@ -228,9 +231,17 @@ class Block(ABC):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         """Shapes of those outputs whose port does not state one, given the shapes of all inputs.
 
-        Raises ``InputError`` where the inputs do not fit together.
+        Unless a block says otherwise, that is the common shape of the inputs without a stated one and of the
+        parameters in ``spreads``. Raises ``InputError`` where they do not fit together.
         """
-        return {}
+        ends = [port.name for port in self.output_ports() if port.shape is None]
+        if self.virtual or not ends:
+            return {}
+        own = {port.name for port in self.input_ports() if port.shape is not None}
+        wide = {name: shape for name, shape in inputs.items() if name not in own}
+        for name in self.spreads:
+            wide[f"parameter {name}" if name in wide else name] = shape_of(self.parameter_value(name))
+        return dict.fromkeys(ends, broadcast(wide))
 
     def assumed_output_shapes(self) -> Shapes:
         """Shapes to assume for outputs in a loop, before the inputs are known (an integrator's start value).

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
-from armblocks.diagram.block import Shapes
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
 
-def broadcast(shapes: Shapes) -> Shape:
+def broadcast(shapes: Mapping[str, Shape]) -> Shape:
     """The shape of an elementwise result: scalars (and single elements) spread over the others, as in
     Simulink; all others must agree.
 
