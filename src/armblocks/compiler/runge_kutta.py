@@ -38,10 +38,11 @@ CRAWL_EVERY, CRAWL_BACK = 64, 8
 """Steps between two looks (a power of two), and how many looks each takes back that finds nothing wrong."""
 CRAWL_LOOKS = {True: 2048, False: 512}
 """Looks that make a run crawl, for explicit methods and others: some tenths of a second."""
-CRAWL_CHANGE, RESOLVED = 1000.0, 0.01
+CRAWL_CHANGE, RESOLVED = 1000.0, 4.0
 """What a step that is short for good reason changes at least, in tolerances: ``h |f(end) - f(start)|``. A
 jump of ``f`` passes where it is below 1 over the least weight of the error, some hundreds; a smooth solution
-of rate L changes by ``(h L)^2 / rtol``, and ``RESOLVED`` is less than the least such square."""
+of rate L changes by ``(h L)^2 / rtol``, where the error makes ``(h L)^2`` about 10 to 50 times
+``rtol^(2/(q + 1))`` for a method whose error is of order q; ``RESOLVED`` is less."""
 MOST_STEPS = 1e8
 """A run that crawls is ended where it has more steps than these before it."""
 
@@ -366,9 +367,7 @@ class Loop:
         is within the tolerance, however good the method is. The same is seen where stability holds an
         explicit method short. Steps that an end or ``max_step`` cuts say nothing.
         """
-        w, step = self.w, self.step
-        crawl, change = self.counts[Count.CRAWL], [0.0] * (self.tableau.end_row + 1)
-        change[0], change[-1] = -1.0, 1.0
+        w, step, tableau, crawl = self.w, self.step, self.tableau, self.counts[Count.CRAWL]
         look, count, wrong, fine, on = (w.fresh(stem) for stem in ("crawl", "count", "wrong", "fine", "on"))
         turn = w.word_op("and", w.get(self.counts[Count.ACCEPTED], "i64"), str(CRAWL_EVERY - 1))
         w.branch(w.word_test("eq", turn, "0"), look, on)
@@ -377,13 +376,21 @@ class Loop:
         free = w.both(w.compare("olt", new_time, w.get(self.end)), w.compare("olt", h, self.max_step))
         w.branch(free, count, on)
         w.place(count)
-        resolved = w.divide(number_text(RESOLVED), w.get(w.at("%reals", Real.RTOL)))
-        enough = w.minimum(number_text(CRAWL_CHANGE), resolved)
-        w.branch(w.compare("olt", step.norm(h, tuple(change)), enough), wrong, fine)
+        # rtol^(2/(q+1) - 1), that is rtol^(-1/(q+1)) to the power q - 1
+        root = w.inverse_root(w.get(w.at("%reals", Real.RTOL)), tableau.error_order + 1)
+        power = number_text(RESOLVED)
+        for _ in range(tableau.error_order - 1):
+            power = w.multiply(power, root)
+        change = step.norm(h, _change(tableau.end_row))
+        if isinstance(tableau, ButcherTableau):
+            # A long step may span a whole period, at whose end all is as at its start.
+            middle = min(range(1, tableau.stages), key=lambda stage: abs(tableau.nodes[stage] - 0.5))
+            change = w.maximum(change, step.norm(h, _change(middle)))
+        w.branch(w.compare("olt", change, w.minimum(number_text(CRAWL_CHANGE), power)), wrong, fine)
         w.place(wrong)
         w.increase(crawl)
         far = w.compare("ogt", w.subtract(self.last_end, new_time), w.multiply(number_text(MOST_STEPS), h))
-        looks = CRAWL_LOOKS[isinstance(self.tableau, ButcherTableau)]
+        looks = CRAWL_LOOKS[isinstance(tableau, ButcherTableau)]
         long = w.word_test("sge", w.get(crawl, "i64"), str(looks))
         crawls = w.fresh("crawls")
         w.branch(w.both(far, long), crawls, on)
@@ -508,3 +515,8 @@ class Loop:
         w.put(w.get(w.at("%ends", segment)), self.end)
         w.put(w.get(w.at("%clamps", segment)), self.clamp)
         w.jump(self.on_start)
+
+
+def _change(row: int) -> Row:
+    """Weights of K that give what the derivative changed by from the step's start to a row."""
+    return (-1.0, *[0.0] * (row - 1), 1.0)
