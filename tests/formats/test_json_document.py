@@ -187,3 +187,9 @@ def test_random_text_is_read_or_refused(text: str) -> None:
         read(text)
     except FormatError as error:
         assert error.where.startswith("a.json")
+
+
+@pytest.mark.parametrize("text", ['{"a": NaN}', '{"a": 1e999}', '{"a": 1, "a": 2}', f'{{"a": {"1" * 30}}}'])
+def test_a_refused_value_says_its_line_and_what_to_do(text: str) -> None:
+    with pytest.raises(FormatError, match=r"d.json:1: .*Fix: correct that line\."):
+        read_document(text.encode(), "d.json", 1000)

@@ -117,7 +117,12 @@ def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPES
     Raises ``FormatError`` for anything that is not strict JSON, and for what passes the caps.
     """
     if len(data) > most_bytes:
-        raise FormatError("the document is too large", where=name, allowed=f"at most {most_bytes} bytes")
+        raise FormatError(
+            "the document is too large",
+            where=name,
+            allowed=f"at most {most_bytes} bytes",
+            fix="split it, or keep long tables in files of their own",
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -137,11 +142,15 @@ def read_document(data: bytes, name: str, most_bytes: int, deepest: int = DEEPES
         )
     except json.JSONDecodeError as error:
         raise FormatError(
-            f"the file is not valid JSON: {error.msg} (column {error.colno})", where=f"{name}:{error.lineno}"
+            f"the file is not valid JSON: {error.msg} (column {error.colno})",
+            where=f"{name}:{error.lineno}",
+            fix="correct that place: a comma, a bracket or a quote may be missing",
         ) from error
     except _RefusedError as refusal:
         line = _line_with(text, refusal.needle)
-        raise FormatError(refusal.what, where=f"{name}:{line}", allowed=refusal.allowed) from None
+        raise FormatError(
+            refusal.what, where=f"{name}:{line}", allowed=refusal.allowed, fix="correct that line"
+        ) from None
     root = Node(document, (), value)
     _check_text(root)
     return root
@@ -269,6 +278,7 @@ def _check_depth(document: Document, deepest: int) -> None:
                     "objects and arrays lie too deep in each other",
                     where=f"{document.name}:{line}",
                     allowed=f"{deepest} levels",
+                    fix="take levels out",
                 )
         elif token in "]}":
             depth -= 1
