@@ -4,6 +4,9 @@ import { lazy, Suspense } from 'react'
 import { Canvas } from './canvas/canvas'
 import { ConnectDialog } from './canvas/connect_dialog'
 import { BlockDialog } from './inspector/block_dialog'
+import { OpenDialog } from './documents/open_dialog'
+import { RecoveryDialog } from './documents/recovery_dialog'
+import { SaveDialog } from './documents/save_dialog'
 import { Palette } from './library/palette'
 import { QuickInsert } from './library/quick_insert'
 import { Notices } from './notices'
@@ -94,6 +97,9 @@ export function App() {
         </Suspense>
       )}
       <DropZone />
+      <SaveDialog />
+      <OpenDialog />
+      <RecoveryDialog />
       <Notices />
     </div>
   )

@@ -1,5 +1,6 @@
 import { Alert, Stack } from '@mantine/core'
 import { IconAlertTriangle } from '@tabler/icons-react'
+import { DiskNotice } from './documents/disk_notice'
 import { useStudio } from './store'
 
 /** What the server refused, and that the line is down: in words, with what to do. */
@@ -20,6 +21,7 @@ export function Notices() {
           Open the link that it printed in another tab: this one then goes on by itself, with what you did meanwhile.
         </Alert>
       )}
+      <DiskNotice />
       {notices.map(({ id, what, fix }) => (
         <Alert key={id} color="red" icon={<IconAlertTriangle />} title={what} withCloseButton closeButtonLabel="Dismiss" onClose={() => dismiss(id)}>
           {fix}

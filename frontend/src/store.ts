@@ -69,6 +69,8 @@ interface Studio {
   /** What the server has open, and what it offers to recover. */
   documents: DocumentState[]
   recoveries: Recovery[]
+  /** Whether this page has come back to what it showed: then it is not stopped by what others lost. */
+  returned: boolean
   welcome: EventOf<'welcome'> | null
   library: Map<string, BlockType>
   document: OpenDocument | null
@@ -85,6 +87,7 @@ export const useStudio = create<Studio>((set) => ({
   line: 'down',
   documents: [],
   recoveries: [],
+  returned: false,
   welcome: null,
   library: new Map(),
   document: null,
@@ -134,9 +137,8 @@ function receive(event: ServerEvent): void {
         welcome: event,
         library: new Map(event.library.map((kind) => [kind.type, kind])),
         documents: event.documents,
-        recoveries: event.recoveries,
       })
-      void showAgain(event)
+      void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
       attachAgain()
       break
     }
@@ -239,6 +241,7 @@ async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
     const { document, inside, path, example } = last
     const found = await ask<string>({ kind: 'attach', document, inside, path, example })
     if (found !== undefined) {
+      useStudio.setState({ returned: true })
       line.resend()
       return
     }

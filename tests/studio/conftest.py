@@ -61,8 +61,16 @@ class Studio:
             said += line
             if found := re.search(r"http://127\.0\.0\.1:\d+/login\?key=\S+", line):
                 self.link = found.group()
+                self.address = self.link.partition("login")[0]
                 return
         raise AssertionError(f"the studio did not start: {said}")
+
+    def kill(self) -> None:
+        """End it as a crash does: nothing of it is asked."""
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
 
     def stop(self) -> None:
         """End it with Ctrl-C, as a user does."""

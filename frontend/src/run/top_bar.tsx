@@ -1,10 +1,9 @@
-import { ActionIcon, Badge, Button, Group, Menu, NumberInput, Select, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Badge, Button, Group, NumberInput, Select, Text, Tooltip } from '@mantine/core'
 import {
   IconArrowBackUp,
   IconArrowForwardUp,
   IconDeviceFloppy,
   IconLayoutDistributeHorizontal,
-  IconMenu2,
   IconPlayerPauseFilled,
   IconPlayerPlayFilled,
   IconPlayerSkipBackFilled,
@@ -14,8 +13,10 @@ import {
   IconSettings,
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
+import { save, show } from '../documents/dialogs'
+import { FileMenu } from '../documents/file_menu'
+import { DocumentTitle } from '../documents/title'
 import { openQuickInsert } from '../library/quick_insert'
-import { useDesk } from '../robot/editor/desk'
 import { alter, ask, change, useStudio } from '../store'
 import { openConfiguration } from './configuration'
 import { stepCursor, useCursor } from './cursor'
@@ -32,14 +33,6 @@ async function run(speed: string): Promise<void> {
   useCursor.setState({ time: null, playing: false })
   const { tried } = useRuns.getState()
   await ask({ kind: 'run', document: document.state.document, speed: speed ? Number(speed) : null, tuned: tried })
-}
-
-/** Save under the present name; asks for one where there is none. */
-export async function save(): Promise<void> {
-  const { document } = useStudio.getState()
-  if (!document) return
-  const path = document.state.path ?? window.prompt('Save as (a file of this folder)', `${document.name}.json`)
-  if (path) await ask({ kind: 'save', document: document.state.document, path })
 }
 
 let speed = ''
@@ -62,6 +55,8 @@ export function TopBar() {
       const pressed = event.key.toLowerCase()
       if (pressed === 'enter') start()
       else if (pressed === 'e') openConfiguration()
+      else if (pressed === 'o') show('open')
+      else if (pressed === 's' && event.shiftKey) show('save_as')
       else if (pressed === 's') void save()
       else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) alter('undo')
       else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) alter('redo')
@@ -76,10 +71,7 @@ export function TopBar() {
   return (
     <header className="top-bar">
       <FileMenu />
-      <Text fw={600} className="title" title={document?.description}>
-        {document?.state.title ?? 'armblocks'}
-        {document?.state.dirty && <span aria-label="changed"> •</span>}
-      </Text>
+      <DocumentTitle />
       <Group gap={2} role="group" aria-label="Edit">
         <Tool label={document?.state.undo ? `Undo ${document.state.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!document?.state.undo} onClick={() => alter('undo')} />
         <Tool label={document?.state.redo ? `Redo ${document.state.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!document?.state.redo} onClick={() => alter('redo')} />
@@ -135,63 +127,6 @@ function Tool({ label, icon: Icon, disabled, onClick }: { label: string; icon: R
         <Icon size={17} />
       </ActionIcon>
     </Tooltip>
-  )
-}
-
-/** Robots that are open in the editor, saved or not. */
-function OpenRobots() {
-  const open = Object.values(useDesk((s) => s.robots))
-  if (!open.length) return null
-  return (
-    <>
-      <Menu.Label>Open robots</Menu.Label>
-      {open.map(({ robot, name, path }) => (
-        <Menu.Item key={robot} onClick={() => void ask({ kind: 'robot_attach', robot })}>
-          {name} <span className="unit">{path ?? 'not saved'}</span>
-        </Menu.Item>
-      ))}
-    </>
-  )
-}
-
-function FileMenu() {
-  const welcome = useStudio((s) => s.welcome)
-  const diagrams = welcome?.files ?? []
-  return (
-    <Menu position="bottom-start" shadow="md" width={320}>
-      <Menu.Target>
-        <ActionIcon variant="subtle" color="gray" aria-label="Menu">
-          <IconMenu2 size={18} />
-        </ActionIcon>
-      </Menu.Target>
-      <Menu.Dropdown mah="80vh" style={{ overflow: 'auto' }}>
-        <Menu.Item onClick={() => void ask({ kind: 'new' })}>New diagram</Menu.Item>
-        <Menu.Item onClick={() => void ask({ kind: 'robot_open' })}>New robot</Menu.Item>
-        <Menu.Label>Files of this folder</Menu.Label>
-        {diagrams.length === 0 && <Menu.Item disabled>none</Menu.Item>}
-        {diagrams.slice(0, 30).map((path) => (
-          <Menu.Item key={path} onClick={() => void ask({ kind: 'open', path })}>
-            {path}
-          </Menu.Item>
-        ))}
-        <OpenRobots />
-        <Menu.Label>Robots</Menu.Label>
-        {(welcome?.robots ?? []).map((shipped) => (
-          <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>
-            {shipped}
-          </Menu.Item>
-        ))}
-        <Menu.Label>Examples</Menu.Label>
-        {Object.entries(welcome?.examples ?? {}).map(([example, description]) => (
-          <Menu.Item key={example} onClick={() => void ask({ kind: 'open', example })}>
-            {example}
-            <Text size="xs" c="dimmed">
-              {description}
-            </Text>
-          </Menu.Item>
-        ))}
-      </Menu.Dropdown>
-    </Menu>
   )
 }
 

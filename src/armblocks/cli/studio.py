@@ -22,6 +22,10 @@ def studio(
     port: Annotated[
         int, typer.Option(help="Port on this machine; 0 takes a free one.", min=0, max=65535)
     ] = 0,
+    new_session: Annotated[
+        bool,
+        typer.Option("--new-session", help="Let no page of an earlier start go on without the new link."),
+    ] = False,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
     """Open the studio in the browser: build a diagram, run it, watch scopes and arm. Ctrl-C ends it."""
@@ -46,4 +50,4 @@ def studio(
         console.print(f"The studio is at {link}", soft_wrap=True, highlight=False)
         console.print("The link is good for one visit. Ctrl-C ends the studio.")
 
-    serve(root, model, port=port, open_browser=browser, announce=announce)
+    serve(root, model, port=port, open_browser=browser, announce=announce, afresh=new_session)

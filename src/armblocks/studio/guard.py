@@ -50,15 +50,15 @@ SECURITY_HEADERS: tuple[tuple[bytes, bytes], ...] = (
 
 
 class Keys:
-    """The secrets of one server: made at its start, never written anywhere.
+    """The secrets of one server, made at its start.
 
     ``token`` opens everything as a bearer; ``login`` is good for one visit, which it turns into the cookie
-    ``session``.
+    ``session``. A ``session`` that is given is that of a server before this one, whose pages are to go on.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, session: str = "") -> None:
         self.token = secrets.token_urlsafe(32)
-        self.session = secrets.token_urlsafe(32)
+        self.session = session or secrets.token_urlsafe(32)
         self.cookie_name = f"armblocks-{port}"
         self._login: str | None = None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import webbrowser
 from collections.abc import Callable
@@ -12,26 +13,36 @@ from armblocks.errors import InputError
 from armblocks.studio.guard import Keys
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.server import built_page, studio_app
+from armblocks.studio.state_folder import StateFolder
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 MOST_MESSAGE_BYTES = 8 * 2**20
 
 
 def serve(
-    folder: str | Path, model: str, *, port: int, open_browser: bool, announce: Callable[[str], None]
+    folder: str | Path,
+    model: str,
+    *,
+    port: int,
+    open_browser: bool,
+    announce: Callable[[str], None],
+    afresh: bool = False,
 ) -> None:
     """Serve until Ctrl-C. ``announce`` gets the login link. ``port`` 0 takes a free one.
 
-    Only this machine can reach it: the socket is bound to 127.0.0.1. Raises ``InputError`` where the port is
-    taken, ``FormatError`` where the page was not built.
+    With ``port`` 0 the port of the server that was in this folder last is tried first, and pages of that
+    server go on with this one, unless ``afresh``. Only this machine can reach it: the socket is bound to
+    127.0.0.1. Raises ``InputError`` where the port is taken, ``FormatError`` where the page was not built.
     """
     import uvicorn
 
     web = built_page()
     project = ProjectFolder(folder)
-    listener = _listener(port)
+    kept = StateFolder(project.root)
+    listener = _listener_as_before(kept) if port == 0 and not afresh else None
+    listener = listener or _listener(port)
     taken: int = listener.getsockname()[1]
-    keys = Keys(taken)
+    keys = Keys(taken, kept.begin_session(taken, afresh=afresh).secret)
     app = studio_app(project, keys, frozenset(f"{host}:{taken}" for host in LOOPBACK), web)
     fragment = f"#{quote(model)}" if model else ""
     link = f"http://127.0.0.1:{taken}/login?key={keys.new_login()}{fragment}"
@@ -48,6 +59,15 @@ def serve(
         timeout_graceful_shutdown=1,
     )
     uvicorn.Server(config).run(sockets=[listener])
+
+
+def _listener_as_before(kept: StateFolder) -> socket.socket | None:
+    """The port at which pages of the server before this one still ask, where it is free."""
+    last = kept.session()
+    if last is not None:
+        with contextlib.suppress(InputError):
+            return _listener(last.port)
+    return None
 
 
 def _listener(port: int) -> socket.socket:

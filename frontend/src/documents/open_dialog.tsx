@@ -1,0 +1,92 @@
+import { Badge, Modal, NavLink, ScrollArea, Stack, Text, TextInput } from '@mantine/core'
+import { IconFile, IconHistory, IconPencil } from '@tabler/icons-react'
+import { useEffect, useState } from 'react'
+import type { Request } from '../connection'
+import { ask, useStudio } from '../store'
+import { projectFiles, show, useDialogs } from './dialogs'
+
+/** Open: what is open now, what was used last, and every file of the project folder. */
+export function OpenDialog() {
+  const opened = useDialogs((s) => s.open === 'open')
+  const times = useDialogs((s) => s.times)
+  return (
+    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Open" size="lg">
+      <Choice key={times} />
+    </Modal>
+  )
+}
+
+function Choice() {
+  const documents = useStudio((s) => s.documents)
+  const here = useStudio((s) => s.document?.state.document)
+  const [found, setFound] = useState<{ files: string[]; recent: string[] } | null>(null)
+  const [typed, setTyped] = useState('')
+  useEffect(() => void projectFiles().then(setFound), [])
+  const fits = (name: string) => name.toLowerCase().includes(typed.trim().toLowerCase())
+  const go = (request: Request) => {
+    show(null)
+    void ask(request)
+  }
+  const open = documents.filter((entry) => entry.document !== here && fits(entry.path ?? entry.title))
+  const recent = found?.recent.filter(fits) ?? []
+  const files = found?.files.filter((file) => fits(file) && !recent.includes(file)) ?? []
+  const first: Request | undefined = open[0]
+    ? { kind: 'attach', document: open[0].document }
+    : (recent[0] ?? files[0]) !== undefined
+      ? { kind: 'open', path: recent[0] ?? files[0] }
+      : undefined
+
+  return (
+    <Stack gap="xs">
+      <TextInput
+        aria-label="Search the files"
+        placeholder="Search the files"
+        data-autofocus
+        value={typed}
+        onChange={(event) => setTyped(event.currentTarget.value)}
+        onKeyDown={(event) => {
+          if (event.key === 'Enter' && first) go(first)
+        }}
+      />
+      <ScrollArea.Autosize mah="55vh" type="auto">
+        <Part title="Open now">
+          {open.map((entry) => (
+            <NavLink
+              key={entry.document}
+              component="button"
+              leftSection={<IconPencil size={15} />}
+              label={entry.path ?? entry.title}
+              rightSection={entry.dirty && <Badge variant="light" color="gray">not saved</Badge>}
+              onClick={() => go({ kind: 'attach', document: entry.document })}
+            />
+          ))}
+        </Part>
+        <Part title="Used last">
+          {recent.map((path) => (
+            <NavLink key={path} component="button" leftSection={<IconHistory size={15} />} label={path} onClick={() => go({ kind: 'open', path })} />
+          ))}
+        </Part>
+        <Part title="Files of this folder">
+          {files.map((path) => (
+            <NavLink key={path} component="button" leftSection={<IconFile size={15} />} label={path} onClick={() => go({ kind: 'open', path })} />
+          ))}
+        </Part>
+        {found && !open.length && !recent.length && !files.length && (
+          <p className="empty">{typed ? 'No file has such a name.' : 'This folder has no models yet: save one, or begin with an example.'}</p>
+        )}
+      </ScrollArea.Autosize>
+    </Stack>
+  )
+}
+
+function Part({ title, children }: { title: string; children: React.ReactNode[] }) {
+  if (!children.length) return null
+  return (
+    <section>
+      <Text size="xs" c="dimmed" fw={600} mt="xs" mb={2}>
+        {title}
+      </Text>
+      {children}
+    </section>
+  )
+}

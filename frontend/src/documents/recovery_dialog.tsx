@@ -1,0 +1,95 @@
+import { Badge, Button, Card, Group, Modal, Stack, Text } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import type { Recovery } from '../protocol'
+import { ask, useStudio } from '../store'
+import { show, useDialogs } from './dialogs'
+
+const when = (seconds: number) =>
+  new Date(1000 * seconds).toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'short' })
+
+const counted = (count: number, thing: string) => `${count} ${thing}${count === 1 ? '' : 's'}`
+
+/** What was drawn and not saved when the studio ended: offered when a page comes, and from the menu later. */
+export function RecoveryDialog() {
+  const recoveries = useStudio((s) => s.recoveries)
+  const opened = useDialogs((s) => s.open === 'recovery')
+  const [offered, setOffered] = useState(false)
+  useEffect(() => {
+    if (recoveries.length && !offered) {
+      setOffered(true)
+      if (!useStudio.getState().returned) show('recovery')
+    }
+    if (!recoveries.length && useDialogs.getState().open === 'recovery') show(null)
+  }, [recoveries, offered])
+  return (
+    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Drawings that were not saved" size="lg">
+      <Stack gap="sm">
+        <Text size="sm" c="dimmed">
+          The studio ended before these were saved; its journal has kept them. No file has been changed. What you leave for later
+          stays in the menu.
+        </Text>
+        {recoveries.map((recovery) => (
+          <Offer key={recovery.document} recovery={recovery} />
+        ))}
+      </Stack>
+    </Modal>
+  )
+}
+
+function Offer({ recovery }: { recovery: Recovery }) {
+  const [sure, setSure] = useState(false)
+  const { document, title, path, began, last, edits, blocks, disk, missing } = recovery
+  const act = (action: 'open' | 'keep_both' | 'discard') => {
+    if (action !== 'discard' && useStudio.getState().recoveries.length === 1) show(null)
+    void ask({ kind: 'recover', document, action })
+  }
+  return (
+    <Card withBorder padding="sm">
+      <Group justify="space-between" align="flex-start" wrap="nowrap">
+        <div>
+          <Text fw={600}>{path ?? `${title}, never saved`}</Text>
+          <Text size="sm">
+            {counted(edits, 'edit')} from {when(began)} to {when(last)}; {counted(blocks, 'block')}
+          </Text>
+        </div>
+        {disk !== 'same' && (
+          <Badge color="yellow" variant="light">
+            {disk === 'gone' ? 'the file is gone' : 'the file is newer'}
+          </Badge>
+        )}
+      </Group>
+      {disk === 'changed' && (
+        <Text size="sm" mt={6}>
+          Somebody has written {path} since. Keep both saves the recovered drawing as a file of its own beside it.
+        </Text>
+      )}
+      {missing && (
+        <Text size="sm" mt={6} c="var(--error)">
+          {missing}
+        </Text>
+      )}
+      <Group gap="xs" mt="sm" justify="flex-end">
+        <Button variant="subtle" color="red" onClick={() => (sure ? act('discard') : setSure(true))} onBlur={() => setSure(false)}>
+          {sure ? 'Discard for good' : 'Discard'}
+        </Button>
+        {disk === 'changed' ? (
+          <>
+            <Button variant="default" onClick={() => act('open')}>
+              Open
+            </Button>
+            <Button onClick={() => act('keep_both')}>Keep both</Button>
+          </>
+        ) : (
+          <>
+            {path && (
+              <Button variant="default" onClick={() => act('keep_both')}>
+                Keep both
+              </Button>
+            )}
+            <Button onClick={() => act('open')}>Open</Button>
+          </>
+        )}
+      </Group>
+    </Card>
+  )
+}

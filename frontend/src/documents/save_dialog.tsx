@@ -1,0 +1,84 @@
+import { Alert, Autocomplete, Button, Group, Modal, Stack, Text } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { Refusal } from '../connection'
+import { line, useStudio } from '../store'
+import { projectFiles, show, useDialogs } from './dialogs'
+
+const named = (typed: string) => (/\.json$/i.test(typed.trim()) ? typed.trim() : `${typed.trim()}.json`)
+
+/** Save as: a name in the project folder; a file that is there is only overwritten when told so. */
+export function SaveDialog() {
+  const opened = useDialogs((s) => s.open === 'save_as')
+  const times = useDialogs((s) => s.times)
+  return (
+    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Save as" size="md">
+      <SaveAs key={times} />
+    </Modal>
+  )
+}
+
+function SaveAs() {
+  const document = useStudio((s) => s.document)
+  const [typed, setTyped] = useState(document?.state.path ?? `${document?.state.title ?? 'untitled'}.json`)
+  const [files, setFiles] = useState<string[]>([])
+  const [fault, setFault] = useState<Refusal | null>(null)
+  useEffect(() => void projectFiles().then((found) => setFiles(found.files.filter((file) => file.endsWith('.json')))), [])
+  if (!document) return null
+  const path = named(typed)
+  const taken = files.includes(path) && path !== document.state.path
+
+  const save = async () => {
+    try {
+      await line.ask({ kind: 'save', document: document.state.document, path, overwrite: taken })
+      show(null)
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error
+      setFault(error)
+      setFiles((await projectFiles()).files)
+    }
+  }
+
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault()
+        void save()
+      }}
+    >
+      <Stack gap="sm">
+        <Autocomplete
+          label="File"
+          description="A name in the project folder; folders are made: models/arm.json"
+          data-autofocus
+          data={files}
+          limit={8}
+          comboboxProps={{ withinPortal: true }}
+          value={typed}
+          onChange={(value) => {
+            setTyped(value)
+            setFault(null)
+          }}
+          error={fault && !taken ? fault.what : undefined}
+        />
+        {fault && !taken && (
+          <Text size="xs" c="dimmed">
+            {fault.fix}
+          </Text>
+        )}
+        {taken && (
+          <Alert color="yellow" title={`${path} is there already`}>
+            What it holds is replaced by this drawing.
+          </Alert>
+        )}
+        <Group justify="flex-end" gap="xs">
+          <Button variant="default" onClick={() => show(null)}>
+            Cancel
+          </Button>
+          <Button type="submit" color={taken ? 'red' : undefined} disabled={!typed.trim()}>
+            {taken ? 'Overwrite' : 'Save'}
+          </Button>
+        </Group>
+      </Stack>
+    </form>
+  )
+}

@@ -1,0 +1,241 @@
+"""Documents in a real browser: saved, opened, changed from outside, found again after a crash."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
+
+from conftest import PATIENCE_MS, Studio
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Studio]]:
+    """The studio of all tests here; who kills it puts the next one in its place."""
+    servers = [Studio(tmp_path_factory.mktemp("project"))]
+    yield servers
+    servers[-1].stop()
+
+
+@pytest.fixture(scope="module")
+def context(browser: Browser, server: list[Studio]) -> Iterator[BrowserContext]:
+    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
+    context.set_default_timeout(PATIENCE_MS)
+    first = context.new_page()
+    first.goto(server[0].link)
+    first.locator(".react-flow__node").first.wait_for()
+    first.close()
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def page(context: BrowserContext, server: list[Studio]) -> Iterator[Page]:
+    """A page with an empty document. An error that the lost line does not explain fails the test."""
+    page = context.new_page()
+    faults: list[str] = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+    page.goto(server[-1].address)
+    page.locator(".react-flow__pane").wait_for()
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name="New diagram").click()
+    expect(page.get_by_text("Type to add a block")).to_be_visible()
+    yield page
+    page.close()
+    assert [said for said in faults if "ERR_CONNECTION_" not in said] == []
+
+
+def block(page: Page, name: str):
+    return page.locator(f'.react-flow__node[data-id="{name}"]')
+
+
+def add(page: Page, typed: str) -> None:
+    page.keyboard.press(typed[0])
+    box = page.get_by_role("textbox", name="Add a block")
+    box.press_sequentially(typed[1:])
+    box.press("Enter")
+    expect(box).to_be_hidden()
+
+
+def save_as(page: Page, path: str) -> None:
+    page.keyboard.press("Control+Shift+S")
+    page.get_by_role("combobox", name="File").fill(path)
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_role("dialog")).to_be_hidden()
+
+
+def names(path: Path) -> list[str]:
+    return sorted(json.loads(path.read_text())["blocks"])
+
+
+def edit_from_outside(path: Path) -> bytes:
+    """What another program writes to a model's file."""
+    path.write_text(json.dumps({**json.loads(path.read_text()), "description": "theirs"}))
+    return path.read_bytes()
+
+
+def test_save_as_asks_before_it_overwrites(page: Page, server: list[Studio]) -> None:
+    folder = server[-1].folder
+    add(page, "constant")
+    expect(page).to_have_title("• untitled – armblocks")
+    page.keyboard.press("Control+s")
+    field = page.get_by_role("combobox", name="File")
+    field.fill("a:b")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_text("is no path of the project")).to_be_visible()
+    field.fill("models/one")
+    field.press("Enter")
+    expect(page.locator(".title")).to_have_text("one")
+    expect(page).to_have_title("one – armblocks")
+    assert page.url.endswith("#models/one.json")
+    assert (folder / "models" / "one.json").is_file()
+    (folder / "theirs.json").write_text("{}")
+    page.keyboard.press("Control+Shift+S")
+    page.get_by_role("combobox", name="File").fill("theirs.json")
+    expect(page.get_by_text("theirs.json is there already")).to_be_visible()
+    page.get_by_role("button", name="Cancel").click()
+    assert (folder / "theirs.json").read_text() == "{}"
+    page.keyboard.press("Control+Shift+S")
+    page.get_by_role("combobox", name="File").fill("theirs.json")
+    page.get_by_role("button", name="Overwrite").click()
+    expect(page.locator(".title")).to_have_text("theirs")
+    page.keyboard.press("Control+o")
+    page.get_by_role("textbox", name="Search the files").fill("one")
+    page.get_by_role("dialog").get_by_text("models/one.json").click()
+    expect(page.locator(".title")).to_have_text("one")
+
+
+def test_a_file_that_changed_on_the_disk_is_told_and_chosen(page: Page, server: list[Studio]) -> None:
+    file = server[-1].folder / "shared.json"
+    add(page, "constant")
+    save_as(page, "shared.json")
+    add(page, "gain")
+    expect(block(page, "Gain")).to_be_visible()
+    edit_from_outside(file)
+    notice = page.get_by_text("shared.json has changed on the disk")
+    expect(notice).to_be_visible()
+    page.keyboard.press("Control+s")
+    expect(page.get_by_text("the file has changed on the disk since it was opened")).to_be_visible()
+    page.get_by_role("button", name="Dismiss").click()
+    page.get_by_role("button", name="Reload").click()
+    expect(notice).to_be_hidden()
+    expect(block(page, "Gain")).to_have_count(0)
+    page.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
+    page.keyboard.press("Control+z")
+    expect(block(page, "Gain")).to_be_visible()
+    file.write_text(file.read_text().replace("theirs", "theirs again"))
+    expect(notice).to_be_visible()
+    page.get_by_role("button", name="Keep mine").click()
+    expect(notice).to_be_hidden()
+    page.keyboard.press("Control+s")
+    expect(page.locator(".title")).to_have_text("shared")
+    expect(page).to_have_title("shared – armblocks")
+    assert "Gain" in names(file)
+
+
+class Line:
+    """The websocket of a page, on which the server's words can be held back."""
+
+    def __init__(self, page: Page) -> None:
+        self.held = False
+        self.waiting: list[str | bytes] = []
+        page.route_web_socket("**/ws", self._connect)
+
+    def _connect(self, line: WebSocketRoute) -> None:
+        self._page = line
+        server = line.connect_to_server()
+        line.on_message(server.send)
+        server.on_message(self._tell)
+
+    def _tell(self, said: str | bytes) -> None:
+        if self.held:
+            self.waiting.append(said)
+        else:
+            self._page.send(said)
+
+    def release(self) -> None:
+        self.held = False
+        for said in self.waiting:
+            self._page.send(said)
+
+
+def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
+    page: Page, context: BrowserContext
+) -> None:
+    add(page, "gain")
+    add(page, "integrator")
+    save_as(page, "two.json")
+    other = context.new_page()
+    line = Line(other)
+    other.goto(page.url)
+    expect(block(other, "Gain")).to_be_visible()
+    block(other, "Gain").click()
+    line.held = True
+    block(page, "Gain").click()
+    page.keyboard.press("ArrowDown")
+    other.keyboard.press("ArrowRight")  # of the place where Gain is not any more
+    page.wait_for_timeout(500)
+    line.release()
+    expect(other.get_by_text("what you changed was changed in another page meanwhile")).to_be_visible()
+    other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
+    add(other, "sum")
+    expect(block(page, "Sum")).to_be_visible()
+    places = "nodes => nodes.map(node => [node.dataset.id, node.style.transform]).sort()"
+    assert page.locator(".react-flow__node").evaluate_all(places) == other.locator(
+        ".react-flow__node"
+    ).evaluate_all(places)
+    other.close()
+
+
+def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, server: list[Studio]) -> None:
+    old = server[-1]
+    add(page, "sine wave")
+    expect(block(page, "Sine Wave")).to_be_visible()
+    old.kill()
+    expect(page.get_by_text("The studio does not answer")).to_be_visible(timeout=3000)
+    add(page, "gain")  # waits in the page
+    server.append(Studio(old.folder))
+    assert server[-1].address == old.address
+    expect(block(page, "Gain")).to_be_visible()
+    expect(page.get_by_text("The studio does not answer")).to_be_hidden()
+    expect(block(page, "Sine Wave")).to_be_visible()
+    page.reload()
+    expect(page.locator(".react-flow__node")).to_have_count(2)
+    page.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
+    page.keyboard.press("Control+z")
+    expect(block(page, "Gain")).to_have_count(0)
+    page.keyboard.press("Control+z")
+    expect(page.locator(".react-flow__node")).to_have_count(0)
+
+
+def test_a_page_that_comes_after_the_crash_is_offered_what_was_drawn(
+    page: Page, context: BrowserContext, server: list[Studio]
+) -> None:
+    folder = server[-1].folder
+    add(page, "constant")
+    save_as(page, "lost.json")
+    add(page, "gain")
+    expect(block(page, "Gain")).to_be_visible()
+    page.goto("about:blank")
+    server[-1].kill()
+    file = folder / "lost.json"
+    newer = edit_from_outside(file)
+    server.append(Studio(folder))
+    fresh = context.new_page()
+    fresh.goto(server[-1].address)
+    offer = fresh.get_by_role("dialog")
+    expect(offer).to_contain_text("lost.json")
+    expect(offer).to_contain_text(re.compile("1 edit from .* to .*; 2 blocks"))
+    expect(offer).to_contain_text("the file is newer")
+    offer.get_by_role("button", name="Keep both").click()
+    expect(offer).to_be_hidden()
+    expect(fresh.locator(".title")).to_have_text(re.compile("^lost recovered 20"))
+    assert file.read_bytes() == newer
+    (kept,) = folder.glob("lost recovered *.json")
+    assert names(kept) == ["Constant", "Gain"]
+    fresh.close()
