@@ -239,12 +239,13 @@ async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
   const last = shown ? { ...shown.state, inside: shown.inside } : lastShown()
   if (last) {
     const { document, inside, path, example } = last
+    useStudio.setState({ returned: true })
     const found = await ask<string>({ kind: 'attach', document, inside, path, example })
     if (found !== undefined) {
-      useStudio.setState({ returned: true })
       line.resend()
       return
     }
+    useStudio.setState({ returned: false })
   }
   line.resend()
   if (!shown) await openFromAddress(welcome)

@@ -228,12 +228,13 @@ def test_a_page_that_comes_after_the_crash_is_offered_what_was_drawn(
     server.append(Studio(folder))
     fresh = context.new_page()
     fresh.goto(server[-1].address)
-    offer = fresh.get_by_role("dialog")
-    expect(offer).to_contain_text("lost.json")
+    offer = fresh.get_by_role("group", name="lost.json")
     expect(offer).to_contain_text(re.compile("1 edit from .* to .*; 2 blocks"))
     expect(offer).to_contain_text("the file is newer")
     offer.get_by_role("button", name="Keep both").click()
     expect(offer).to_be_hidden()
+    if fresh.get_by_role("dialog").count():
+        fresh.keyboard.press("Escape")  # other tests have left something too
     expect(fresh.locator(".title")).to_have_text(re.compile("^lost recovered 20"))
     assert file.read_bytes() == newer
     (kept,) = folder.glob("lost recovered *.json")

@@ -44,7 +44,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
     void ask({ kind: 'recover', document, action })
   }
   return (
-    <Card withBorder padding="sm">
+    <Card withBorder padding="sm" role="group" aria-label={path ?? title}>
       <Group justify="space-between" align="flex-start" wrap="nowrap">
         <div>
           <Text fw={600}>{path ?? `${title}, never saved`}</Text>
