@@ -190,6 +190,8 @@ def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
         ".react-flow__node"
     ).evaluate_all(places)
     other.close()
+    page.keyboard.press("Control+s")
+    expect(page).to_have_title("two – armblocks")
 
 
 def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, server: list[Studio]) -> None:
