@@ -83,6 +83,12 @@ export function FileMenu() {
             {path}
           </Menu.Item>
         ))}
+        <Menu.Label>Robots</Menu.Label>
+        {(welcome?.robots ?? []).map((shipped) => (
+          <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>
+            {shipped}
+          </Menu.Item>
+        ))}
         <Menu.Label>Examples</Menu.Label>
         {Object.entries(welcome?.examples ?? {}).map(([example, description]) => (
           <Menu.Item key={example} onClick={() => void ask({ kind: 'open', example })}>
