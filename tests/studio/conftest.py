@@ -86,8 +86,9 @@ class Studio:
             self.process.stdout.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    """One for each module: while it is there, its event loop keeps other tests from running one of theirs."""
     path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     assert path is not None, f"no browser: install one of {', '.join(BROWSERS)} (apt-get install chromium)"
     with sync_playwright() as playwright:
