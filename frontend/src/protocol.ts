@@ -858,6 +858,7 @@ export interface RunStarted {
     [k: string]: string;
   };
   tunables: Tunable[];
+  stride: number;
 }
 /**
  * One recorded signal of a run and where its numbers lie in the columns of a frame.

@@ -24,6 +24,8 @@ let versions = 0
 export class RunSamples {
   version = ++versions
   count = 0
+  /** How often the run has gone back. */
+  returns = 0
   time = new Float64Array(FIRST_ROOM)
   private data: Float64Array[]
   private readonly columns = new Map<string, Columns>()
@@ -69,6 +71,7 @@ export class RunSamples {
   /** Only the first samples are still true: the run has gone back. */
   truncate(count: number): void {
     this.count = Math.min(this.count, count)
+    this.returns++
     this.version = ++versions
   }
 

@@ -17,6 +17,8 @@ export interface KeptRun {
   name: string
   began: Date
   stopTime: number
+  /** Of so many recorded instants there are the extremes; 1: all. */
+  stride: number
   state: string
   solver: string
   reason: string
@@ -62,6 +64,7 @@ export function began(event: EventOf<'run_started'>): void {
       name: `Run ${++counted}`,
       began: new Date(),
       stopTime: event.stop_time,
+      stride: event.stride,
       state: 'running',
       solver: '',
       reason: '',

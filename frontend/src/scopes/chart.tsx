@@ -1,6 +1,7 @@
 import { ActionIcon, Menu } from '@mantine/core'
 import { IconDownload } from '@tabler/icons-react'
 import { useRef, useState } from 'react'
+import { useRuns } from '../run/runs'
 import { saveCsv, savePng, saveSvg } from './export'
 import { MeasureTable } from './measure_table'
 import { Plot, type PlotHandle } from './plot'
@@ -12,6 +13,7 @@ import { XyPlot } from './xy_plot'
 export function Chart({ title, traces, path = false, band }: { title: string; traces: Trace[]; path?: boolean; band?: number }) {
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
+  const stride = useRuns((s) => s.runs.at(-1)?.stride ?? 1)
   const handle = useRef<PlotHandle>(null)
   const names = shortened(traces.map(({ label }) => label))
   const figure = () => handle.current?.figure()
@@ -43,7 +45,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
             </ActionIcon>
           </Menu.Target>
           <Menu.Dropdown>
-            <Menu.Item onClick={() => saveCsv(title, traces)}>Samples as CSV</Menu.Item>
+            <Menu.Item onClick={() => saveCsv(title, traces)}>{stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV'}</Menu.Item>
             <Menu.Item onClick={() => figure() && void savePng(figure()!)}>Picture as PNG</Menu.Item>
             <Menu.Item onClick={() => figure() && saveSvg(figure()!)}>Picture as SVG</Menu.Item>
           </Menu.Dropdown>

@@ -7,7 +7,7 @@ import { useRuns } from '../run/runs'
 import { samples } from '../samples'
 import { aired, type Figure } from './figure'
 import { digits, reading, useUnits, type Reading } from './quantity'
-import { extremes, within, type Drawn, type Trace } from './trace'
+import { extremes, within, type Drawn, type Extremes, type Trace } from './trace'
 import { pan, shownWindow, useWindow, zoomBy, zoomTo } from './window'
 
 const FONT = '11px Inter Variable'
@@ -41,15 +41,18 @@ function axisReading(traces: Trace[], drawn: Drawn): Reading {
 }
 
 /** What there is to draw in a window: raw samples while few, else the extremes of each pixel. */
-function drawnOf(traces: Trace[], from: number, to: number, width: number): Drawn {
+function drawnOf(traces: Trace[], from: number, to: number, width: number, before: Extremes | undefined): { drawn: Drawn; extremes?: Extremes } {
   const found = traces.map(({ read }) => read() ?? { time: new Float64Array(0), values: new Float64Array(0) })
   const parts = found.map((one) => within(one, from, to))
-  if (parts.some(({ time }) => time.length > DENSE * width)) return extremes(found, from, to, width)
+  if (parts.some(({ time }) => time.length > DENSE * width)) {
+    const known = extremes(found, from, to, width, before)
+    return { drawn: known.drawn, extremes: known }
+  }
   const [first, ...others] = parts
-  if (!first) return [new Float64Array(0)]
+  if (!first) return { drawn: [new Float64Array(0)] }
   if (others.every(({ time }) => time.buffer === first.time.buffer && time.length === first.time.length && time.byteOffset === first.time.byteOffset))
-    return [first.time, ...parts.map(({ values }) => values)]
-  return uPlot.join(parts.map(({ time, values }) => [time, values] as uPlot.AlignedData)) as unknown as Drawn
+    return { drawn: [first.time, ...parts.map(({ values }) => values)] }
+  return { drawn: uPlot.join(parts.map(({ time, values }) => [time, values] as uPlot.AlignedData)) as unknown as Drawn }
 }
 
 function scaled(drawn: Drawn, factor: number): Drawn {
@@ -98,6 +101,8 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
       element,
     )
     const leave = listen(plot)
+    let known: Extremes | undefined
+    let returns = 0
     let seen = ''
     let lines = ''
     let frameHandle = 0
@@ -109,7 +114,11 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
       const marks = `${useCursor.getState().time} ${String(useWindow.getState().cursors)} ${useRuns.getState().runs.at(-1)?.tunings.length}`
       if (now !== seen) {
         seen = now
-        const raw = drawnOf(shown, from, to, width)
+        // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
+        const made = drawnOf(shown, from, to, width, samples.returns === returns ? known : undefined)
+        const raw = made.drawn
+        known = made.extremes
+        returns = samples.returns
         const found = axisReading(shown, raw)
         unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
         drawn = scaled(raw, found.factor)

@@ -4,7 +4,7 @@ import { useMemo } from 'react'
 import type { ViewOf } from '../protocol'
 import { shownTime } from '../run/cursor'
 import { samples } from '../samples'
-import { useStudio, type RunView } from '../store'
+import { useStudio } from '../store'
 import { Chart } from './chart'
 import { useUnits } from './quantity'
 import { tracesOf } from './trace'
@@ -12,8 +12,10 @@ import { toggleCursors, useWindow, zoomBy } from './window'
 
 /** Every Scope and XY Graph of the run and every logged signal, side by side. */
 export function Scopes() {
-  const run = useStudio((s) => s.run)
-  const views = run?.views.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
+  // Not the whole run: where it stands changes sixty times a second.
+  const run = useStudio((s) => s.run?.run)
+  const all = useStudio((s) => s.run?.views)
+  const views = all?.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
   if (!run) return <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
   if (!views.length) return <p className="empty">The model has no Scope and no XY Graph, and no wire is logged: add a Scope, or click a wire and log it.</p>
   return (
@@ -21,19 +23,19 @@ export function Scopes() {
       <PlotTools />
       <div className="scopes">
         {views.map((view) => (
-          <ScopeChart key={`${run.run}${view.block}${view.signals.join()}`} run={run} view={view} />
+          <ScopeChart key={`${run}${view.block}${view.signals.join()}`} run={run} view={view} />
         ))}
       </div>
     </div>
   )
 }
 
-function ScopeChart({ run, view }: { run: RunView; view: ViewOf }) {
+function ScopeChart({ run, view }: { run: string; view: ViewOf }) {
   const traces = useMemo(
     () => tracesOf(samples, view.signals.map((name, k) => ({ path: `${view.block}/${name}`, label: view.labels[k] ?? '' }))),
     // The samples of a run are one object as long as it is on the screen.
     // eslint-disable-next-line react-hooks/exhaustive-deps
-    [run.run, view],
+    [run, view],
   )
   return <Chart title={view.title || view.block} traces={traces} path={view.kind === 'path'} />
 }

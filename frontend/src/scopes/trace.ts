@@ -52,23 +52,33 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
 /** The columns that a plot draws: a common row of instants, and for each trace its values there. */
 export type Drawn = [Float64Array, ...(Float64Array | (number | null | undefined)[])[]]
 
+/** The extremes of some traces in the stretches of a window, as far as they have been worked out. */
+export interface Extremes {
+  from: number
+  to: number
+  width: number
+  drawn: Drawn
+  /** Of each trace the row at which its last stretch begins: all before it stands. */
+  rows: number[]
+}
+
 /**
  * The least and the greatest value of each trace in each of `width` stretches of a window of time: no more points
- * than can be seen, and no peak is lost.
+ * than can be seen, and no peak is lost. What `before` knows of the same window is not looked at again.
  */
-export function extremes(traces: { time: Float64Array; values: Float64Array }[], from: number, to: number, width: number): Drawn {
+export function extremes(traces: { time: Float64Array; values: Float64Array }[], from: number, to: number, width: number, before?: Extremes): Extremes {
   const span = (to - from) / width
-  const time = new Float64Array(2 * width)
-  for (let k = 0; k < width; k++) {
-    time[2 * k] = from + (k + 0.25) * span
-    time[2 * k + 1] = from + (k + 0.75) * span
-  }
-  const columns = traces.map(({ time: at, values }) => {
-    const column: (number | undefined)[] = new Array<number | undefined>(2 * width).fill(undefined)
+  const known = before && before.from === from && before.to === to && before.width === width && before.rows.length === traces.length ? before : undefined
+  const time = known ? known.drawn[0] : new Float64Array(2 * width).map((_, k) => from + (Math.floor(k / 2) + (k % 2 ? 0.75 : 0.25)) * span)
+  const rows: number[] = []
+  const columns = traces.map(({ time: at, values }, trace) => {
+    const column = known ? (known.drawn[trace + 1] as (number | undefined)[]) : new Array<number | undefined>(2 * width).fill(undefined)
     // One sample beyond each side, so that a line leaves the window where it should.
-    let row = Math.max(firstAfter(at, from) - 1, 0)
+    let row = known ? known.rows[trace]! : Math.max(firstAfter(at, from) - 1, 0)
+    let begin = row
     const end = Math.min(firstAfter(at, to) + 1, at.length)
     while (row < end) {
+      begin = row
       const k = Math.min(Math.max(Math.floor((at[row]! - from) / span), 0), width - 1)
       const until = k === width - 1 ? Infinity : from + (k + 1) * span
       let low = row
@@ -81,9 +91,10 @@ export function extremes(traces: { time: Float64Array; values: Float64Array }[],
       column[2 * k] = values[Math.min(low, high)]
       column[2 * k + 1] = values[Math.max(low, high)]
     }
+    rows.push(begin)
     return column
   })
-  return [time, ...columns]
+  return { from, to, width, drawn: [time, ...columns], rows }
 }
 
 /** Samples of a trace in a window of time, as they were recorded, with one beyond each side. */

@@ -159,6 +159,11 @@ class Simulation:
         return self._stretches[-1].recorded if self._stretches else 0
 
     @property
+    def planned(self) -> int:
+        """How many instants the whole run records, if nothing ends it early."""
+        return self._plan.instants.count
+
+    @property
     def wall_time(self) -> float:
         """Time that the run has taken so far, without pauses, s."""
         return self._spent

@@ -23,3 +23,31 @@ def sample_frame(run: str, first: int, time: NDArray[np.float64], signals: NDArr
     header += b" " * (-(4 + len(header)) % 8)
     numbers = np.ascontiguousarray(np.concatenate([time[None, :], signals]), dtype="<f8")
     return len(header).to_bytes(4, "little") + header + numbers.tobytes()
+
+
+def thinned(
+    time: NDArray[np.float64], signals: NDArray[np.float64], stride: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Two samples in the place of every ``stride``: of each signal the least and the greatest, as they came.
+
+    ``time`` (N,) s and ``signals`` (ny, N) give rows that draw the same picture where a pixel is wider than a
+    stride. What does not fill a stride at the end is one too.
+    """
+    whole = time.size - time.size % stride
+    if whole == 0:
+        return (time, signals) if time.size <= 2 else _extremes(time, signals, time.size)
+    first = _extremes(time[:whole], signals[:, :whole], stride)
+    if whole == time.size:
+        return first
+    rest = thinned(time[whole:], signals[:, whole:], stride)
+    return np.concatenate([first[0], rest[0]]), np.concatenate([first[1], rest[1]], axis=1)
+
+
+def _extremes(
+    time: NDArray[np.float64], signals: NDArray[np.float64], stride: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    groups = signals.reshape(signals.shape[0], -1, stride)
+    places = np.sort(np.stack([groups.argmin(axis=2), groups.argmax(axis=2)], axis=2), axis=2)
+    values = np.take_along_axis(groups, places, axis=2)
+    times = time.reshape(-1, stride)[:, [0, stride // 2]]
+    return times.reshape(-1), values.reshape(signals.shape[0], -1)

@@ -562,6 +562,8 @@ class RunStarted(Message):
     views: list[ViewOf]
     aliases: dict[str, str]
     tunables: list[Tunable]
+    stride: int
+    """Of so many recorded instants the page gets the extremes of each signal, as two; 1: it gets all."""
 
 
 class RunTuned(Message):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
+import math
 import signal
 import sys
 from multiprocessing.connection import Connection
@@ -29,7 +30,7 @@ from armblocks.face.diagram_run import DiagramRun
 from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
 from armblocks.studio import messages as say
-from armblocks.studio.frames import sample_frame
+from armblocks.studio.frames import sample_frame, thinned
 from armblocks.studio.parameter_values import tuned_value
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.run_history import RunHistory
@@ -40,6 +41,8 @@ FRAME_SECONDS = 1 / 60
 MOST_MEMORY = 8 * 2**30
 """Bytes of address space of a worker."""
 MOST_CPU_SECONDS = 3600
+MOST_NUMBERS = 16_000_000
+"""Numbers of one run that a page is sent, 128 MB: of more, the extremes."""
 
 
 def work(pipe: Connection) -> None:
@@ -50,6 +53,12 @@ def work(pipe: Connection) -> None:
     with contextlib.suppress(EOFError, OSError):
         job = json.loads(pipe.recv_bytes())
         _Run(pipe, job).run()
+
+
+def stride_of(run: DiagramRun) -> int:
+    """Of how many instants a page gets the extremes: 1, which is all, unless they would fill its memory."""
+    numbers = run.simulation.planned * (1 + run.simulation.compiled.signals_layout.size)
+    return 1 if numbers <= MOST_NUMBERS else math.ceil(2 * numbers / MOST_NUMBERS)
 
 
 def _limit() -> None:
@@ -73,6 +82,9 @@ class _Run:
         self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
         self.time = 0.0
         self.count = 0
+        """How many recorded instants have been told."""
+        self.stride = 1
+        """Of so many instants a page gets the extremes only."""
         self.times: Array = np.empty(0)
         self.began = perf_counter()
         self.paced_from = (0.0, self.began)
@@ -102,6 +114,7 @@ class _Run:
         history = RunHistory(CompiledDiagram(diagram))
         for path, value in self.tuned.items():
             history.tune(path, tuned_value(value, path))
+        self.stride = stride_of(history.run)
         self._tell_start(history.run)
         self.began = perf_counter()
         self.paced_from = (0.0, self.began)
@@ -156,7 +169,8 @@ class _Run:
                 case "control", "back":
                     self._go_back(history, history.recorded - 1)
                 case "rewind", _:
-                    self._go_back(history, int(np.searchsorted(self.times, float(command["time"]), "right")))
+                    told = int(np.searchsorted(self.times, float(command["time"]), "right"))
+                    self._go_back(history, told if self.stride == 1 else told * self.stride // 2)
                 case "speed", _:
                     self.speed = command["speed"]
                     self.paced_from = (self.time, perf_counter())
@@ -182,8 +196,9 @@ class _Run:
         """Stand where at most so many instants are recorded; what is tuned holds from there on."""
         history.back_to(max(recorded, 1))
         self.count, self.time = history.recorded, history.run.time
-        self.times = self.times[: self.count]
-        self._tell(say.RunRewound(run=self.key, time=self.time, count=self.count))
+        told = self.count if self.stride == 1 else int(np.searchsorted(self.times, self.time, "right"))
+        self.times = self.times[:told]
+        self._tell(say.RunRewound(run=self.key, time=self.time, count=told))
         self._become("paused")
 
     # -- what the hub is told --------------------------------------------------------------------------------
@@ -214,22 +229,33 @@ class _Run:
                 ],
                 aliases=dict(compiled.aliases),
                 tunables=tunables(diagram),
+                stride=self.stride,
             )
         )
 
     def _send_samples(self, history: RunHistory) -> None:
         fresh = history.samples(self.count)
-        if fresh.time.size:
-            self.pipe.send_bytes(b"S" + sample_frame(self.key, fresh.begin, fresh.time, fresh.signals))
-            self.count = fresh.end
-            self.times = np.concatenate([self.times, fresh.time])
+        ready = fresh.time.size
+        if not history.run.finished:
+            ready -= ready % self.stride
+        if ready:
+            self._send(fresh.time[:ready], fresh.signals[:, :ready], last=history.run.finished)
         self.time = history.run.time
+
+    def _send(self, time: Array, signals: Array, *, last: bool) -> None:
+        self.count += time.size
+        if self.stride > 1:
+            ends = time[-1:], signals[:, -1:]
+            time, signals = thinned(time, signals, self.stride)
+            if last and time[-1] < ends[0][0]:
+                time, signals = np.append(time, ends[0]), np.append(signals, ends[1], axis=1)
+        self.pipe.send_bytes(b"S" + sample_frame(self.key, self.times.size, time, signals))
+        self.times = np.concatenate([self.times, time])
 
     def _send_rest(self, partial: object) -> None:
         """What is good of a run that failed."""
         if isinstance(partial, SimulationResult) and partial.time.size > self.count:
-            time, signals = partial.time[self.count :], partial.signals[:, self.count :]
-            self.pipe.send_bytes(b"S" + sample_frame(self.key, self.count, time, signals))
+            self._send(partial.time[self.count :], partial.signals[:, self.count :], last=True)
             self.time = float(partial.time[-1])
 
     def _progress(

@@ -1,0 +1,104 @@
+"""What a page gets of a run: all samples, or of very many the extremes."""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armblocks.blocks import BLOCKS
+from armblocks.face.model import CompiledDiagram
+from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
+from armblocks.studio import run_worker
+from armblocks.studio.frames import sample_frame, thinned
+
+Array = Any
+
+
+def read_frame(data: bytes) -> tuple[dict[str, Any], Array, Array]:
+    """Header, times and columns, read as the page reads them."""
+    length = struct.unpack("<I", data[:4])[0]
+    header = json.loads(data[4 : 4 + length])
+    assert (4 + length) % 8 == 0
+    numbers = np.frombuffer(data, "<f8", offset=4 + length).reshape(-1, header["count"])
+    return header, numbers[0], numbers[1:]
+
+
+def test_a_frame_says_what_went_in() -> None:
+    rng = np.random.default_rng(1)
+    time, signals = np.arange(5.0), rng.normal(size=(3, 5))
+    header, found_time, found = read_frame(sample_frame("ä", 7, time, signals))
+    assert header == {"run": "ä", "first": 7, "count": 5}
+    np.testing.assert_array_equal(found_time, time)
+    np.testing.assert_array_equal(found, signals)
+
+
+@given(st.integers(1, 60), st.integers(2, 9), st.integers(0, 2**32 - 1))
+def test_no_extreme_is_lost_and_time_goes_on(count: int, stride: int, seed: int) -> None:
+    time: Array = np.arange(count) * 0.1
+    signals = np.random.default_rng(seed).normal(size=(2, count))
+    few_time, few = thinned(time, signals, stride)
+    assert few.shape == (2, few_time.size)
+    assert few_time.size <= 2 * -(-count // stride)
+    assert np.all(np.diff(few_time) > 0)
+    for begin in range(0, count, stride):
+        part = slice(begin, begin + stride)
+        here = (few_time >= time[part][0]) & (few_time <= time[part][-1])
+        np.testing.assert_array_equal(few[:, here].min(axis=1), signals[:, part].min(axis=1))
+        np.testing.assert_array_equal(few[:, here].max(axis=1), signals[:, part].max(axis=1))
+
+
+class Pipe:
+    """The worker's end of a pipe on which nobody says anything."""
+
+    def __init__(self) -> None:
+        self.said: list[bytes] = []
+
+    def send_bytes(self, data: bytes) -> None:
+        self.said.append(data)
+
+    def poll(self, _: float) -> bool:
+        return False
+
+
+@pytest.mark.parametrize("most", [10**9, 4000])
+def test_a_long_run_sends_its_extremes_a_short_one_all(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_worker, "MOST_NUMBERS", most)
+    diagram = load_diagram("van_der_pol_pid", BLOCKS)
+    pipe = Pipe()
+    source = diagram_to_bytes(diagram, load_robot).decode()
+    job: dict[str, Any] = {
+        "run": "r",
+        "document": "d",
+        "speed": None,
+        "folder": ".",
+        "diagram": source,
+        "tuned": {},
+    }
+    run_worker._Run(pipe, job).run()  # pyright: ignore
+    events = [json.loads(data[1:]) for data in pipe.said if data[:1] == b"J"]
+    assert events[-1]["state"] == "done"
+    frames = [read_frame(data[1:]) for data in pipe.said if data[:1] == b"S"]
+    sent = 0
+    for header, _, _ in frames:
+        assert header["first"] == sent
+        sent += header["count"]
+    time = np.concatenate([frame[1] for frame in frames])
+    signals = np.concatenate([frame[2] for frame in frames], axis=1)
+    whole = CompiledDiagram(diagram).simulate()
+    if most == 10**9:
+        assert events[0]["stride"] == 1
+        np.testing.assert_array_equal(time, whole.time)
+        np.testing.assert_array_equal(signals, whole.signals)
+        return
+    assert events[0]["stride"] > 1
+    assert time.size * (1 + signals.shape[0]) < 1.1 * most
+    assert time[-1] == whole.time[-1]
+    np.testing.assert_array_equal(signals.max(axis=1), whole.signals.max(axis=1))
+    np.testing.assert_array_equal(signals.min(axis=1), whole.signals.min(axis=1))
+    np.testing.assert_array_equal(signals[:, -1], whole.signals[:, -1])
