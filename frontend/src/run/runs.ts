@@ -55,6 +55,14 @@ function update(key: string, change: (run: KeptRun) => Partial<KeptRun>): void {
 }
 
 export function began(event: EventOf<'run_started'>): void {
+  const known = useRuns.getState().runs.find(({ key }) => key === event.run)
+  if (known) {
+    // After a line that broke, the server tells of its run again, from the beginning.
+    known.samples.truncate(0)
+    showSamples(known.samples)
+    update(event.run, () => ({ state: 'running', tunings: [] }))
+    return
+  }
   const made = new RunSamples(event.run, event.channels, event.aliases)
   showSamples(made)
   useRuns.setState((s) => {
