@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
 PICTURES = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -32,7 +32,23 @@ def take(link: str, theme: str) -> None:
             slider.press("PageDown")
         page.wait_for_timeout(2000)
         page.screenshot(path=PICTURES / f"studio-{theme}.png")
+        take_editor(page, theme)
         browser.close()
+
+
+def take_editor(page: Page, theme: str) -> None:
+    """The robot editor with the Puma, its dynamics, and a joint that was moved."""
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name="puma560", exact=True).click()
+    editor = page.locator(".robot-editor")
+    editor.get_by_text("Dynamics", exact=True).click()
+    for joint, value in (("link2", "40"), ("link3", "-150"), ("link5", "50")):
+        editor.get_by_role("textbox", name=f"q of {joint} as a number").fill(value)
+    editor.get_by_role("region", name="Jacobian").wait_for(timeout=60_000)
+    editor.get_by_role("button", name="Show all of the arm").click()
+    page.mouse.move(5, 850)
+    page.wait_for_timeout(3000)
+    page.screenshot(path=PICTURES / f"robot-editor-{theme}.png")
 
 
 def main() -> None:

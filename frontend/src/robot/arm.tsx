@@ -45,25 +45,41 @@ export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
       group.matrixWorldNeedsUpdate = true
     })
   })
+  const first = ghost ? 1 : 0 // the base of a ghost is that of the arm
   return (
     <group name={ghost ? 'ghost' : 'arm'}>
-      {Array.from({ length: rows }, (_, row) => (
+      {Array.from({ length: rows - first }, (_, k) => k + first).map((row) => (
         <group key={row} ref={(group) => void (groups.current[row] = group)} matrixAutoUpdate={false}>
           {bodies
             .filter((body) => body.row === row)
-            .map((body, k) =>
-              ghost ? (
-                <mesh key={k} geometry={body.geometry} renderOrder={2}>
-                  <meshBasicMaterial color={ghost} transparent opacity={0.13} depthWrite={false} />
-                </mesh>
-              ) : (
-                <mesh key={k} geometry={body.geometry} castShadow receiveShadow>
-                  <meshStandardMaterial {...MATERIALS[body.material]} />
-                </mesh>
-              ),
-            )}
+            .map((body, k) => (ghost ? <GhostBody key={k} geometry={body.geometry} colour={ghost} /> : <SolidBody key={k} {...body} />))}
         </group>
       ))}
     </group>
+  )
+}
+
+function SolidBody({ geometry, material }: Body) {
+  return (
+    <mesh geometry={geometry} castShadow receiveShadow>
+      <meshStandardMaterial {...MATERIALS[material]} />
+    </mesh>
+  )
+}
+
+/** A ghost a little behind where it stands, so that it never shimmers through the arm itself. */
+const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }
+
+/** First the depth of a body, then its colour: bodies behind one another do not add up. */
+function GhostBody({ geometry, colour }: { geometry: BufferGeometry; colour: string }) {
+  return (
+    <>
+      <mesh geometry={geometry} renderOrder={1}>
+        <meshBasicMaterial colorWrite={false} transparent {...BEHIND} />
+      </mesh>
+      <mesh geometry={geometry} renderOrder={2}>
+        <meshLambertMaterial color={colour} transparent opacity={0.22} depthWrite={false} {...BEHIND} />
+      </mesh>
+    </>
   )
 }

@@ -41,10 +41,12 @@ interface CameraProps {
   scene: RobotScene
   poses: () => Poses | undefined
   floor: number
+  extent: (() => [number, number, number][]) | undefined
+  whole: string | undefined
   handle: React.RefObject<CameraHandle | null>
 }
 
-export function ViewCamera({ scene, poses, floor, handle }: CameraProps) {
+export function ViewCamera({ scene, poses, floor, extent, whole, handle }: CameraProps) {
   const controls = useRef<CameraControls>(null)
   const mounted = useRef(false)
   const touched = useRef(false)
@@ -66,10 +68,11 @@ export function ViewCamera({ scene, poses, floor, handle }: CameraProps) {
     if (!arm || !controls.current) return
     world.updateMatrixWorld(true)
     const corners = cornersOf(arm)
-    const box = new Box3().setFromPoints(corners)
-    if (box.isEmpty()) return
+    const box = new Box3()
+    const thick = 0.05 * scene.reach
+    for (const [x, y, z] of extent?.() ?? []) corners.push(new Vector3(x, y, z + thick), new Vector3(x, y, z - thick))
     corners.push(new Vector3(0, 0, floor))
-    box.expandByPoint(new Vector3(0, 0, floor))
+    box.setFromPoints(corners)
     const centre = box.getCenter(new Vector3())
     const d = direction.clone().normalize()
     const right = new Vector3(0, 0, 1).cross(d)
@@ -117,7 +120,7 @@ export function ViewCamera({ scene, poses, floor, handle }: CameraProps) {
   useEffect(() => {
     if (!touched.current) fit(new Vector3(...PRESETS.iso), false)
     // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [size.width, size.height, floor])
+  }, [size.width, size.height, floor, whole])
 
   // Another robot, or the first one: all of it is to be seen. Edits of a robot leave the camera where it is.
   useEffect(() => {

@@ -48,7 +48,7 @@ export function Frames({ scene, poses }: OverlayProps) {
     return (
       <Riding key={row} row={row} poses={poses}>
         {AXES.map((color, axis) => (
-          <Line key={axis} points={[[0, 0, 0], [0, 1, 2].map((k) => (k === axis ? size : 0)) as [number, number, number]]} color={color} lineWidth={2.4} depthTest={false} renderOrder={4} />
+          <Line toneMapped={false} key={axis} points={[[0, 0, 0], [0, 1, 2].map((k) => (k === axis ? size : 0)) as [number, number, number]]} color={color} lineWidth={2.4} depthTest={false} renderOrder={4} />
         ))}
       </Riding>
     )
@@ -62,7 +62,7 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
     return (
       <Riding key={joint.name} row={joint.carrier} poses={poses}>
         <Fixed at={joint.frame}>
-          <Line points={[[0, 0, -half], [0, 0, half]]} color={dark ? '#e8ebf0' : '#23211e'} lineWidth={1.2} dashed dashSize={0.03 * scene.reach} gapSize={0.015 * scene.reach} depthTest={false} renderOrder={3} />
+          <Line toneMapped={false} points={[[0, 0, -half], [0, 0, half]]} color={dark ? '#e8ebf0' : '#23211e'} lineWidth={1.2} dashed dashSize={0.03 * scene.reach} gapSize={0.015 * scene.reach} depthTest={false} renderOrder={3} />
         </Fixed>
       </Riding>
     )
@@ -87,12 +87,12 @@ function Range({ joint, poses, dark, reach }: { joint: SceneJoint; poses: () => 
       <>
         <Riding row={joint.carrier} poses={poses}>
           <Fixed at={joint.frame}>
-            <Line points={[[outer, 0, low], [outer, 0, high]]} color={colour} lineWidth={5} />
+            <Line toneMapped={false} points={[[outer, 0, low], [outer, 0, high]]} color={colour} lineWidth={5} />
           </Fixed>
         </Riding>
         <Riding row={joint.row} poses={poses}>
           <Fixed at={joint.moving}>
-            <Line points={[[inner, 0, 0], [1.2 * outer, 0, 0]]} color={hand} lineWidth={3} />
+            <Line toneMapped={false} points={[[inner, 0, 0], [1.2 * outer, 0, 0]]} color={hand} lineWidth={3} />
           </Fixed>
         </Riding>
       </>
@@ -103,16 +103,16 @@ function Range({ joint, poses, dark, reach }: { joint: SceneJoint; poses: () => 
         <Fixed at={joint.frame}>
           <mesh renderOrder={3}>
             <ringGeometry args={[inner, outer, 64, 1, low, Math.min(high - low, MOST_ARC)]} />
-            <meshBasicMaterial color={colour} transparent opacity={0.28} side={DoubleSide} depthWrite={false} />
+            <meshBasicMaterial toneMapped={false} color={colour} transparent opacity={0.28} side={DoubleSide} depthWrite={false} />
           </mesh>
           {[low, high].map((angle, k) => (
-            <Line key={k} points={[[inner * Math.cos(angle), inner * Math.sin(angle), 0], [outer * Math.cos(angle), outer * Math.sin(angle), 0]]} color={colour} lineWidth={2} />
+            <Line toneMapped={false} key={k} points={[[inner * Math.cos(angle), inner * Math.sin(angle), 0], [outer * Math.cos(angle), outer * Math.sin(angle), 0]]} color={colour} lineWidth={2} />
           ))}
         </Fixed>
       </Riding>
       <Riding row={joint.row} poses={poses}>
         <Fixed at={joint.moving}>
-          <Line points={[[inner, 0, 0.002 * reach], [1.08 * outer, 0, 0.002 * reach]]} color={hand} lineWidth={3} />
+          <Line toneMapped={false} points={[[inner, 0, 0.002 * reach], [1.08 * outer, 0, 0.002 * reach]]} color={hand} lineWidth={3} />
         </Fixed>
       </Riding>
     </>

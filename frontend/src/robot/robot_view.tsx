@@ -54,6 +54,7 @@ interface RunStageProps {
 /** The arm as the samples of the run say it at the time cursor. */
 function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
   const path = [...inside, block].join('/')
+  const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
   const has = useStudio((s) => Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)))
   const poses = useCallback(() => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest, [path, scene.rows, rest])
   const state = useCallback(() => `${samples.run} ${samples.version} ${shownTime()}`, [])
@@ -70,17 +71,20 @@ function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
   }, [path, scene.rows])
   const ghosts = useMemo<Ghosts>(
     () => ({
-      start: () => posesAt(path, scene.rows, 0),
-      goal: () => (useStudio.getState().run?.state === 'done' ? posesAt(path, scene.rows, samples.count - 1) : undefined),
+      // Where the arm itself stands there is no ghost.
+      start: () => (samples.indexAt(shownTime()) > 0 ? posesAt(path, scene.rows, 0) : undefined),
+      goal: () =>
+        useStudio.getState().run?.state === 'done' && samples.indexAt(shownTime()) < samples.count - 1 ? posesAt(path, scene.rows, samples.count - 1) : undefined,
     }),
     [path, scene.rows],
   )
+  const extent = useCallback(() => extentOf(path, scene.rows), [path, scene.rows])
   const drawing = useCallback(
     () => ask<string>({ kind: 'robot_picture', document, inside, block, q, theme: globalThis.document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light' }),
     [document, inside, block, q],
   )
   return (
-    <Stage scene={scene} poses={poses} state={state} way={way} ghosts={ghosts} drawing={drawing} {...(has ? { film: playOnce } : {})}>
+    <Stage scene={scene} poses={poses} state={state} way={way} ghosts={ghosts} extent={extent} whole={whole} drawing={drawing} {...(has ? { film: playOnce } : {})}>
       <Button label="Edit this robot" icon={IconEdit} onClick={() => void ask({ kind: 'robot_of_block', document, inside, block })} />
     </Stage>
   )
@@ -97,6 +101,21 @@ function poseSignal(path: string, rows: number): Float64Array[] | undefined {
 function posesAt(path: string, rows: number, index: number): Poses | undefined {
   const found = index < 0 ? undefined : poseSignal(path, rows)
   return found && index < (found[0]?.length ?? 0) ? (row, k) => found[16 * row + k]![index]! : undefined
+}
+
+const EXTENT_SAMPLES = 60
+
+/** Where the links go in all of the run, at instants spread over it. */
+function extentOf(path: string, rows: number): [number, number, number][] {
+  const found = poseSignal(path, rows)
+  if (!found || !samples.count) return []
+  const points: [number, number, number][] = []
+  const last = samples.count - 1
+  for (let k = 0; k <= EXTENT_SAMPLES; k++) {
+    const index = Math.round((last * k) / EXTENT_SAMPLES)
+    for (let row = 0; row < rows; row++) points.push([3, 7, 11].map((place) => found[16 * row + place]![index]!) as [number, number, number])
+  }
+  return points
 }
 
 /** Play the run from its start; done when it has come to its end, or is held. */

@@ -30,6 +30,10 @@ interface StageProps {
   state: () => string
   way?: () => Way | undefined
   ghosts?: Ghosts
+  /** Where the links go in all that is to be shown; the floor lies under it, and the view takes it in. */
+  extent?: () => [number, number, number][]
+  /** Changes when the extent is complete. */
+  whole?: string
   /** The drawing that stands in where there is no WebGL. */
   drawing: () => Promise<string | undefined>
   /** Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film. */
@@ -98,14 +102,14 @@ interface InsideProps extends StageProps {
   shot: React.RefObject<Shot | null>
 }
 
-function Inside({ scene, poses, state, way, ghosts, scheme, camera, shot }: InsideProps) {
+function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camera, shot }: InsideProps) {
   const options = useViewOptions()
   const bodies = useBodies(scene)
   const colours = COLOURS[scheme]
   const dark = scheme === 'dark'
   const { reach } = scene
   const foot = (poses()?.(0, 11) ?? 0) - scene.foot
-  const floor = useFloor(scene, poses, foot)
+  const floor = useFloor(scene, poses, foot, extent, whole)
   useDrawnWhenChanged(state)
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => invalidate(), [options, bodies, scheme, invalidate])
@@ -148,20 +152,25 @@ function Inside({ scene, poses, state, way, ghosts, scheme, camera, shot }: Insi
       {options.path && way && <ToolPath way={way} dark={dark} background={colours.background} />}
       <Pedestal from={floor} to={foot} reach={reach} poses={poses} />
       <Ground height={floor} reach={reach} colours={colours} />
-      <ViewCamera scene={scene} poses={poses} floor={floor} handle={camera} />
+      <ViewCamera scene={scene} poses={poses} floor={floor} extent={extent} whole={whole} handle={camera} />
     </>
   )
 }
 
 /** The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it has reached. */
-function useFloor(scene: RobotScene, poses: () => Poses | undefined, foot: number): number {
+function useFloor(scene: RobotScene, poses: () => Poses | undefined, foot: number, extent: StageProps['extent'], whole: string | undefined): number {
   const [lowest, setLowest] = useState<{ name: string; floor: number }>({ name: scene.name, floor: Infinity })
+  const counted = useRef('')
   const step = (scene.reach > 1 ? 0.5 : 0.1) * Math.max(1, Math.round(0.12 * scene.reach))
   useFrame(() => {
     const now = poses()
     if (!now) return
     let low = Infinity
     for (let row = 1; row < scene.rows; row++) low = Math.min(low, now(row, 11))
+    if (whole && whole !== counted.current) {
+      counted.current = whole
+      for (const [, , z] of extent?.() ?? []) low = Math.min(low, z)
+    }
     low -= 0.06 * scene.reach
     const floor = low < foot ? step * Math.floor(low / step) : Infinity
     if (lowest.name !== scene.name || floor < lowest.floor - 1e-9) setLowest({ name: scene.name, floor })

@@ -45,12 +45,11 @@ function arrange({ api }: DockviewReadyEvent): void {
     ...(tall ? { position: { referencePanel: 'kinematics', direction: 'below' }, initialHeight: 0.24 * innerHeight } : { position: { referencePanel: 'kinematics' } }),
   })
   api.addPanel({ id: 'robot', component: 'robot', title: 'Robot, base, tool', inactive: true, position: { referencePanel: tall ? 'dynamics' : 'kinematics' } })
-  // Widths last: what comes beside a group takes from it.
-  const widths: [string, number, number][] = [
-    ['joints', 300, 0.2],
-    ['readings', 376, 0.24],
-  ]
-  for (const [id, least, share] of widths) api.getPanel(id)?.group.api.setSize({ width: Math.min(Math.max(least, share * innerWidth), 1.5 * least) })
+  // Widths last and from the left: a group that is set takes from those on its right.
+  const width = (least: number, share: number) => Math.min(Math.max(least, share * innerWidth), 1.5 * least)
+  const [joints, readings] = [width(300, 0.2), width(376, 0.26)]
+  api.getPanel('arm')?.group.api.setSize({ width: innerWidth - joints - readings })
+  api.getPanel('joints')?.group.api.setSize({ width: joints })
 }
 
 function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
@@ -193,7 +192,7 @@ function Findings({ shown }: { shown: RobotShown }) {
   return (
     <Menu position="bottom-end" shadow="md" width={380}>
       <Menu.Target>
-        <Button size="compact-sm" variant="default" leftSection={<IconAlertTriangle size={13} />} className="findings">
+        <Button size="compact-sm" variant="default" c="var(--warning)" bg="var(--warning-wash)" leftSection={<IconAlertTriangle size={13} />} className="findings">
           {count === 1 ? '1 warning' : `${count} warnings`}
         </Button>
       </Menu.Target>
