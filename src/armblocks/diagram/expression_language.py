@@ -2,8 +2,9 @@
 
 Python's own grammar reads the text (:mod:`armblocks.diagram.formula_spelling` respells it first); every node
 of the tree must be one of those listed here, so that a formula can do nothing but arithmetic. ``^`` is a
-power, ``&&``, ``||`` and ``!`` are logic as in Simulink's Fcn block, but ``!`` binds as Python's ``not``: it
-takes the whole comparison behind it. Elements are counted from 1: ``u[1]`` and ``u(1)`` are the first.
+power as in MATLAB: ``2^3^2`` is ``(2^3)^2``, ``-2^2`` is ``-(2^2)`` and ``2^-1^2`` is ``(2^-1)^2``. ``&&``,
+``||`` and ``!`` are logic as in Simulink's Fcn block, but ``!`` binds as Python's ``not``: it takes the whole
+comparison behind it. Elements are counted from 1: ``u[1]`` and ``u(1)`` are the first.
 
 Arrays are written as in MATLAB, ``[1 2; 3 4]``, ``[0:0.5:2]``. A vector is neither row nor column: ``[1 2]``
 and ``[1; 2]`` are the same, and ``[v; w]`` has the rows v and w. Two vectors are multiplied element by
@@ -21,6 +22,7 @@ from typing import cast
 from casadi import SX, horzcat, logic_and, logic_not, logic_or, mtimes, vertcat
 
 from armblocks.diagram.formula_functions import CONSTANTS, FUNCTIONS, MAKERS, MATRIX_FUNCTIONS, range_of
+from armblocks.diagram.formula_powers import powers_from_the_left
 from armblocks.diagram.formula_spelling import CALLED_IF, CALLED_RANGE, python_spelling
 from armblocks.errors import InputError, UnknownNameError
 
@@ -70,7 +72,7 @@ class Formula:
                 raise self._error(f"'{_short(text)}' has no meaning in a formula", _ALLOWED)
         spelt = python_spelling(text, where)
         try:
-            self._tree = ast.parse(spelt, mode="eval").body
+            self._tree = powers_from_the_left(ast.parse(spelt, mode="eval").body, spelt)
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             reason = error.msg if isinstance(error, SyntaxError) else "it is nested too deeply"
             raise self._error(f"'{_short(text)}' is no formula: {reason}", _ALLOWED) from None

@@ -65,8 +65,11 @@ class _Brackets:
             if depth >= DEEPEST:
                 raise self._error("brackets are nested too deeply", f"{DEEPEST} levels")
             return self._index(depth) if re.fullmatch(r"[\w)\]]", before) else self._array(depth + 1)
+        if mark == "." and self._text.startswith("'", self._place):  # .' is ' for real numbers
+            self._place += 1
+            return " .T"
         if mark == "'" and _OPERAND_END.fullmatch(before):
-            return ".T"
+            return " .T"  # the space keeps the point out of a number before it
         return mark
 
     def _index(self, depth: int) -> str:
