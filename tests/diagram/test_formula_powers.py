@@ -1,4 +1,4 @@
-"""Formulas give the numbers that MATLAB gives: powers go from the left, signs behind ^ belong to the operand."""
+"""Formulas give MATLAB's numbers: powers go from the left, signs behind ^ belong to the operand."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
 """Powers as MATLAB reads them: ``a^b^c`` is ``(a^b)^c`` and ``a^-b^c`` is ``(a^-b)^c``.
 
-Python reads both from the right, ``a ** (b ** c)`` and ``a ** -(b ** c)``. Its trees know no brackets, but say
-where in the text each part stands, and so whether a bracket was opened before it. Source: MathWorks,
-*Operator Precedence*: operators of one level go from left to right, a sign behind ``^`` belongs to its operand.
+Python reads both from the right, ``a ** (b ** c)`` and ``a ** -(b ** c)``. Its trees know no brackets, but
+say where in the text each part stands, and so whether a bracket was opened before it. Source: MathWorks,
+*Operator Precedence*: operators of one level go from left to right; a sign behind ``^`` belongs to its
+operand.
 """
 
 from __future__ import annotations
