@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.compiler.integrator_workspace import Status
 from armblocks.compiler.native_integrator import Integration
 from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Shape
 from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.simulation.stretch import Consumer, Stretch
 
 Array = NDArray[np.float64]
 SAME_INSTANT = 1.0 + 2.0**-50
@@ -51,26 +53,21 @@ class Calls:
         self.seconds = 0.0
         """What the functions took, without all that is around them."""
 
-    def waits(self, integration: Integration) -> bool:
-        """Whether the run has halted for a tick whose functions have not been called."""
-        return integration.waiting and bool(self._due(integration))
-
-    def make(self, integration: Integration, p: Array) -> None:
-        """Call what is due where the run stands, and let it halt where something is due next.
+    def advance(self, stretch: Stretch, steps: int, pause: float, consume: Consumer | None) -> None:
+        """Take steps as :meth:`Stretch.advance` does; where functions are due on the way, they are called.
 
         Raises ``SimulationError`` where a function fails.
         """
-        if integration.waiting:
-            self._make_due(integration, p)
-        following = [
-            integration.next_tick(clock) for clock in self._clocks if not self._is_done(integration, clock)
-        ]
-        after = [
-            integration.next_tick(clock) + self._compiled.sizes.clocks[clock][0]
-            for clock in self._clocks
-            if self._is_done(integration, clock)
-        ]
-        integration.halt_at(min(following + after))
+        integration = stretch.integration
+        assert integration is not None  # what ticks is integrated
+        end = stretch.taken + steps
+        while True:
+            if integration.waiting:
+                self._make_due(integration, stretch.p)
+            integration.halt_at(self._next(integration))
+            stretch.advance(max(0, end - stretch.taken), pause, consume)
+            if stretch.status is not Status.PAUSED or not (integration.waiting and self._due(integration)):
+                return
 
     def told(self, wall_time: float) -> str:
         """What the calls cost, in words."""
@@ -78,6 +75,14 @@ class Calls:
         share = 100.0 * self.seconds / wall_time if wall_time > 0.0 else 0.0
         cost = f"{self.seconds:.3g} s, {share:.0f} % of the run"
         return f"Python was called {self.count} times for {names}: {cost}"
+
+    def _next(self, integration: Integration) -> float:
+        """The next tick, s, whose functions have not been called."""
+        ticks = {clock: integration.next_tick(clock) for clock in self._clocks}
+        return min(
+            tick + self._compiled.sizes.clocks[clock][0] if self._done.get(clock) == tick else tick
+            for clock, tick in ticks.items()
+        )
 
     def _is_done(self, integration: Integration, clock: int) -> bool:
         return self._done.get(clock) == integration.next_tick(clock)

@@ -63,14 +63,29 @@ def _signal_error(system: CompiledSystem, place: int, value: float, time: float)
     )
 
 
-def assertion_failure(system: CompiledSystem, block: str, time: float) -> SimulationError:
-    """An Assertion whose input has become 0."""
+def ended_by_block(system: CompiledSystem, run: Integration) -> str | SimulationError:
+    """Which block has ended a run: a sentence, or the error of an Assertion whose input has become 0."""
+    guard = run.positive(system.sizes.stops)[0]
+    block = system.guard_names[guard]
+    if system.guard_actions[guard] != "fail":
+        return f"stopped by block '{block}' at {run.time:.9g} s"
     return SimulationError(
-        f"assertion '{block}' does not hold at {time:.9g} s",
+        f"assertion '{block}' does not hold at {run.time:.9g} s",
         where=system.name,
         allowed="an input that is not 0 at any time",
         fix=f"look at what feeds '{block}', or let it only warn",
     )
+
+
+def warnings_of_blocks(system: CompiledSystem, run: Integration) -> list[str]:
+    """What blocks have to say that only warn."""
+    found: list[str] = []
+    for guard, action in enumerate(system.guard_actions):
+        fired = run.last_fired(guard)
+        if action == "warn" and (fired > -np.inf or run.positive([guard])):
+            when = f"last from {fired:.9g} s on" if fired > -np.inf else "from the start on"
+            found.append(f"assertion '{system.guard_names[guard]}' did not hold, {when}")
+    return found
 
 
 def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> SimulationError:

@@ -78,6 +78,11 @@ class Stretch:
         return self.begin + self.held
 
     @property
+    def taken(self) -> int:
+        """Steps that are done; the instants of a run that integrates nothing."""
+        return self.recorded if self.integration is None else self.integration.accepted
+
+    @property
     def time(self) -> float:
         """Time that is reached, s."""
         if self.integration is not None:
@@ -91,6 +96,11 @@ class Stretch:
         if self.integration is not None:
             return self.integration.status
         return Status.DONE if self.recorded == self._instants.count else Status.PAUSED
+
+    @property
+    def wants_other(self) -> bool:
+        """Whether another method would go on better."""
+        return self.integration is not None and self.integration.wants_other
 
     def rows(self, begin: int | None = None) -> Rows:
         """What is held from instant number ``begin`` on: views."""

@@ -1,0 +1,161 @@
+"""What a run has recorded: all of it in memory, or one window of it there and the rest in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.compiler.native_integrator import Integration
+from armblocks.compiler.system import CompiledSystem
+from armblocks.equations import Signature
+from armblocks.errors import SimulationError
+from armblocks.simulation.diagnosis import first_bad_signal
+from armblocks.simulation.plan import Instants, LogRequest
+from armblocks.simulation.result import LoggedFile, SimulationResult, signal_path
+from armblocks.simulation.stretch import Consumer, Rows, Stretch
+
+if TYPE_CHECKING:
+    from armblocks.simulation.run_log import RunLog
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples:
+    """Recorded instants of a run that goes on: ``time (N,)`` s and ``signals (ny, N)``.
+
+    ``begin`` is the number of the first, ``end`` that of the one which comes next. ``samples["block/port"]``
+    is ``(N, *shape)``.
+    """
+
+    begin: int
+    time: Array
+    signals: Array
+    layout: Signature
+    aliases: Mapping[str, str]
+
+    @property
+    def end(self) -> int:
+        """Number of the instant after these."""
+        return self.begin + self.time.size
+
+    def __getitem__(self, name: str) -> Array:
+        path = signal_path(name, self.layout, self.aliases, "samples")
+        rows = self.signals[self.layout.ranges[path]]
+        return rows.T.reshape(self.time.size, *self.layout[path].shape)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """Instants that are good: ``time (N,)`` s, ``states (N, nx)`` and ``signals (ny, N)``.
+
+    ``failure`` says which signal is not finite at the instant after the last of them, if one is.
+    """
+
+    time: Array
+    states: Array
+    signals: Array
+    failure: SimulationError | None = None
+
+
+class Recording:
+    """The stretches of a run, and the file that a logged one is written to while it goes on."""
+
+    def __init__(self, compiled: CompiledSystem, instants: Instants, log: LogRequest | None) -> None:
+        """Raises what opening a log raises."""
+        self._compiled = compiled
+        self.stretches: list[Stretch] = []
+        self.window: int | None = None
+        """How many instants are held at once, in a run that is logged."""
+        self._log: RunLog | None = None
+        if log is not None:
+            # A run without a log loads no writers.
+            from armblocks.simulation.run_log import RunLog, window_rows
+
+            layout, states = compiled.signals_layout, compiled.states.size
+            self._log = RunLog(log, layout, compiled.aliases, states, instants.count)
+            self.window = window_rows(1 + states + layout.size)
+
+    @property
+    def recorded(self) -> int:
+        """How many instants are recorded so far."""
+        return self.stretches[-1].recorded if self.stretches else 0
+
+    @property
+    def integrations(self) -> list[Integration]:
+        """The native loops, one for each stretch of a system that has states."""
+        return [part.integration for part in self.stretches if part.integration is not None]
+
+    @property
+    def file(self) -> LoggedFile | None:
+        """What is in the log, if there is one."""
+        return None if self._log is None else LoggedFile(path=self._log.path, rows=self._log.rows)
+
+    @property
+    def consumer(self) -> Consumer | None:
+        """Takes full windows of a logged run; raises ``SimulationError`` where a signal is not finite."""
+        return None if self._log is None else self._write
+
+    def hand_over(self) -> None:
+        """What the last stretch still holds goes into the log. Raises as the :attr:`consumer`."""
+        if self._log is not None and self.stretches:
+            self.stretches[-1].settle()
+            self._write(self.stretches[-1].rows())
+
+    def samples(self, begin: int) -> Samples:
+        """Signals at the instants from number ``begin`` on, as far as they are held."""
+        parts, compiled = self._rows(begin), self._compiled
+        nothing = np.empty((compiled.signals_layout.size, 0))
+        return Samples(
+            begin=parts[0].begin if parts else min(begin, self.recorded),
+            time=_joined([rows.time for rows in parts] or [np.empty(0)]),
+            signals=_joined([rows.signals(compiled) for rows in parts] or [nothing], axis=1),
+            layout=compiled.signals_layout,
+            aliases=compiled.aliases,
+        )
+
+    def good(self) -> Recorded:
+        """All that is recorded up to the first signal that is not finite; of a logged run, the view of it."""
+        compiled = self._compiled
+        if self._log is not None:
+            time, states, signals = self._log.view(compiled.signals_layout.size)
+            return Recorded(time=time, states=states, signals=signals)
+        parts = self._rows(0) or [self.stretches[-1].rows()]
+        time = _joined([rows.time for rows in parts])
+        states = _joined([rows.states for rows in parts])
+        signals = _joined([rows.signals(compiled) for rows in parts], axis=1)
+        bad = first_bad_signal(compiled, time, signals, _joined([rows.algebraic for rows in parts]))
+        if bad is None:
+            return Recorded(time=time, states=states, signals=signals)
+        failure, count = bad
+        return Recorded(time=time[:count], states=states[:count], signals=signals[:, :count], failure=failure)
+
+    def finish(self, result: SimulationResult) -> None:
+        """Complete the file of a logged run, with how the run went."""
+        if self._log is not None:
+            self._log.finish(result)
+
+    def _rows(self, begin: int) -> list[Rows]:
+        return [rows for rows in (part.rows(begin) for part in self.stretches) if rows.time.size]
+
+    def _write(self, rows: Rows) -> None:
+        """A window goes into the log; rows that are there already, after an interruption, are left out."""
+        assert self._log is not None
+        rows = rows.after(self._log.rows)
+        if not rows.time.size:
+            return
+        signals = rows.signals(self._compiled)
+        bad = first_bad_signal(self._compiled, rows.time, signals, rows.algebraic)
+        good = rows.time.size if bad is None else bad[1]
+        self._log.append(rows.time[:good], rows.states[:good], signals[:, :good])
+        if bad is not None:
+            raise bad[0]
+
+
+def _joined(parts: Sequence[Array], axis: int = 0) -> Array:
+    """One array; without a copy where there is one part."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=axis)

@@ -1,0 +1,158 @@
+"""By which method a run goes, where it starts from, and its change to the other method of two on the way."""
+
+from __future__ import annotations
+
+import dataclasses
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.compiler.native_integrator import Checkpoint, Integration, NativeIntegrator, RunPoint
+from armblocks.compiler.rosenbrock_tableau import Tableau
+from armblocks.compiler.system import CompiledSystem
+from armblocks.equations import SimulationOptions
+from armblocks.errors import SimulationError
+from armblocks.simulation.first_guess import first_guess
+from armblocks.simulation.plan import Plan
+from armblocks.simulation.run_state import RunState, settings_text
+
+Array = NDArray[np.float64]
+
+
+class RunMethod:
+    """Makes the native loops of a run, and says which they are and why."""
+
+    def __init__(
+        self,
+        compiled: CompiledSystem,
+        options: SimulationOptions,
+        plan: Plan,
+        initial_state: RunState | None,
+    ) -> None:
+        self._compiled = compiled
+        self._options = options
+        self._plan = plan
+        self._initial_state = initial_state
+        self._tableau = plan.tableau
+        self._reason = plan.reason
+        self._resumption = ""
+        self._changed = False
+        self.solver = plan.solver
+        """The method's name, or the names of all that were used."""
+        self.settings = ""
+        """Method and numbers, which tell whether a checkpoint can be gone on with."""
+        self.checkpoint: Checkpoint | None = None
+        """One from before the last loop, where it belongs to a stretch that this loop goes on with."""
+        started = perf_counter()
+        compiled.prepare(plan.tableau)
+        self.preparation_time = perf_counter() - started
+        """What making native loops has taken, s."""
+
+    @property
+    def reason(self) -> str:
+        """Why this method, where another took over, and where the run came from."""
+        return self._reason + self._resumption
+
+    def begin(self, p: Array, instants: Array, before: Integration | None) -> Integration | None:
+        """A loop for parameters ``p`` that records these instants first; none where nothing is integrated.
+
+        It starts where the loop ``before`` stands, else from the initial state, else from initial values.
+        Raises ``SimulationError`` for initial values that are not finite.
+        """
+        if self._tableau is None:
+            return None
+        compiled, options, plan = self._compiled, self._options, self._plan
+        assert plan.tableau is not None
+        key = compiled.integrator(plan.tableau).key
+        step = 0.0 if plan.tableau.adaptive else plan.step
+        numbers = (step, options.rtol, options.atol, plan.max_step)
+        self.settings = settings_text(key if plan.stiff is None else (*key, "auto"), numbers, p)
+        self.checkpoint = checkpoint = None
+        if before is not None:
+            start = dataclasses.replace(before.point, begun=True)
+        elif self._initial_state is not None:
+            start, checkpoint = self._resumed(self._initial_state)
+        else:
+            start = _starting_point(compiled, p)
+        return self._prepared(self._tableau).begin(
+            start,
+            p,
+            instants,
+            compiled.breakpoints(p),
+            step=plan.step,
+            rtol=options.rtol,
+            atol=options.atol,
+            max_step=plan.max_step,
+            checkpoint=checkpoint,
+            watch_stiffness=plan.stiff is not None,
+            stop=plan.instants.stop,
+        )
+
+    def change(self, integration: Integration) -> Integration:
+        """The run goes on by the other method of the two, from where it stands."""
+        first, stiff = self._plan.tableau, self._plan.stiff
+        assert first is not None and stiff is not None
+        following = first if self._tableau is stiff else stiff
+        native = self._prepared(following)
+        self.checkpoint = integration.checkpoint
+        when, step = f"{integration.time:.4g} s", f"{integration.last_step:.2g} s"
+        if following is first:
+            self._reason += f"; from {when} {first.title}, as steps of {step} are stable now"
+        elif self._changed:
+            self._reason += f"; from {when} {stiff.title}"
+        else:
+            self._reason = (
+                f"auto: {first.title} until {when}, then {stiff.title}, because the system is "
+                f"stiff: stability, not accuracy, held the explicit steps at {step}"
+            )
+        self.solver += f", then {following.name}"
+        self._tableau, self._changed = following, True
+        return native.take_over(integration)
+
+    def _resumed(self, state: RunState) -> tuple[RunPoint, Checkpoint | None]:
+        """Where another run ended, and its checkpoint where this run's settings are the same."""
+        stiff = self._plan.stiff
+        checkpoint = state.checkpoint if state.settings == self.settings else None
+        if stiff is not None and checkpoint is not None and checkpoint.method == stiff.name:
+            self._tableau, self.solver, self._changed = stiff, stiff.name, True
+            self._reason = f"auto: {stiff.title}, as the run before found the system stiff"
+        how = "exactly as the run before" if checkpoint is not None else "started anew"
+        self._resumption = f"; goes on from {state.time:g} s, {how}"
+        start = RunPoint(
+            time=state.time,
+            x=state.states,
+            z=state.discrete,
+            w=state.algebraic,
+            past=state.past,
+            begun=True,
+        )
+        return start, checkpoint
+
+    def _prepared(self, tableau: Tableau) -> NativeIntegrator:
+        """The native loop of a method; the time to make it counts as preparation."""
+        started = perf_counter()
+        native = self._compiled.integrator(tableau)
+        self.preparation_time += perf_counter() - started
+        return native
+
+
+def _starting_point(compiled: CompiledSystem, p: Array) -> RunPoint:
+    """The initial values. Raises ``SimulationError`` naming the first variable that is not finite."""
+    start = RunPoint(
+        time=0.0,
+        x=compiled.initial_states(p),
+        z=compiled.initial_discrete(p),
+        w=compiled.initial_algebraic(p),
+    )
+    for layout, values in ((compiled.states, start.x), (compiled.discrete, start.z)):
+        for slot in layout:
+            given = values[layout.ranges[slot.name]]
+            if not np.isfinite(given).all():
+                raise SimulationError(
+                    f"the initial value of state '{slot.name}' is {given.tolist()}",
+                    where=compiled.name,
+                    allowed="finite numbers",
+                    fix="change the block's initial value",
+                )
+    return dataclasses.replace(start, w=first_guess(compiled, start, p))
