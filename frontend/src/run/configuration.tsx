@@ -16,7 +16,7 @@ export function Configuration() {
   const { opened } = useConfiguration()
   const close = () => useConfiguration.setState({ opened: false })
   return (
-    <Modal opened={opened} onClose={close} title={<b>Configuration parameters</b>} size="md">
+    <Modal opened={opened} onClose={close} closeButtonProps={{ 'aria-label': 'Close' }} title={<b>Configuration parameters</b>} size="md">
       {opened && <Form onClose={close} />}
     </Modal>
   )

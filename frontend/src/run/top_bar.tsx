@@ -152,7 +152,7 @@ function RunState() {
           {run.realTimeFactor >= 100 ? run.realTimeFactor.toFixed(0) : run.realTimeFactor.toFixed(1)} × real time
         </Text>
       )}
-      <Badge color={colour} variant="light" title={run.message || run.fault?.what}>
+      <Badge color={colour} variant="light" styles={{ label: { color: 'var(--ink)' } }} title={run.message || run.fault?.what}>
         {run.state}
       </Badge>
     </span>

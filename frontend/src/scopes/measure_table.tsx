@@ -42,7 +42,7 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
   const now = shownTime()
   const read = traces.map((trace) => ({ trace, data: trace.read() })).flatMap(({ trace, data }) => (data ? [{ trace, data }] : []))
   return (
-    <div className="measures">
+    <div className="measures" tabIndex={0} role="region" aria-label="Measures">
       {cursors && (
         <p className="between">
           <span>A {spoken(cursors[0], 's', 5)}</span>
