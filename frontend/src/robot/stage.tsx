@@ -46,12 +46,17 @@ const TURN = Math.PI / 24
 
 /** An arm on its floor, with light, shadow, camera and the tools of a view. */
 export function Stage(props: StageProps) {
-  const { scene, poses, drawing, film, children } = props
+  const { scene, poses, state, drawing, film, children } = props
   const scheme = useComputedColorScheme('light')
   const camera = useRef<CameraHandle>(null)
   const shot = useRef<Shot | null>(null)
   const [works] = useState(hasWebGl)
-  if (!works) return <StaticArm name={scene.name} drawing={drawing} />
+  if (!works)
+    return (
+      <StaticArm name={scene.name} drawing={drawing} state={state}>
+        {children}
+      </StaticArm>
+    )
   const onKeyDown = (event: React.KeyboardEvent) => {
     const view = camera.current
     if (!view || event.ctrlKey || event.metaKey || event.altKey) return
@@ -91,7 +96,7 @@ export function Stage(props: StageProps) {
       >
         {children}
       </ViewTools>
-      <Instant poses={poses} rows={scene.rows} state={props.state} />
+      <Instant poses={poses} rows={scene.rows} state={state} />
     </div>
   )
 }

@@ -1,15 +1,33 @@
 import { useEffect, useState } from 'react'
 
+const LOOK_MS = 300
+
+interface StaticArmProps {
+  name: string
+  drawing: () => Promise<string | undefined>
+  state: () => string
+  children?: React.ReactNode
+}
+
 /** What is shown where the browser has no WebGL: words, and a drawing that the server makes. */
-export function StaticArm({ name, drawing }: { name: string; drawing: () => Promise<string | undefined> }) {
+export function StaticArm({ name, drawing, state, children }: StaticArmProps) {
   const [svg, setSvg] = useState<string>()
   useEffect(() => {
     let current = true
-    void drawing().then((found) => current && setSvg(found))
+    let drawn: string | undefined
+    const look = () => {
+      const now = state()
+      if (now === drawn) return
+      drawn = now
+      void drawing().then((found) => current && setSvg(found))
+    }
+    look()
+    const timer = setInterval(look, LOOK_MS)
     return () => {
       current = false
+      clearInterval(timer)
     }
-  }, [drawing])
+  }, [drawing, state])
   return (
     <figure className="robot still">
       {svg && <img src={`data:image/svg+xml;utf8,${encodeURIComponent(svg)}`} alt={`The robot ${name}`} />}
@@ -17,6 +35,7 @@ export function StaticArm({ name, drawing }: { name: string; drawing: () => Prom
         This browser shows no 3-D (WebGL is off or missing), so the arm stands still here. Runs, scopes and the editor work as usual. Turn
         hardware acceleration on in the browser's settings to see it move.
       </figcaption>
+      {children && <div className="view-tools">{children}</div>}
     </figure>
   )
 }

@@ -11,7 +11,9 @@ import { LinkTable } from './table'
 import { saveRobot, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
+/** From this height on (px) both tables are seen at once. */
 const TALL = 1000
+const BAR_PX = 44
 
 const panels: Record<string, React.FunctionComponent> = {
   arm: () => (
@@ -45,11 +47,15 @@ function arrange({ api }: DockviewReadyEvent): void {
     ...(tall ? { position: { referencePanel: 'kinematics', direction: 'below' }, initialHeight: 0.24 * innerHeight } : { position: { referencePanel: 'kinematics' } }),
   })
   api.addPanel({ id: 'robot', component: 'robot', title: 'Robot, base, tool', inactive: true, position: { referencePanel: tall ? 'dynamics' : 'kinematics' } })
-  // Widths last and from the left: a group that is set takes from those on its right.
+  // Sizes last, from the left and from above: a group that is set takes from those behind it.
   const width = (least: number, share: number) => Math.min(Math.max(least, share * innerWidth), 1.5 * least)
   const [joints, readings] = [width(300, 0.2), width(376, 0.26)]
   api.getPanel('arm')?.group.api.setSize({ width: innerWidth - joints - readings })
   api.getPanel('joints')?.group.api.setSize({ width: joints })
+  if (!tall) return
+  const table = 0.2 * innerHeight
+  api.getPanel('arm')?.group.api.setSize({ height: innerHeight - BAR_PX - 2 * table })
+  api.getPanel('kinematics')?.group.api.setSize({ height: table })
 }
 
 function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
