@@ -730,13 +730,14 @@ export interface Documents {
   recoveries: Recovery[];
 }
 /**
- * A whole document, for a page that shows it from now on.
+ * A whole document, for a page that shows it from now on, and the run that the server has of it.
  */
 export interface Opened {
   kind: "opened";
   state: DocumentState;
   inside: string[];
   sheet: Sheet;
+  run?: string | null;
 }
 /**
  * The whole drawing.

@@ -150,6 +150,8 @@ function receive(event: ServerEvent): void {
       const same = document?.state.document === state.document
       const moved = same && document.inside.join('/') !== inside.join('/')
       if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
+      if (same && run && (run.state === 'running' || run.state === 'paused') && event.run !== run.run)
+        useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
       useStudio.setState({
         document: {
           state,
@@ -180,6 +182,7 @@ function receive(event: ServerEvent): void {
       if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
       break
     case 'run_started':
+      if (run?.run === event.run) break // told again after the line was down: its samples are the same
       runs.began(event)
       useStudio.setState({
         run: {

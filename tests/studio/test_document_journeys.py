@@ -194,6 +194,16 @@ def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
     expect(page).to_have_title("two – armblocks")
 
 
+def test_a_run_is_shown_again_after_a_reload(page: Page) -> None:
+    add(page, "sine wave")
+    page.keyboard.press("Control+Enter")
+    state = page.locator(".run-state")
+    expect(state).to_contain_text("done")
+    page.reload()
+    expect(state).to_contain_text("done")
+    expect(state).to_contain_text("10.00 s")
+
+
 def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, server: list[Studio]) -> None:
     old = server[-1]
     add(page, "sine wave")

@@ -31,6 +31,7 @@ from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
 from armblocks.studio.run_process import RunProcess, Worker
+from armblocks.studio.run_record import RunRecord, Said
 from armblocks.studio.run_settings import setting_rules, solver_choices
 from armblocks.studio.sheet import library, sheet, sheet_change
 from armblocks.studio.state_folder import StateFolder
@@ -50,12 +51,17 @@ class Page:
     send_bytes: SendBytes
     shows: dict[str, tuple[str, ...]] = dataclasses.field(default_factory=dict[str, tuple[str, ...]])
     """Documents that it shows, and the path of the sheet that it looks at."""
+    hears: dict[str, int] = dataclasses.field(default_factory=dict[str, int])
+    """Runs that it is told from their beginning, and how far: until then it gets nothing else of them."""
 
     async def tell(self, event: say.Message) -> None:
         """Send an event; a page that is gone is nobody's trouble."""
-        text = event.model_dump_json()
+        await self.send(event.model_dump_json())
+
+    async def send(self, said: Said) -> None:
+        """Send a message or a frame as it is."""
         with contextlib.suppress(*GONE):
-            await self.send_text(text)
+            await (self.send_text(said) if isinstance(said, str) else self.send_bytes(said))
 
 
 class Hub:
@@ -67,6 +73,7 @@ class Hub:
         self.documents = OpenDocuments(folder, StateFolder(folder.root), self.resolve_robot)
         self.runs: dict[str, RunProcess] = {}
         self.robots = RobotDesk(folder, self)
+        self.records: dict[str, RunRecord] = {}
         self._spare: Worker | None = None
         self._watching: asyncio.Task[None] | None = None
 
@@ -171,15 +178,28 @@ class Hub:
             if found.key in page.shows:
                 raise
             path, shown = (), found.document.diagram  # what the page looked at before is gone
+        fresh = found.key not in page.shows
         page.shows[found.key] = path
+        run = next((run.key for run in self.runs.values() if run.document == found.key), None)
         drawn, linked = sheet(shown), linked_part(found.document.diagram, path)
         if linked:
             link = inside(found.document.diagram, linked).link
             drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
-        await page.tell(say.Opened(state=found.state(), inside=list(path), sheet=drawn))
+        await page.tell(say.Opened(state=found.state(), inside=list(path), sheet=drawn, run=run))
+        if fresh and run is not None:
+            await self._tell_run(page, run)
         await self._tell_documents()
         self._check_later(found)
         return found.key
+
+    async def _tell_run(self, page: Page, run: str) -> None:
+        """Tell a page that has just come what a run has said so far, and from then on what it says."""
+        record = self.records[run]
+        page.hears[run] = 0
+        while page.hears[run] < len(record) and self.records.get(run) is record and page in self.pages:
+            page.hears[run] += 1
+            await page.send(record[page.hears[run] - 1])
+        del page.hears[run]
 
     async def _change(self, request: Performed | say.Reload) -> int:
         found = self.documents[request.document]
@@ -330,18 +350,19 @@ class Hub:
     async def _run(self, request: say.Run) -> str:
         found = self.documents[request.document]
 
+        key, record = secrets.token_hex(8), RunRecord()
+
         async def tell(event: say.Message | bytes) -> None:
-            if isinstance(event, bytes):
-                pages = [page for page in self.pages if found.key in page.shows]
-                with contextlib.suppress(*GONE):
-                    await asyncio.gather(*(page.send_bytes(event) for page in pages))
-            else:
-                await self.tell_all(found.key, event)
+            said = event if isinstance(event, bytes) else event.model_dump_json()
+            record.append(said)
+            pages = [page for page in self.pages if found.key in page.shows and key not in page.hears]
+            await asyncio.gather(*(page.send(said) for page in pages))
 
         for other in list(self.runs.values()):
             if other.document == found.key:
                 other.end()
                 del self.runs[other.key]
+                self.records.pop(other.key).close()
         job = {
             "diagram": formats.diagram_to_bytes(
                 found.document.diagram, self.resolve_robot, folder=self.folder.root
@@ -350,8 +371,8 @@ class Hub:
             "speed": request.speed,
             "tuned": request.tuned,
         }
-        run = RunProcess(secrets.token_hex(8), found.key, self._spare or Worker(), tell)
-        self.runs[run.key] = run
+        run = RunProcess(key, found.key, self._spare or Worker(), tell)
+        self.runs[key], self.records[key] = run, record
         run.start(job)
         self._spare = Worker()
         return run.key

@@ -524,12 +524,13 @@ class Documents(Message):
 
 
 class Opened(Message):
-    """A whole document, for a page that shows it from now on."""
+    """A whole document, for a page that shows it from now on, and the run that the server has of it."""
 
     kind: Literal["opened"] = "opened"
     state: DocumentState
     inside: list[str]
     sheet: Sheet
+    run: str | None = None
 
 
 class Changed(Message):

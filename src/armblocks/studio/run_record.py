@@ -1,0 +1,41 @@
+"""What a run has said, for pages that come later: after a reload, after a lost line, or as a second page.
+
+It lies in a file without a name, which the system removes with the process: a long run costs no memory.
+"""
+
+from __future__ import annotations
+
+import tempfile
+
+Said = str | bytes
+"""A message as JSON, or a frame of samples."""
+
+
+class RunRecord:
+    """Everything that a run has said, in order."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the run
+        self._spots: list[tuple[int, int, bool]] = []
+        self._size = 0
+
+    def __len__(self) -> int:
+        return len(self._spots)
+
+    def __getitem__(self, index: int) -> Said:
+        begin, size, text = self._spots[index]
+        self._file.seek(begin)
+        data = self._file.read(size)
+        return data.decode() if text else data
+
+    def append(self, said: Said) -> None:
+        """Keep what was said last."""
+        data = said.encode() if isinstance(said, str) else said
+        self._file.seek(self._size)
+        self._file.write(data)
+        self._spots.append((self._size, len(data), isinstance(said, str)))
+        self._size += len(data)
+
+    def close(self) -> None:
+        """Forget everything."""
+        self._file.close()
