@@ -1,0 +1,58 @@
+"""What the studio keeps for its user: readable by nobody else, and never a reason not to start."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from armblocks.errors import FormatError
+from armblocks.studio import state_folder
+from armblocks.studio.state_folder import SESSION_SECONDS, StateFolder
+
+
+@pytest.fixture
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StateFolder:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return StateFolder(tmp_path / "project")
+
+
+def test_a_session_is_taken_up_again_at_its_port_and_not_for_ever(kept: StateFolder) -> None:
+    assert kept.session() is None
+    first = kept.begin_session(8642)
+    assert kept.begin_session(8642) == first
+    assert kept.begin_session(8643).secret != first.secret
+    second = kept.begin_session(8642)
+    assert kept.begin_session(8642, afresh=True).secret != second.secret
+    file = kept.root / "session.json"
+    assert file.stat().st_mode & 0o077 == 0
+    assert kept.root.stat().st_mode & 0o077 == 0
+    os.utime(file, (0, file.stat().st_mtime - SESSION_SECONDS - 1))
+    assert kept.session() is None
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"port": 1}', '{"port": "x", "secret": "y"}'])
+def test_a_broken_file_is_as_none(kept: StateFolder, content: str) -> None:
+    kept.begin_session(1)
+    (kept.root / "session.json").write_text(content)
+    (kept.root / "recent.json").write_text(content)
+    assert kept.session() is None
+    assert kept.recent() == []
+
+
+def test_files_used_last_come_first_and_once(kept: StateFolder) -> None:
+    for name in ("a.json", "b.json", "a.json", *(f"{k}.json" for k in range(20))):
+        kept.use(name)
+    assert kept.recent()[:2] == ["19.json", "18.json"]
+    assert len(kept.recent()) == state_folder.MOST_RECENT
+
+
+def test_a_user_without_a_home_is_told_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nowhere() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", nowhere)
+    with pytest.raises(FormatError, match=r"this user has no home folder.*set XDG_STATE_HOME to a folder"):
+        StateFolder(tmp_path)
