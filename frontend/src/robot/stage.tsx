@@ -36,6 +36,8 @@ interface StageProps {
   whole?: string
   /** The drawing that stands in where there is no WebGL. */
   drawing: () => Promise<string | undefined>
+  /** Changes when the drawing would; one that says nothing is drawn once. */
+  drawn?: () => string
   /** Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film. */
   film?: () => Promise<void>
   /** Buttons of its own that stand before the others. */
@@ -43,17 +45,18 @@ interface StageProps {
 }
 
 const TURN = Math.PI / 24
+const once = () => ''
 
 /** An arm on its floor, with light, shadow, camera and the tools of a view. */
 export function Stage(props: StageProps) {
-  const { scene, poses, state, drawing, film, children } = props
+  const { scene, poses, state, drawing, drawn, film, children } = props
   const scheme = useComputedColorScheme('light')
   const camera = useRef<CameraHandle>(null)
   const shot = useRef<Shot | null>(null)
   const [works] = useState(hasWebGl)
   if (!works)
     return (
-      <StaticArm name={scene.name} drawing={drawing} state={state}>
+      <StaticArm name={scene.name} drawing={drawing} state={drawn ?? once}>
         {children}
       </StaticArm>
     )

@@ -60,5 +60,5 @@ export default function ArmPanel() {
     return current ? ask<string>({ kind: 'robot_picture', robot: current, q: joints[current]?.q ?? [], theme }) : undefined
   }, [current])
   if (!scene) return <p className="empty">Loading the robot …</p>
-  return <Stage key={current} scene={scene} poses={posesNow} state={state} drawing={drawing} />
+  return <Stage key={current} scene={scene} poses={posesNow} state={state} drawing={drawing} drawn={state} />
 }
