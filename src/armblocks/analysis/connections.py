@@ -19,12 +19,18 @@ def _together(first: LinearSystem, second: LinearSystem) -> float:
             f"systems with the sample times {first.dt:g} s and {second.dt:g} s are put together",
             allowed="one sample time, or continuous systems only",
             fix="linearize the whole diagram instead",
+            where="linear systems",
         )
     return first.dt
 
 
 def _refuse_sizes(what: str, found: object, wanted: object) -> InputError:
-    return InputError(f"{what} does not fit: {found}", allowed=f"{wanted}", fix="choose ends with select()")
+    return InputError(
+        f"{what} does not fit: {found}",
+        allowed=f"{wanted}",
+        fix="choose ends with select()",
+        where="linear systems",
+    )
 
 
 def _states(first: LinearSystem, second: LinearSystem) -> dict[str, tuple[str, ...]]:
@@ -101,7 +107,10 @@ def feedback(forward: LinearSystem, back: LinearSystem | float, sign: int) -> Li
     loop = np.eye(nu) - sign * back.D @ forward.D
     if np.linalg.cond(loop) > 1e14:
         raise InputError(
-            "the loop of direct ways is singular", allowed="1 + D not 0", fix="change a gain in the loop"
+            "the loop of direct ways is singular",
+            allowed="1 + D not 0",
+            fix="change a gain in the loop",
+            where="linear systems",
         )
     # u = loop^-1 (v + sign (C2 x2 + D2 C1 x1))
     inverse = np.linalg.inv(loop)

@@ -29,6 +29,7 @@ def to_control(system: LinearSystem) -> Any:
     except ImportError:
         raise InputError(
             "python-control is not installed",
+            where="LinearSystem.to_control",
             allowed="an environment that has the package 'control'",
             fix="pip install control",
         ) from None

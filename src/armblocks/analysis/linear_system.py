@@ -59,11 +59,18 @@ class LinearSystem:
                 raise InputError(
                     f"{len(names)} names and {len(units)} units are given for the {kind}s",
                     allowed=f"one for each of the {size}",
+                    where="linear system",
+                    fix="give as many, or leave them out",
                 )
             object.__setattr__(self, f"{kind}s", names)
             object.__setattr__(self, f"{kind}_units", units)
         if not (np.isfinite(self.dt) and self.dt >= 0.0):
-            raise InputError(f"the sample time is {self.dt}", allowed="0 (continuous) or a finite time > 0 s")
+            raise InputError(
+                f"the sample time is {self.dt}",
+                allowed="0 (continuous) or a finite time > 0 s",
+                where="linear system",
+                fix="give dt in seconds",
+            )
 
     # What it is.
 
@@ -287,9 +294,19 @@ def _checked_matrices(system: LinearSystem) -> tuple[int, int, int]:
     for letter in "ABCD":
         matrix = np.array(getattr(system, letter), dtype=np.float64)
         if matrix.ndim != 2:
-            raise InputError(f"{letter} has {matrix.ndim} axes", allowed="matrices, two axes")
+            raise InputError(
+                f"{letter} has {matrix.ndim} axes",
+                allowed="matrices, two axes",
+                where="linear system",
+                fix=f"give {letter} as a list of rows",
+            )
         if not np.isfinite(matrix).all():
-            raise InputError(f"{letter} is not all finite numbers", allowed="finite matrices")
+            raise InputError(
+                f"{letter} is not all finite numbers",
+                allowed="finite matrices",
+                where="linear system",
+                fix=f"take NaN and infinities out of {letter}",
+            )
         matrix.flags.writeable = False
         object.__setattr__(system, letter, matrix)
     (ny, nu), nx = system.D.shape, system.A.shape[0]
@@ -298,6 +315,8 @@ def _checked_matrices(system: LinearSystem) -> tuple[int, int, int]:
             raise InputError(
                 f"{letter} has shape {getattr(system, letter).shape}",
                 allowed=f"shape {shape}, as A has {nx} rows and D has shape {system.D.shape}",
+                where="linear system",
+                fix=f"change the rows or columns of {letter}",
             )
     return nx, nu, ny
 

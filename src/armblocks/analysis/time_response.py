@@ -86,7 +86,12 @@ def _instants(system: LinearSystem, stop_time: float | None, points: int) -> Arr
     span, fastest = natural_times(system)
     end = span if stop_time is None else float(stop_time)
     if not (math.isfinite(end) and end > 0.0):
-        raise InputError(f"the stop time is {stop_time}", allowed="a finite time > 0 s")
+        raise InputError(
+            f"the stop time is {stop_time}",
+            allowed="a finite time > 0 s",
+            where="time response",
+            fix="leave it out, or give one in seconds",
+        )
     if system.is_discrete:
         count = max(round(end / system.dt), 1)
         return system.dt * np.arange(min(count, MOST_INSTANTS) + 1, dtype=np.float64)
@@ -167,18 +172,34 @@ def forced_response(
     given = given[:, None] if given.ndim == 1 and nu == 1 else given
     steps = np.diff(instants)
     if instants.ndim != 1 or instants.size < 2 or not (steps > 0.0).all():
-        raise InputError("the instants do not rise", allowed="two or more instants, each after the last, s")
+        raise InputError(
+            "the instants do not rise",
+            allowed="two or more instants, each after the last, s",
+            where="time response",
+            fix="sort them, each once",
+        )
     if given.shape != (instants.size, nu):
         raise InputError(
-            f"the inputs have shape {given.shape}", allowed=f"shape {(instants.size, nu)}: instants, inputs"
+            f"the inputs have shape {given.shape}",
+            allowed=f"shape {(instants.size, nu)}: instants, inputs",
+            where="time response",
+            fix="give one row of inputs for each instant",
         )
     if system.is_discrete and not np.allclose(steps, system.dt, rtol=1e-9, atol=0.0):
         raise InputError(
-            f"the instants are not {system.dt:g} s apart", allowed="the sample times of the system"
+            f"the instants are not {system.dt:g} s apart",
+            allowed="the sample times of the system",
+            where="time response",
+            fix=f"use {system.dt:g} * numpy.arange(n)",
         )
     x = np.zeros(n) if start is None else np.asarray(start, dtype=np.float64)
     if x.shape != (n,):
-        raise InputError(f"the start has shape {x.shape}", allowed=f"shape {(n,)}, one for each state")
+        raise InputError(
+            f"the start has shape {x.shape}",
+            allowed=f"shape {(n,)}, one for each state",
+            where="time response",
+            fix="leave it out to start at rest",
+        )
     states = np.empty((instants.size, n))
     states[0] = x
     maps: dict[float, Array] = {}

@@ -63,7 +63,10 @@ def parse_value(text: str, where: str = "--set") -> Value:
         if len({len(row) for row in rows}) > 1:
             lengths = ", ".join(str(len(row)) for row in rows)
             raise InputError(
-                f"the rows of {text} have {lengths} numbers", where=where, allowed="rows of one length"
+                f"the rows of {text} have {lengths} numbers",
+                where=where,
+                allowed="rows of one length",
+                fix="give every row as many numbers",
             )
         return rows
     if "," in text:
@@ -77,7 +80,12 @@ def parse_value(text: str, where: str = "--set") -> Value:
         return text == "true"
     if _WORD.fullmatch(text):
         return text
-    raise InputError(f"'{text}' is no value", where=where, allowed=_ALLOWED)
+    raise InputError(
+        f"'{text}' is no value",
+        where=where,
+        allowed=_ALLOWED,
+        fix="put quotes around a text that is none of these",
+    )
 
 
 def _row(text: str, where: str) -> list[float]:
@@ -89,7 +97,7 @@ def _row(text: str, where: str) -> list[float]:
             found = (
                 f"'{part}' in '{text.strip()}' is no number" if part else f"a number is missing in '{text}'"
             )
-            raise InputError(found, where=where, allowed=_ALLOWED)
+            raise InputError(found, where=where, allowed=_ALLOWED, fix="correct that number")
         numbers.append(number)
     return numbers
 

@@ -36,9 +36,15 @@ def describe_blocks(
             f"the block '{name}' and the search '{search}' are both given",
             allowed="a block's name or --search",
             fix="leave one of them out",
+            where="armblocks blocks",
         )
     if name is None and save is not None:
-        raise InputError("--save needs a block", allowed="armblocks blocks NAME --save FILE", fix="name one")
+        raise InputError(
+            "--save needs a block",
+            allowed="armblocks blocks NAME --save FILE",
+            fix="name one",
+            where="armblocks blocks",
+        )
     if name is None:
         _list(console, search)
     elif save is not None:
@@ -70,6 +76,7 @@ def _list(console: Console, search: str | None) -> None:
             f"no block's documentation has '{search}'",
             allowed="part of a word of a block's name, title or documentation",
             fix="list them all with 'armblocks blocks'",
+            where="armblocks blocks --search",
         )
     console.print(blocks_table(kinds))
     console.print(Text(f"\n{len(kinds)} blocks. 'armblocks blocks NAME' shows one, with an example."))

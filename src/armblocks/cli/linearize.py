@@ -66,7 +66,10 @@ def linearize(
 
     if free and not trimmed:
         raise InputError(
-            "--free is given without --trim", allowed="--free with --trim only", fix="add --trim"
+            "--free is given without --trim",
+            allowed="--free with --trim only",
+            fix="add --trim",
+            where="armblocks linearize",
         )
     diagram = ab.load_diagram(model)
     parameters = parse_assignments(assignments or [])

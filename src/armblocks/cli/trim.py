@@ -85,11 +85,19 @@ def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
         name, equals, value = text.partition("=")
         if not (equals and name.strip() and value.strip()):
             raise InputError(
-                f"'{text}' does not say which name gets which value", where=option, allowed="NAME=VALUE"
+                f"'{text}' does not say which name gets which value",
+                where=option,
+                allowed="NAME=VALUE",
+                fix=f"write {option} NAME=VALUE",
             )
         parsed = parse_value(value.strip(), where=f"{option} {name}")
         if isinstance(parsed, str | bool):
-            raise InputError(f"'{value.strip()}' is no number", where=f"{option} {name}", allowed="numbers")
+            raise InputError(
+                f"'{value.strip()}' is no number",
+                where=f"{option} {name}",
+                allowed="numbers",
+                fix="give a number, such as 0.5",
+            )
         values[name.strip()] = parsed
     return values
 

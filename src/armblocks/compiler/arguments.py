@@ -36,7 +36,10 @@ def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:
         array = np.asarray(value)
     except (ValueError, TypeError) as error:
         raise InputError(
-            f"'{slot.name}' cannot be read as an array: {error}", where=name, allowed=_allowed(slot)
+            f"'{slot.name}' cannot be read as an array: {error}",
+            where=name,
+            allowed=_allowed(slot),
+            fix="give rows of equal length",
         ) from error
     if array.dtype.kind not in "fiu":
         raise InputError(
@@ -46,7 +49,9 @@ def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:
             fix="convert it with numpy.asarray(…, dtype=float)",
         )
     if array.shape != slot.shape and (array.ndim == 0 or array.shape[1:] != slot.shape):
-        raise InputError(f"'{slot.name}' has shape {array.shape}", where=name, allowed=_allowed(slot))
+        raise InputError(
+            f"'{slot.name}' has shape {array.shape}", where=name, allowed=_allowed(slot), fix="reshape it"
+        )
     return array.astype(np.float64, copy=False)
 
 
@@ -61,6 +66,7 @@ def count_samples(name: str, signature: Signature, arrays: Sequence[Array]) -> i
             f"the inputs hold different numbers of samples: {found}",
             where=name,
             allowed="one number of samples; an input without a samples' axis serves all",
+            fix="give as many samples of each",
         )
     return next(iter(counts.values()), None)
 
@@ -79,7 +85,10 @@ def new_outputs(
     given = cast("tuple[object, ...]", out) if isinstance(out, tuple) else (out,)
     if len(given) != len(signature):
         raise InputError(
-            f"out= holds {len(given)} arrays", where=name, allowed=f"one per output: {_listing(signature)}"
+            f"out= holds {len(given)} arrays",
+            where=name,
+            allowed=f"one per output: {_listing(signature)}",
+            fix="leave out= away, or give one array for each output",
         )
     written: list[Array] = []
     handed: list[Array] = []
@@ -120,7 +129,12 @@ def check_threads(name: str, threads: object) -> int:
     except TypeError:
         count = 0
     if count < 1:
-        raise InputError(f"threads={threads!r}", where=name, allowed="a whole number from 1 up")
+        raise InputError(
+            f"threads={threads!r}",
+            where=name,
+            allowed="a whole number from 1 up",
+            fix="leave threads= away for one",
+        )
     return count
 
 

@@ -67,6 +67,7 @@ class ButcherTableau:
                     f"'{field}' does not fit the {s} stages",
                     where=f"integrator {self.name}",
                     allowed="row i of the matrix has i numbers; see ButcherTableau",
+                    fix=f"correct '{field}'",
                 )
         sums = {f"matrix row {i}": (sum(row), self.nodes[i]) for i, row in enumerate(self.matrix)}
         sums |= {f"extra row {i}": (sum(row), self.extra_nodes[i]) for i, row in enumerate(self.extra_matrix)}

@@ -32,7 +32,12 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
     arrays = [np.asarray(value, dtype=np.float64) for value in inputs]
     found = tuple(array.shape[-1] if array.ndim else -1 for array in arrays)
     if found != tape.input_sizes:
-        raise InputError(f"inputs of sizes {found}", allowed=f"sizes {tape.input_sizes} on the last axis")
+        raise InputError(
+            f"inputs of sizes {found}",
+            allowed=f"sizes {tape.input_sizes} on the last axis",
+            where="tape",
+            fix="give one array for each input of the tape",
+        )
     lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     registers: list[Values] = []
     for array in arrays:

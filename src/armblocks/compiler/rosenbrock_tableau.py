@@ -67,6 +67,7 @@ class RosenbrockTableau:
                     f"'{field}' does not fit the {s} stages",
                     where=f"integrator {self.name}",
                     allowed="row i of a matrix has i numbers; see RosenbrockTableau",
+                    fix=f"correct '{field}'",
                 )
         # Back in the textbook's form, rows add up to the nodes, to the weights of T, to one and to zero.
         inverse = np.eye(s) / self.gamma - _square(self.couplings)

@@ -189,7 +189,10 @@ class Tape:
             flat = numbers[n_in + n_out + n_code :]
         except (ValueError, KeyError, IndexError, struct.error) as error:
             raise CompileError(
-                f"these bytes are no tape: {error}", allowed="what Tape.to_bytes gave"
+                f"these bytes are no tape: {error}",
+                allowed="what Tape.to_bytes gave",
+                where="tape",
+                fix="write the tape again with Tape.to_bytes",
             ) from error
         ends = np.cumsum(output_sizes).tolist()
         outputs = tuple(tuple(flat[end - size : end]) for end, size in zip(ends, output_sizes))

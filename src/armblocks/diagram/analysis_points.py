@@ -139,7 +139,12 @@ def with_analysis_points(
 def _once(names: Sequence[str], kind: str) -> Sequence[str]:
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise InputError(f"the {kind} '{name}' is given twice", allowed="every point once")
+            raise InputError(
+                f"the {kind} '{name}' is given twice",
+                allowed="every point once",
+                where="analysis points",
+                fix="leave one of them out",
+            )
     return names
 
 
@@ -173,6 +178,7 @@ def _port(form: FlatForm, name: str, kind: str) -> PortRef:
                 f"{name}/{entry.name}" for entry in (*block.output_ports(), *block.input_ports())
             ),
             fix="name the port",
+            where="analysis points",
         )
     return PortRef(block_name, outputs[0])
 

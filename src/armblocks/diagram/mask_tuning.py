@@ -73,6 +73,7 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
             f"the mask parameter '{path}' is {type(value).__name__}, which has no slope",
             where=f"diagram '{diagram.name}'",
             allowed="numbers and arrays",
+            fix="choose another parameter",
         )
     slot = Slot(path, shape_of(value), rule.unit)
     change = SX.sym(rule.name, slot.size)

@@ -30,6 +30,7 @@ class UserFunction:
                 f"the arguments of {self.name} cannot be listed",
                 allowed="a function with named arguments, such as def law(u, t)",
                 fix="write a function around it",
+                where=self.name,
             )
 
     @property

@@ -277,6 +277,7 @@ def _trace(
             f"no joint moves, so there is no {name}",
             where=f"robot '{robot.name}'",
             allowed="at least one revolute or prismatic joint",
+            fix="give the robot a joint that moves",
         )
     return TracedFunction.trace(name, _inputs(robot, inputs), signature(output), equations)
 

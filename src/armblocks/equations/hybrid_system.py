@@ -29,6 +29,7 @@ class SampleClock:
                 f"a clock has the period {self.period:g} s and the offset {self.offset:g} s",
                 allowed="a finite period > 0 and 0 <= offset < period",
                 fix="change the sample time",
+                where="sample clock",
             )
 
 

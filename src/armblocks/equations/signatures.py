@@ -54,7 +54,9 @@ class Signature:
         for slot in self.slots:
             if slot.name in seen:
                 raise InputError(
-                    f"the name '{slot.name}' stands twice in one signature", fix="rename one of them"
+                    f"the name '{slot.name}' stands twice in one signature",
+                    fix="rename one of them",
+                    where="signature",
                 )
             seen.add(slot.name)
 
@@ -101,11 +103,19 @@ class Signature:
         flat = np.empty(self.size)
         for slot in self.slots:
             if slot.name not in values:
-                raise InputError(f"no value is given for '{slot.name}'", allowed=", ".join(self.names))
+                raise InputError(
+                    f"no value is given for '{slot.name}'",
+                    allowed=", ".join(self.names),
+                    where="signature",
+                    fix=f"give '{slot.name}' a value",
+                )
             value = np.asarray(values[slot.name], dtype=np.float64)
             if value.shape != slot.shape:
                 raise InputError(
-                    f"'{slot.name}' has shape {value.shape}", allowed=f"shape {slot.shape}", fix="reshape it"
+                    f"'{slot.name}' has shape {value.shape}",
+                    allowed=f"shape {slot.shape}",
+                    fix="reshape it",
+                    where="signature",
                 )
             flat[self.ranges[slot.name]] = value.ravel()
         return flat

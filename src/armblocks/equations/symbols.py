@@ -17,7 +17,12 @@ def flatten(value: SX, shape: Shape) -> SX:
     """
     rows, columns = matrix_shape(shape)
     if value.shape != (rows, columns):
-        raise InputError(f"symbolic value has shape {value.shape}", allowed=f"{(rows, columns)} for {shape}")
+        raise InputError(
+            f"symbolic value has shape {value.shape}",
+            allowed=f"{(rows, columns)} for {shape}",
+            where="symbols",
+            fix="return a value of the declared shape",
+        )
     return reshape(densify(value).T, rows * columns, 1)
 
 

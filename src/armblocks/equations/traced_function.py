@@ -44,7 +44,10 @@ class TracedFunction:
         values = (returned,) if isinstance(returned, SX) else tuple(returned)
         if len(values) != len(outputs):
             raise InputError(
-                f"the equations of '{name}' return {len(values)} values", allowed=f"{len(outputs)} values"
+                f"the equations of '{name}' return {len(values)} values",
+                allowed=f"{len(outputs)} values",
+                where=f"function '{name}'",
+                fix="return one value for each output",
             )
         results = tuple(flatten(SX(value), slot.shape) for value, slot in zip(values, outputs))
         return cls(name=name, inputs=inputs, outputs=outputs, arguments=symbols, results=results)

@@ -216,7 +216,10 @@ def operating_points_at(diagram: Diagram, times: Sequence[float], **settings: An
     """Operating points at times of one run, in the order given. Raises ``InputError`` for a negative time."""
     if not all(np.isfinite(time) and time >= 0.0 for time in times):
         raise InputError(
-            f"the times to linearize at are {list(times)}", allowed="finite times >= 0 s", fix="change them"
+            f"the times to linearize at are {list(times)}",
+            allowed="finite times >= 0 s",
+            fix="change them",
+            where=f"diagram '{diagram.name}'",
         )
     compiled = compile_diagram(diagram)
     evaluated = EvaluatedSystem(compiled.system)

@@ -28,9 +28,16 @@ class Payload:
             raise InputError(
                 f"payload {self} is not made of 1 + 3 + 6 finite numbers",
                 allowed="mass, centre (x, y, z), inertia (xx, yy, zz, xy, yz, xz)",
+                where="Payload",
+                fix="correct the numbers",
             )
         if self.mass < 0:
-            raise InputError(f"payload mass {self.mass} kg is negative", allowed="zero or more")
+            raise InputError(
+                f"payload mass {self.mass} kg is negative",
+                allowed="zero or more",
+                where="Payload",
+                fix="give the mass in kg",
+            )
 
     def vector(self) -> NDArray[np.float64]:
         """The ten numbers in the order that the compiled dynamics take."""

@@ -80,7 +80,10 @@ def sensitivity(
     wanted = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     if not names or not wanted:
         raise InputError(
-            f"{len(names)} parameters and {len(wanted)} outputs are given", allowed="one or more of each"
+            f"{len(names)} parameters and {len(wanted)} outputs are given",
+            allowed="one or more of each",
+            where=system.name,
+            fix="name a parameter and an output",
         )
     for name in names:
         if name not in system.parameters.ranges:

@@ -43,7 +43,10 @@ def jtraj(
     for name, vector in (("qf", goal), ("qd0", first), ("qd1", last)):
         if vector is not None and vector.shape != start.shape:
             raise InputError(
-                f"{name} has {vector.size} joints", where="jtraj", allowed=f"{start.size}, as q0"
+                f"{name} has {vector.size} joints",
+                where="jtraj",
+                allowed=f"{start.size}, as q0",
+                fix=f"give {name} as many numbers as q0",
             )
     times = _instants(t)
     motion = Quintic(q0=start, qf=goal, tmax=times[-1:], qd0=first, qd1=last).at(times)
@@ -54,7 +57,10 @@ def _joint_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
     vector = np.atleast_1d(np.asarray(value, dtype=np.float64))
     if vector.ndim != 1 or not np.isfinite(vector).all():
         raise InputError(
-            f"{name} = {value!r}", where="jtraj", allowed="a vector of finite joint values, one per joint"
+            f"{name} = {value!r}",
+            where="jtraj",
+            allowed="a vector of finite joint values, one per joint",
+            fix="give one finite number for each joint",
         )
     return vector
 
@@ -62,7 +68,12 @@ def _joint_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
 def _instants(t: ArrayLike | int) -> NDArray[np.float64]:
     if isinstance(t, int):
         if t < 2:
-            raise InputError(f"t = {t} samples", where="jtraj", allowed="2 or more, or a vector of instants")
+            raise InputError(
+                f"t = {t} samples",
+                where="jtraj",
+                allowed="2 or more, or a vector of instants",
+                fix="use np.linspace(0, T, N) for instants in s",
+            )
         return np.linspace(0.0, 1.0, t)
     times = np.asarray(t, dtype=np.float64)
     rising = times.ndim == 1 and times.size >= 2 and bool((np.diff(times) > 0).all())

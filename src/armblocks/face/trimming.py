@@ -121,7 +121,10 @@ def _spread(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
     array = np.asarray(value, dtype=np.float64)
     if array.ndim and array.shape != shape:
         raise InputError(
-            f"{what} is given values of shape {array.shape}", allowed=f"a number, or shape {shape}"
+            f"{what} is given values of shape {array.shape}",
+            allowed=f"a number, or shape {shape}",
+            where="trim",
+            fix="give one number for each element, or one for all",
         )
     return np.broadcast_to(array, shape).ravel()
 
@@ -175,6 +178,7 @@ def _bounds(
                 f"the bounds of '{name}' are {low:g} and {high:g}",
                 allowed="the lower one first",
                 fix="swap them",
+                where=system.name,
             )
         layout, slot = place
         found |= dict.fromkeys(layout[slot].elements, (float(low), float(high)))

@@ -31,7 +31,9 @@ def canonical_bytes(
         return ("".join(pieces) + "\n").encode("utf-8")
     except UnicodeEncodeError as error:
         raise FormatError(
-            "a text cannot be written, as it is not valid Unicode", fix="correct the text"
+            "a text cannot be written, as it is not valid Unicode",
+            fix="correct the text",
+            where="JSON document",
         ) from error
 
 
@@ -39,7 +41,12 @@ def _check_depth(value: object, deepest: int) -> None:
     level, depth = [value], 0
     while level:
         if depth > deepest:
-            raise FormatError("objects and arrays lie too deep in each other", allowed=f"{deepest} levels")
+            raise FormatError(
+                "objects and arrays lie too deep in each other",
+                allowed=f"{deepest} levels",
+                where="JSON document",
+                fix="put less into each other",
+            )
         inside: list[object] = []
         for entry in level:
             if isinstance(entry, Mapping):
@@ -58,7 +65,12 @@ def _write(
             members = cast("Mapping[object, object]", value)
             keys = [key for key in members if isinstance(key, str)]
             if len(keys) < len(members):
-                raise FormatError("a key is not text", where=path_text(path), allowed="texts as keys")
+                raise FormatError(
+                    "a key is not text",
+                    where=path_text(path),
+                    allowed="texts as keys",
+                    fix="use texts as keys",
+                )
             flat = one_line(path)
             _write_group(
                 "{}",
@@ -104,7 +116,10 @@ def _scalar(value: object, path: KeyPath) -> str:
         case float():
             if not math.isfinite(value):
                 raise FormatError(
-                    f"the number {value} cannot be written", where=path_text(path), allowed="finite numbers"
+                    f"the number {value} cannot be written",
+                    where=path_text(path),
+                    allowed="finite numbers",
+                    fix="replace it by a finite number",
                 )
             # 10.0 as 10, which is how JavaScript writes it; the sign of -0.0 would be lost so.
             whole = (
@@ -116,4 +131,5 @@ def _scalar(value: object, path: KeyPath) -> str:
                 f"a {type(value).__name__} cannot be written",
                 where=path_text(path),
                 allowed="JSON's own types",
+                fix="turn it into numbers, texts, lists and objects",
             )

@@ -278,6 +278,7 @@ def _value(value: object) -> str:
             f"the function {value.name} has no place in a listing",
             allowed="diagrams without Python functions",
             fix="write the diagram as JSON, which names the function's file",
+            where=f"function {value.name}",
         )
     if isinstance(value, TimeTable):
         return f"ab.load_table({_text(value.source)})" if value.source else _value(_nested(value))

@@ -19,7 +19,10 @@ def load_function(reference: str, folder: Path | None) -> UserFunction:
     file = Path(path) if folder is None else folder / path
     if not path.endswith(".py") or not name.isidentifier() or not file.is_file():
         raise FormatError(
-            f"'{reference}' names no function of a file", allowed="file.py:name, relative to the diagram"
+            f"'{reference}' names no function of a file",
+            allowed="file.py:name, relative to the diagram",
+            where=f"function '{reference[:80]}'",
+            fix="write the file's path from the diagram's folder, a colon, and the function's name",
         )
     spec = spec_from_file_location(file.stem, file)
     assert spec is not None
@@ -28,8 +31,17 @@ def load_function(reference: str, folder: Path | None) -> UserFunction:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise FormatError(f"the code of {path} fails: {type(error).__name__}: {error}"[:300]) from error
+        raise FormatError(
+            f"the code of {path} fails: {type(error).__name__}: {error}"[:300],
+            where=str(file),
+            fix="run the file with Python, and correct what it says",
+        ) from error
     found = vars(module).get(name)
     if not callable(found):
-        raise FormatError(f"{path} has no function named '{name}'", fix="correct the name")
+        raise FormatError(
+            f"{path} has no function named '{name}'",
+            fix="correct the name",
+            where=str(file),
+            allowed="a function that the file defines at its top",
+        )
     return UserFunction(found)

@@ -105,7 +105,12 @@ def read_robots(data: bytes, name: str) -> Mapping[str, Robot]:
     """
     format = _format(name)
     if len(data) > format.most_bytes:
-        raise FormatError(f"it has {len(data)} bytes", where=name, allowed=f"at most {format.most_bytes}")
+        raise FormatError(
+            f"it has {len(data)} bytes",
+            where=name,
+            allowed=f"at most {format.most_bytes}",
+            fix="split the file, or write the robot as JSON",
+        )
     return format.read(data, name)
 
 
@@ -126,7 +131,10 @@ def _pick(robots: Mapping[str, Robot], where: str, name: str | None) -> Robot:
     """The robot that is meant among those of one file."""
     if not robots:
         raise FormatError(
-            "the file defines no robot", where=where, allowed="kuka = robot(L, …) or SerialLink(L, …)"
+            "the file defines no robot",
+            where=where,
+            allowed="kuka = robot(L, …) or SerialLink(L, …)",
+            fix="let the script make a robot, or name another file",
         )
     if name is not None:
         for variable, robot in robots.items():

@@ -145,6 +145,7 @@ class RobotWriter:
                 f"the function {function.name} stands in no file of its own",
                 allowed="functions at the top of a .py file, whose place a diagram can name",
                 fix="move it to a file and import it",
+                where=f"function {function.name}",
             )
         return f"{relative_to_folder(file, self._folder)}:{name}"
 

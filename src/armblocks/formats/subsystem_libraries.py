@@ -72,6 +72,8 @@ def library_path(reference: str, folder: Path | None) -> Path:
         raise FormatError(
             f"{reference[:80]!r} is no path of a library",
             allowed=f"the path of a {SUFFIX} file, or one of {', '.join(list_libraries())}",
+            where="library",
+            fix=f"name a file that ends in {SUFFIX}",
         )
     return (Path(reference) if folder is None else folder / reference).resolve()
 

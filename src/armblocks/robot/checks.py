@@ -26,7 +26,9 @@ def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform
         where = f"{robot}, link '{link.name}'"
         _check_finite(where, _link_numbers(link))
         if link.mass < 0:
-            raise RobotError(f"the mass is {link.mass:g} kg", where=where, allowed="zero or more")
+            raise RobotError(
+                f"the mass is {link.mass:g} kg", where=where, allowed="zero or more", fix="check its sign"
+            )
         _check_joint(where, link.joint)
         if link.motor is not None:
             _check_motor(where, link.motor)
@@ -36,13 +38,17 @@ def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform
 def _check_tree(robot: str, links: Sequence[Link]) -> None:
     """Count, names and parents: every chain of parents ends at the base."""
     if not links:
-        raise RobotError("it has no links", where=robot, allowed="1 link or more")
+        raise RobotError("it has no links", where=robot, allowed="1 link or more", fix="add a link")
     if len(links) > MOST_LINKS:
-        raise RobotError(f"it has {len(links)} links", where=robot, allowed=f"at most {MOST_LINKS}")
+        raise RobotError(
+            f"it has {len(links)} links", where=robot, allowed=f"at most {MOST_LINKS}", fix="split the robot"
+        )
     parents: dict[str, str | None] = {}
     for link in links:
         if not link.name:
-            raise RobotError("a link has no name", where=robot, allowed="a name that is not empty")
+            raise RobotError(
+                "a link has no name", where=robot, allowed="a name that is not empty", fix="name it"
+            )
         if link.name in parents:
             raise RobotError(
                 f"two links are named '{link.name}'", where=robot, allowed="every name once", fix="rename one"
@@ -75,7 +81,12 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
 
 def _check_joint(where: str, joint: Joint) -> None:
     if joint.moves and not any(joint.axis):
-        raise RobotError("the joint's axis is zero", where=where, allowed="a direction such as (0, 0, 1)")
+        raise RobotError(
+            "the joint's axis is zero",
+            where=where,
+            allowed="a direction such as (0, 0, 1)",
+            fix="set the axis along which it moves",
+        )
     limits = joint.limits
     if limits.position is not None and limits.position[0] > limits.position[1]:
         low, high = limits.position
@@ -83,11 +94,15 @@ def _check_joint(where: str, joint: Joint) -> None:
             f"the position limits are reversed: from {low:g} to {high:g} {joint.unit}",
             where=where,
             allowed="the lower limit first",
+            fix="swap the two limits",
         )
     for kind, value in (("speed", limits.speed), ("torque", limits.torque)):
         if value is not None and value <= 0:
             raise RobotError(
-                f"the {kind} limit is {value:g}", where=where, allowed="above zero, or None where unknown"
+                f"the {kind} limit is {value:g}",
+                where=where,
+                allowed="above zero, or None where unknown",
+                fix="give its magnitude, or leave it out",
             )
 
 
@@ -100,7 +115,12 @@ def _check_motor(where: str, motor: Motor) -> None:
             fix="use 1 for a direct drive, or no motor at all",
         )
     if motor.inertia < 0:
-        raise RobotError(f"the motor inertia is {motor.inertia:g} kg m2", where=where, allowed="zero or more")
+        raise RobotError(
+            f"the motor inertia is {motor.inertia:g} kg m2",
+            where=where,
+            allowed="zero or more",
+            fix="check its sign",
+        )
     plus, minus = motor.coulomb_friction
     if motor.viscous_friction < 0 or plus < 0 or minus > 0:
         warnings.warn(
@@ -129,7 +149,9 @@ def _check_dh(where: str, link: Link) -> None:
 def _check_finite(where: str, fields: Iterator[tuple[str, float]]) -> None:
     for field, value in fields:
         if not math.isfinite(value):
-            raise RobotError(f"{field} is {value}", where=where, allowed="a finite number")
+            raise RobotError(
+                f"{field} is {value}", where=where, allowed="a finite number", fix=f"set {field} to a number"
+            )
 
 
 def _numbers(transform: Transform) -> Iterator[float]:

@@ -71,10 +71,14 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
             "it is no single chain of D-H rows",
             where=where,
             allowed="robots whose every link has a row and hangs on the link before it",
+            fix="build its links with standard_dh or modified_dh",
         )
     if len({row.convention for row in rows}) > 1:
         raise RobotError(
-            "its rows are of both conventions", where=where, allowed="rows of one convention throughout"
+            "its rows are of both conventions",
+            where=where,
+            allowed="rows of one convention throughout",
+            fix="write all rows in one of them",
         )
     return rows
 

@@ -43,7 +43,10 @@ class DhRow:
             object.__setattr__(self, name, float(getattr(self, name)) + 0.0)
         if self.sigma not in (0, 1):
             raise RobotError(
-                f"sigma of a D-H row is {self.sigma}", allowed="0 for a revolute, 1 for a prismatic joint"
+                f"sigma of a D-H row is {self.sigma}",
+                allowed="0 for a revolute, 1 for a prismatic joint",
+                where="D-H row",
+                fix="set sigma to 0 or 1",
             )
         object.__setattr__(self, "sigma", int(self.sigma))
 

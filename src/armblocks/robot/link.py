@@ -36,7 +36,10 @@ class Motor:
         Tc = np.atleast_1d(np.asarray(self.coulomb_friction, dtype=np.float64)).ravel()
         if Tc.size not in (1, 2):
             raise RobotError(
-                f"the Coulomb friction of a motor has {Tc.size} numbers", allowed="Tc, or the pair Tc+ Tc-"
+                f"the Coulomb friction of a motor has {Tc.size} numbers",
+                allowed="Tc, or the pair Tc+ Tc-",
+                where="motor",
+                fix="give (Tc+, Tc-), Tc- negative",
             )
         pair = (float(Tc[0]), -float(Tc[0]) if Tc.size == 1 else float(Tc[1]))
         object.__setattr__(self, "coulomb_friction", (pair[0] + 0.0, pair[1] + 0.0))
@@ -109,7 +112,10 @@ def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
     if numbers.shape == (3, 3):
         if not np.allclose(numbers, numbers.T, rtol=1e-9, atol=0.0, equal_nan=True):
             raise RobotError(
-                "the matrix is not symmetric", where=where, allowed="Ixy = Iyx, Iyz = Izy, Ixz = Izx"
+                "the matrix is not symmetric",
+                where=where,
+                allowed="Ixy = Iyx, Iyz = Izy, Ixz = Izx",
+                fix="make both halves the same",
             )
         return matrix3((numbers + numbers.T) / 2, where=where)
     flat = [float(number) + 0.0 for number in numbers.ravel()]
@@ -120,6 +126,7 @@ def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
             f"the shape is {numbers.shape}",
             where=where,
             allowed="(3, 3), or 3 numbers Ixx Iyy Izz, or 6 numbers Ixx Iyy Izz Ixy Iyz Ixz",
+            fix="give the inertia in one of these forms",
         )
     xx, yy, zz, xy, yz, xz = flat
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)

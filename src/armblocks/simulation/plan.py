@@ -276,6 +276,7 @@ def parameter_vector(system: CompiledSystem, given: Mapping[str, ArrayLike] | Ar
             f"the parameter vector has shape {p.shape}",
             where=system.name,
             allowed=f"({layout.size},): one number for each of {', '.join(layout.names) or 'none'}",
+            fix="give a mapping by name instead",
         )
     # An infinite limit is a value that the diagram itself may have.
     return _refuse(system, p, ~np.isfinite(p) & np.isfinite(system.parameter_values))
@@ -299,6 +300,7 @@ def changed_parameters(system: CompiledSystem, p: Array, given: Mapping[str, Arr
                 f"parameter '{name}' got a value of shape {array.shape}",
                 where=system.name,
                 allowed=f"shape {slot.shape}, or one number for all of it",
+                fix="give one number for each element",
             )
         p[layout.ranges[name]] = np.broadcast_to(array, slot.shape).ravel()
     return _refuse(system, p, np.isnan(p))

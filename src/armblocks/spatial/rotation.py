@@ -30,7 +30,9 @@ def vector3(value: ArrayLike, *, where: str = "") -> Vector3:
     """Three numbers in any array shape of size 3 as a tuple; raises InputError for another count."""
     array = _numbers(value, where)
     if array.size != 3:
-        raise InputError(f"{array.size} numbers are given", where=where, allowed="3 numbers x y z")
+        raise InputError(
+            f"{array.size} numbers are given", where=where, allowed="3 numbers x y z", fix="give x, y and z"
+        )
     x, y, z = (float(number) + 0.0 for number in array.ravel())
     return x, y, z
 
@@ -39,7 +41,12 @@ def matrix3(value: ArrayLike, *, where: str = "") -> Matrix3:
     """A (3, 3) array as three rows of floats; raises InputError for another shape."""
     array = _numbers(value, where)
     if array.shape != (3, 3):
-        raise InputError(f"the shape is {array.shape}", where=where, allowed="shape (3, 3)")
+        raise InputError(
+            f"the shape is {array.shape}",
+            where=where,
+            allowed="shape (3, 3)",
+            fix="give three rows of three numbers",
+        )
     return vector3(array[0]), vector3(array[1]), vector3(array[2])
 
 
@@ -47,7 +54,12 @@ def _numbers(value: ArrayLike, where: str) -> NDArray[np.float64]:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{value!r} is not an array of numbers", where=where) from None
+        raise InputError(
+            f"{value!r} is not an array of numbers",
+            where=where,
+            allowed="numbers, lists of them, or arrays",
+            fix="give numbers",
+        ) from None
 
 
 def cos_exact(angle: float) -> float:

@@ -50,12 +50,18 @@ class Transform:
         """From a homogeneous (4, 4) matrix; raises InputError where its last row is not 0 0 0 1."""
         T = np.asarray(matrix, dtype=np.float64)
         if T.shape != (4, 4):
-            raise InputError(f"a transform has shape {T.shape}", allowed="shape (4, 4)")
+            raise InputError(
+                f"a transform has shape {T.shape}",
+                allowed="shape (4, 4)",
+                where="Transform.from_matrix",
+                fix="give four rows of four numbers",
+            )
         if not np.array_equal(T[3], (0.0, 0.0, 0.0, 1.0)) and np.isfinite(T).all():
             raise InputError(
                 f"the last row of a transform is {T[3].tolist()}",
                 allowed="0 0 0 1",
                 fix="pass the pose of a frame as [R p; 0 0 0 1]",
+                where="Transform.from_matrix",
             )
         return cls(rotation=T[:3, :3], translation=T[:3, 3])
 
@@ -150,10 +156,12 @@ def _check_rotation(rotation: Matrix3) -> None:
             f"a matrix that should be a rotation is not: R'R differs from the identity by {error:.3g}",
             allowed=f"at most {ORTHONORMALITY:g}",
             fix="give its numbers with more digits, or build it from angles with trotx, troty, trotz",
+            where="rotation of a transform",
         )
     if np.linalg.det(R) < 0:
         raise InputError(
             "a matrix that should be a rotation is a mirror (its determinant is -1)",
             allowed="determinant +1",
             fix="check the sign of one of its axes",
+            where="rotation of a transform",
         )

@@ -163,7 +163,9 @@ def journaled_document(path: Path, folder: Path, resolve_robot: ResolveRobot) ->
     try:
         return _replayed(records, path, whole, folder, resolve_robot)
     except (KeyError, TypeError, AttributeError) as error:
-        raise FormatError("this is no journal of the studio", where=str(path)) from error
+        raise FormatError(
+            "this is no journal of the studio", where=str(path), fix="open the drawing's own file"
+        ) from error
 
 
 def _replayed(

@@ -355,7 +355,12 @@ def _connection(wire: Wire) -> Connection:
 def _port(text: str) -> PortRef:
     block, slash, port = text.rpartition("/")
     if not slash:
-        raise DiagramError(f"'{text}' is no port", allowed="block/port", fix="name the block and the port")
+        raise DiagramError(
+            f"'{text}' is no port",
+            allowed="block/port",
+            fix="name the block and the port",
+            where="connection",
+        )
     return PortRef(block, port)
 
 

@@ -291,7 +291,12 @@ class Hub:
         level = inside(self.documents[document].document.diagram, path)
         robot = getattr(level.block(block), "robot", None)
         if not isinstance(robot, Robot):
-            raise InputError("the block has no robot", where=f"block '{block}'", allowed="a robot block")
+            raise InputError(
+                "the block has no robot",
+                where=f"block '{block}'",
+                allowed="a robot block",
+                fix="choose a block with a robot",
+            )
         return robot
 
     async def show_diagram(self, page: Page, data: bytes, name: str) -> str:

@@ -99,10 +99,19 @@ def read_journal(path: Path) -> tuple[list[Record], int]:
     """
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise FormatError("the journal is too large", where=str(path), allowed=f"{MOST_BYTES} bytes")
+            raise FormatError(
+                "the journal is too large",
+                where=str(path),
+                allowed=f"{MOST_BYTES} bytes",
+                fix="save the drawing, which starts another journal",
+            )
         data = path.read_bytes()
     except OSError as error:
-        raise FormatError(f"the journal cannot be read ({error.strerror})", where=str(path)) from error
+        raise FormatError(
+            f"the journal cannot be read ({error.strerror})",
+            where=str(path),
+            fix="check the rights of the file, or open the drawing's own file",
+        ) from error
     records: list[Record] = []
     whole = 0
     for record, end in _records(data):

@@ -228,6 +228,7 @@ class OpenDocuments:
             f"{len(self._open)} documents with unsaved edits are open",
             allowed=f"at most {MOST_DOCUMENTS}",
             fix="save or discard some of them",
+            where="studio",
         )
 
     # -- changing --------------------------------------------------------------------------------------------
@@ -249,7 +250,12 @@ class OpenDocuments:
     def reload(self, found: OpenDocument) -> None:
         """Take what the file holds now, as one step that can be undone."""
         if found.path is None:
-            raise FormatError("the drawing has no file yet", allowed="a file", fix="save it under a name")
+            raise FormatError(
+                "the drawing has no file yet",
+                allowed="a file",
+                fix="save it under a name",
+                where=found.document.diagram.name,
+            )
         data, on_disk = self.folder.read_known(found.path)
         place = self.folder.path(found.path)
         read = formats.diagram_from_bytes(
@@ -296,7 +302,12 @@ class OpenDocuments:
         async with found.saving:
             path = path or found.path or ""
             if not path:
-                raise FormatError("the drawing has no file yet", allowed="a path", fix="save it under a name")
+                raise FormatError(
+                    "the drawing has no file yet",
+                    allowed="a path",
+                    fix="save it under a name",
+                    where=found.document.diagram.name,
+                )
             place = self.folder.path(path)
             path = place.relative_to(self.folder.root).as_posix()
             if not overwrite:

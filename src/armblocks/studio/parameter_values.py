@@ -68,7 +68,9 @@ def number_value(text: str, where: str) -> float | list[Any]:
         variables = read_script(f"deg = pi/180; rad = 1; value = {text};".encode(), "field").variables
     except ArmblocksError as error:
         what = error.what.partition(", in: ")[0]  # the line around it is not the user's
-        raise InputError(f"'{_short(text)}': {what}", where=where, allowed=allowed) from None
+        raise InputError(
+            f"'{_short(text)}': {what}", where=where, allowed=allowed, fix="correct the formula"
+        ) from None
     value = variables.get("value")
     if set(variables) != {"deg", "rad", "value"} or not isinstance(value, np.ndarray):
         raise InputError(f"'{_short(text)}' is no number", where=where, allowed=allowed, fix="type a value")

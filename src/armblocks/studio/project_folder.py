@@ -81,12 +81,27 @@ class ProjectFolder:
         # send the user's credentials (CVE-2024-35178).
         strange = "\0" in relative or "\\" in relative or ":" in relative or relative.startswith("/")
         if not relative or strange or len(relative) > 1000:
-            raise FormatError(f"{relative[:80]!r} is no path of the project", allowed=allowed)
+            raise FormatError(
+                f"{relative[:80]!r} is no path of the project",
+                allowed=allowed,
+                where="project folder",
+                fix="choose a file of the project",
+            )
         found = (self.root / relative).resolve()
         if not found.is_relative_to(self.root) or found == self.root:
-            raise FormatError(f"'{relative[:80]}' lies outside of the project folder", allowed=allowed)
+            raise FormatError(
+                f"'{relative[:80]}' lies outside of the project folder",
+                allowed=allowed,
+                where="project folder",
+                fix="copy the file into the project",
+            )
         if found.suffix.lower() not in suffixes:
-            raise FormatError(f"the studio does not open '{relative[:80]}'", allowed=allowed)
+            raise FormatError(
+                f"the studio does not open '{relative[:80]}'",
+                allowed=allowed,
+                where="project folder",
+                fix="choose a file of another kind",
+            )
         return found
 
     def read(self, relative: str) -> bytes:
@@ -108,6 +123,7 @@ class ProjectFolder:
                 f"the library '{path.name}' lies outside of the project folder",
                 allowed="shipped libraries, and files of the project folder",
                 fix="copy the library into the project",
+                where="project folder",
             )
         return read_bounded(path, MOST_BYTES)
 
@@ -196,4 +212,5 @@ def check_file_name(relative: str) -> None:
             f"'{part[:80]}' cannot be a file's name: it {reason}",
             allowed=f"letters, digits, spaces, - and _, at most {LONGEST_NAME} characters",
             fix="choose another name",
+            where="project folder",
         )

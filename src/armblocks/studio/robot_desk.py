@@ -142,6 +142,7 @@ class RobotDesk:
                 f"{len(self.robots)} robots are open",
                 allowed=f"at most {MOST_ROBOTS}",
                 fix="restart the studio",
+                where="studio",
             )
         found = OpenRobot(key=secrets.token_hex(8), history=History(robot), **facts)
         self.robots[found.key] = found
@@ -203,12 +204,18 @@ class RobotDesk:
         try:
             data = base64.b64decode(request.content, validate=True)
         except ValueError:  # binascii.Error, or letters that are not ASCII
-            raise InputError("the content is not base64", where=request.name[:80], allowed="base64") from None
+            raise InputError(
+                "the content is not base64",
+                where=request.name[:80],
+                allowed="base64",
+                fix="drop the file again",
+            ) from None
         if len(data) > say.MOST_DROPPED:
             raise FormatError(
                 f"the file has {len(data)} bytes",
                 where=request.name[:80],
                 allowed=f"at most {say.MOST_DROPPED}",
+                fix="choose a smaller file",
             )
         if suffix == ".json" and not formats.holds_robot(data):
             key = await self._drawings.show_diagram(page, data, request.name)
@@ -241,7 +248,12 @@ class RobotDesk:
         found = self._known(request.robot)
         path = request.path or found.path
         if not path:
-            raise FormatError("the robot has no file yet", allowed="a path", fix="save it under a name")
+            raise FormatError(
+                "the robot has no file yet",
+                allowed="a path",
+                fix="save it under a name",
+                where=f"robot '{found.robot.name}'",
+            )
         disk, _ = self._folder.compared(path, found.on_disk)
         if path == found.path and disk == "changed" and not request.overwrite:
             raise FormatError(
@@ -294,7 +306,10 @@ def _read(data: bytes, name: str) -> tuple[Mapping[str, Robot], tuple[str, ...]]
         robots = formats.read_robots(data, name)
     if not robots:
         raise FormatError(
-            "the file defines no robot", where=name, allowed="kuka = robot(L, …) or SerialLink(L, …)"
+            "the file defines no robot",
+            where=name,
+            allowed="kuka = robot(L, …) or SerialLink(L, …)",
+            fix="let the script make a robot, or choose another file",
         )
     said = [str(one.message) for one in caught if issubclass(one.category, ArmblocksWarning)]
     return robots, tuple(dict.fromkeys(said))

@@ -128,14 +128,21 @@ def _with_cell(robot: Robot, edit: SetCell) -> Robot:
     column = _known(LINK_COLUMNS, edit.column)
     where = f"link '{link.name}', {column.title}"
     if why := column.locked(link):
-        raise InputError("there is nothing to type here", where=where, allowed=why)
+        raise InputError(
+            "there is nothing to type here", where=where, allowed=why, fix="type into another cell"
+        )
     changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.turn)))
     return replace(robot, links=tuple(changed if each is link else each for each in robot.links))
 
 
 def _known(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
     if name not in columns:
-        raise InputError(f"there is no column '{name[:40]}'", allowed=", ".join(columns))
+        raise InputError(
+            f"there is no column '{name[:40]}'",
+            allowed=", ".join(columns),
+            where="robot table",
+            fix="choose one of these columns",
+        )
     return columns[name]
 
 
@@ -146,7 +153,12 @@ def _typed(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, tu
         return text
     if column.quantity is Quantity.CHOICE:
         if text not in column.choices:
-            raise InputError(f"'{text[:40]}' is no choice", where=where, allowed=", ".join(column.choices))
+            raise InputError(
+                f"'{text[:40]}' is no choice",
+                where=where,
+                allowed=", ".join(column.choices),
+                fix="take one of the list",
+            )
         return text
     if not text:
         if column.optional:
@@ -157,7 +169,9 @@ def _typed(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, tu
     )
     value = angle_value(text, where, edit.angles) if angular else _one_number(text, where)
     if not math.isfinite(value):
-        raise InputError(f"{column.title} is {value}", where=where, allowed="a finite number")
+        raise InputError(
+            f"{column.title} is {value}", where=where, allowed="a finite number", fix="type a finite number"
+        )
     return value
 
 
@@ -178,7 +192,9 @@ def angle_value(text: str, where: str, unit: Literal["deg", "rad"]) -> float:
 def _one_number(text: str, where: str) -> float:
     value = number_value(text, where)
     if isinstance(value, list):
-        raise InputError(f"{len(value)} numbers were typed", where=where, allowed="one number")
+        raise InputError(
+            f"{len(value)} numbers were typed", where=where, allowed="one number", fix="type one number"
+        )
     return value
 
 
@@ -230,6 +246,7 @@ def _without_joint(robot: Robot, name: str) -> Robot:
             "a robot has one link at least",
             where=f"robot '{robot.name}'",
             allowed="more than one link, to take one out",
+            fix="change this link instead",
         )
     links = tuple(
         replace(link, parent=gone.parent) if link.parent == name else link
@@ -247,10 +264,14 @@ def _with_joint_moved(robot: Robot, name: str, by: int) -> Robot:
             "the links do not form a single chain",
             where=f"robot '{robot.name}'",
             allowed="links of a chain change places; those of a tree do not",
+            fix="change the parents of the links",
         )
     if not 0 <= place + by < len(links):
         raise InputError(
-            "there is no neighbour on that side", where=f"link '{name}'", allowed="the other direction"
+            "there is no neighbour on that side",
+            where=f"link '{name}'",
+            allowed="the other direction",
+            fix="move it the other way",
         )
     links[place], links[place + by] = links[place + by], links[place]
     return replace(robot, links=serial_chain(links))

@@ -34,7 +34,12 @@ def variable_of(link: Link) -> str:
 def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -> Link:
     """The link with another D-H row: joint and transforms follow it. ``limits``: its own where left out."""
     if link.dh is None:
-        raise RobotError(_NO_ROW, where=f"link '{link.name}'", allowed="links with a D-H row")
+        raise RobotError(
+            _NO_ROW,
+            where=f"link '{link.name}'",
+            allowed="links with a D-H row",
+            fix="edit its transforms instead",
+        )
     row = replace(link.dh, **changes)  # pyright: ignore[reportArgumentType] - fields by name
     return link_from_dh(
         link.name,

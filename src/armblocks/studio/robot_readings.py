@@ -48,6 +48,7 @@ def _check_count(robot: Robot, name: str, values: Sequence[float]) -> None:
             f"{len(values)} numbers were given for {name}",
             where=f"robot '{robot.name}'",
             allowed=f"{robot.n}, one for each joint",
+            fix="give one number for each joint",
         )
 
 

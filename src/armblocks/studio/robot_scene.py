@@ -79,6 +79,7 @@ def link_frames_of(robot: Robot, q: Sequence[float]) -> list[Any]:
             f"{len(q)} joint coordinates were given",
             where=f"robot '{robot.name}'",
             allowed=f"{len(robot.moving_links)}, one for each joint",
+            fix="give one number for each joint",
         )
     return link_frames(robot, q).tolist()
 

@@ -100,7 +100,9 @@ class _Run:
             self._fail(error)
         except MemoryError:
             fix = "record fewer samples, or shorten the run"
-            self._fail(SimulationError("the run needs more memory than it may have", fix=fix))
+            self._fail(
+                SimulationError("the run needs more memory than it may have", fix=fix, where=self.document)
+            )
 
     def _go(self) -> None:
         diagram = formats.diagram_from_bytes(

@@ -30,6 +30,8 @@ class JointLimits:
                 raise RobotError(
                     f"the position limits are {len(position)} numbers",
                     allowed="a pair, or None where unknown",
+                    where="joint limits",
+                    fix="give (lowest, highest)",
                 )
             object.__setattr__(self, "position", position)
         for name in ("speed", "torque"):
