@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -28,6 +31,7 @@ from armblocks.diagram import (
     mask_parameter,
     with_parameters,
 )
+from armblocks.diagram.mask import formula_number
 from armblocks.errors import DiagramError, InputError, UnknownNameError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
 
@@ -241,3 +245,11 @@ def test_mistakes_are_named(number: int) -> None:
     act, kind, message = mistakes()[number]
     with pytest.raises(kind, match=message):
         act()  # pyright: ignore
+
+
+def test_numbers_over_zero_are_what_floating_point_says() -> None:
+    assert formula_number("-1/0", "here") == -math.inf
+    assert formula_number("[1 -2]./[0 0]", "here") == [math.inf, -math.inf]
+    assert math.isnan(cast("float", formula_number("0/0", "here")))
+    with pytest.raises(UnknownNameError, match="there is no name named 'k'"):
+        formula_number("2*k", "here")

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 
 import armblocks as ab
 from armblocks.errors import ArmblocksWarning, FormatError
-from armblocks.formats import holds_robot, load_robot, read_robots, write_robot
+from armblocks.formats import DocumentKind, kind_of_data, load_robot, read_robots, write_robot
 from armblocks.studio.hub import Hub, Page
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_messages import MOST_DROPPED
@@ -256,10 +256,13 @@ def test_singularities_are_told_in_words() -> None:
 
 
 def test_files_of_robots_are_told_from_diagrams_and_bounded() -> None:
-    assert holds_robot(write_robot(load_robot("kr180")))
-    assert not holds_robot(b'{"blocks": {}, "links": []}')
-    assert not holds_robot(b"[1, 2]")
-    assert not holds_robot(b"{")
+    assert kind_of_data(write_robot(load_robot("kr180")), "arm.json") is DocumentKind.ROBOT
+    assert kind_of_data(b"% a script", "arm.m") is DocumentKind.ROBOT
+    assert kind_of_data(b'{"blocks": {}, "links": []}', "model.json") is DocumentKind.DIAGRAM
+    assert kind_of_data(b'{"library": "joints", "blocks": {}}', "parts.JSON") is DocumentKind.LIBRARY
+    for wrong in (b"[1, 2]", b"{"):
+        with pytest.raises(FormatError, match=r"model\.json"):
+            kind_of_data(wrong, "model.json")
     with pytest.raises(FormatError, match="is no suffix of a robot file"):
         read_robots(b"", "arm.step")
     with pytest.raises(FormatError, match="it has 1048577 bytes"):

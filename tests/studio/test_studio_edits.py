@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram, diagram_views
+from armblocks.blocks import BLOCKS, Gain
+from armblocks.diagram import Diagram, diagram_views, formula, mask_parameter
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
 from armblocks.studio.document import Document
@@ -27,6 +30,7 @@ from armblocks.studio.edits import (
     SetParameters,
     SetSettings,
     Wire,
+    applied,
     summary,
 )
 from armblocks.studio.sheet import placed
@@ -138,8 +142,9 @@ def test_refusals_say_what_is_in_the_way() -> None:
     many = [NewBlock(name=f"b{k}", type="Gain", place=place) for k in range(20_000)]
     assert "the sheet would hold 20002 blocks" in refused(AddBlocks(blocks=many))
     wrong = SetParameters(block="gain", values={"gain": "import os"})
-    assert "'os' is not understood here" in refused(wrong)
-    assert "is no number" in refused(SetParameters(block="gain", values={"gain": "1; x = 2"}))
+    assert "'import os' is no formula" in refused(wrong)
+    assert "there is no name named 'os'" in refused(SetParameters(block="gain", values={"gain": "2*os"}))
+    assert "is no formula" in refused(SetParameters(block="gain", values={"gain": "1; x = 2"}))
     assert "this is no value" in refused(SetParameters(block="gain", values={"gain": " "}))
     plot = AddBlocks(blocks=[NewBlock(name="p", type="RobotPlot", parameters={"robot": 3}, place=place)])
     assert "a robot is asked for, and int was given" in refused(plot)
@@ -154,13 +159,30 @@ def test_there_is_an_end_to_undo_and_redo() -> None:
 
 @pytest.mark.parametrize(
     ("typed", "value"),
-    [("2*pi", 6.283185307179586), ("-1/4", -0.25), ("45*deg", 0.7853981633974483), ("1e3", 1000.0)],
+    [
+        ("2*pi", 6.283185307179586),
+        ("-1/4", -0.25),
+        ("45*deg", 0.7853981633974483),
+        ("2*rad", 2.0),
+        ("1e3", 1000.0),
+        (" 007 ", 7.0),
+        ("1/Inf", 0.0),
+        ("2^3^2", 64.0),
+        ("[1 2; 3 4]", ((1.0, 2.0), (3.0, 4.0))),
+        ("[1 -2]'", (1.0, -2.0)),
+        ("sqrt(2)*[1, 0]", (math.sqrt(2.0), 0.0)),
+    ],
 )
 def test_numbers_may_be_typed_as_formulas(typed: str, value: float) -> None:
     document = empty()
     new = NewBlock(name="gain", type="Gain", parameters={"gain": typed}, place=Place(x=0, y=0))
     document.edit(AddBlocks(blocks=[new]))
     assert document.diagram.blocks["gain"].parameter_value("gain") == value
+    # In the place of a value a formula means the same, with a mask's names or without.
+    assert Gain(gain=formula(typed)).parameter_value("gain") == value
+    masked = replace(document.diagram, mask=(mask_parameter("k", 1.0),))
+    in_mask = applied(SetParameters(block="gain", values={"gain": f"k*({typed})"}), masked, load_robot)
+    assert in_mask.blocks["gain"].parameter_value("gain") == value
 
 
 def test_tuned_values_of_several_blocks_are_kept_in_one_step() -> None:

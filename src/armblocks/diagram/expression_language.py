@@ -19,7 +19,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import cast
 
-from casadi import SX, horzcat, logic_and, logic_not, logic_or, mtimes, vertcat
+import numpy as np
+from casadi import SX, evalf, horzcat, logic_and, logic_not, logic_or, mtimes, vertcat
 
 from armblocks.diagram.formula_functions import CONSTANTS, FUNCTIONS, MAKERS, MATRIX_FUNCTIONS, range_of
 from armblocks.diagram.formula_powers import powers_from_the_left
@@ -31,13 +32,22 @@ LONGEST = 4000
 DEEPEST = 60
 """Levels of brackets and operators within each other."""
 
+
+def _quotient(left: SX, right: SX) -> SX:
+    """CasADi takes every constant over zero for plus infinity, -1/0 and 0/0 too."""
+    if not (left.is_constant() and right.is_constant()):
+        return left / right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return SX(np.divide(evalf(left).full(), evalf(right).full()))
+
+
 _OPERATORS: Mapping[type[ast.operator], Callable[[SX, SX], SX]] = {
     ast.Add: lambda left, right: left + right,
     ast.Sub: lambda left, right: left - right,
     ast.Mult: lambda left, right: left * right,
     ast.MatMult: lambda left, right: left * right,  # .*
-    ast.Div: lambda left, right: left / right,
-    ast.FloorDiv: lambda left, right: left / right,  # ./
+    ast.Div: _quotient,
+    ast.FloorDiv: _quotient,  # ./
     ast.Pow: lambda left, right: left**right,
 }
 _COMPARISONS: Mapping[type[ast.cmpop], Callable[[SX, SX], SX]] = {
@@ -70,7 +80,7 @@ class Formula:
         for mark in ("@", "//"):
             if mark in text:
                 raise self._error(f"'{_short(text)}' has no meaning in a formula", _ALLOWED)
-        spelt = python_spelling(text, where)
+        self._spelt = spelt = python_spelling(text, where)
         try:
             self._tree = powers_from_the_left(ast.parse(spelt, mode="eval").body, spelt)
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -266,7 +276,8 @@ class Formula:
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise self._error(f"'{_short(ast.unparse(node))}' is too large a number", "numbers up to 1.8e308")
+            typed = ast.get_source_segment(self._spelt, node) or "inf"
+            raise self._error(f"'{_short(typed)}' is too large a number", "numbers up to 1.8e308")
         return number
 
     def _error(self, what: str, allowed: str) -> InputError:

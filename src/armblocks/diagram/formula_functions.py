@@ -36,7 +36,14 @@ def _inverse(value: SX) -> SX:
     return casadi.inv(value)
 
 
-CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e, "deg": math.pi / 180.0, "inf": math.inf}
+CONSTANTS: Mapping[str, float] = {
+    "pi": math.pi,
+    "e": math.e,
+    "deg": math.pi / 180.0,
+    "rad": 1.0,
+    "inf": math.inf,
+    "Inf": math.inf,
+}
 
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., SX]]] = {
     **{

@@ -38,6 +38,7 @@ def python_spelling(text: str, where: str) -> str:
     if "[" in text or "'" in text:
         text = "".join(_Brackets(text, where).rewritten())
     text = re.sub(r"\bif\s*\(", f"{CALLED_IF}(", text)
+    text = re.sub(r"(?<![\w.])0+(?=\d)", "", text)  # Python refuses 007
     for pattern, python in _OPERATORS:
         text = re.sub(pattern, python, text)
     return text.strip()

@@ -108,9 +108,17 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
     return tuple(found)
 
 
-def formula_names(text: str) -> frozenset[str]:
-    """The parameters that a formula reads."""
-    return _parsed(text, "").names
+def formula_names(text: str, where: str = "") -> frozenset[str]:
+    """The parameters that a formula reads. Raises ``InputError`` where the text is no formula."""
+    return _parsed(text, where).names
+
+
+def formula_number(text: str, where: str) -> float | list[Any]:
+    """The number, vector or matrix that a formula without parameters gives; a row or a column is a vector.
+
+    Raises ``UnknownNameError`` for a name that is no constant, ``InputError`` where the text is no formula.
+    """
+    return _evaluated(text, (), where)
 
 
 def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value:
@@ -157,8 +165,7 @@ def _parsed(text: str, where: str) -> Formula:
 
 
 @lru_cache(maxsize=4096)
-def _evaluated(text: str, used: tuple[tuple[str, Value], ...], where: str) -> Value:
-    """Numbers: a float, or lists of them."""
+def _evaluated(text: str, used: tuple[tuple[str, Value], ...], where: str) -> float | list[Any]:
     names: dict[str, SX] = {}
     for name, value in used:
         symbols = as_symbols(value)
@@ -176,7 +183,7 @@ def _evaluated(text: str, used: tuple[tuple[str, Value], ...], where: str) -> Va
     return array.reshape(-1).tolist() if 1 in array.shape else array.tolist()
 
 
-def _of_kind(kind: ParameterKind, value: Value) -> Value:
+def _of_kind(kind: ParameterKind, value: float | list[Any]) -> float | list[Any]:
     """Whole numbers and truth values are numbers in formulas."""
     if not isinstance(value, float):
         return value

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     )
     from armblocks.formats.diagram_json import diagram_from_bytes, diagram_to_bytes
     from armblocks.formats.diagram_python import diagram_to_python
-    from armblocks.formats.document_kinds import DocumentKind, kind_of_document
+    from armblocks.formats.document_kinds import DocumentKind, kind_of_data, kind_of_document
     from armblocks.formats.matlab_script import Script, read_script
     from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot, read_robots
     from armblocks.formats.robot_format import RobotFormat
-    from armblocks.formats.robot_json import holds_robot, read_robot, write_robot
+    from armblocks.formats.robot_json import read_robot, write_robot
     from armblocks.formats.robot_references import ResolveRobot
     from armblocks.formats.subsystem_libraries import list_libraries
     from armblocks.formats.table_files import load_table
@@ -36,7 +36,7 @@ else:
             "diagram_from_bytes": "armblocks.formats.diagram_json",
             "diagram_to_bytes": "armblocks.formats.diagram_json",
             "diagram_to_python": "armblocks.formats.diagram_python",
-            "holds_robot": "armblocks.formats.robot_json",
+            "kind_of_data": "armblocks.formats.document_kinds",
             "kind_of_document": "armblocks.formats.document_kinds",
             "list_examples": "armblocks.formats.diagram_files",
             "list_libraries": "armblocks.formats.subsystem_libraries",
@@ -64,7 +64,7 @@ __all__ = [
     "diagram_from_bytes",
     "diagram_to_bytes",
     "diagram_to_python",
-    "holds_robot",
+    "kind_of_data",
     "kind_of_document",
     "list_examples",
     "list_libraries",

@@ -36,11 +36,17 @@ def kind_of_document(name_or_path: str) -> DocumentKind:
         if name_or_path not in shipped:
             raise UnknownNameError("shipped robot, diagram or library", name_or_path, shipped)
         return shipped[name_or_path]
-    if not name_or_path.lower().endswith(".json"):
+    return kind_of_data(read_bounded(name_or_path, MOST_BYTES), name_or_path)
+
+
+def kind_of_data(data: bytes, name: str) -> DocumentKind:
+    """What the bytes of a file hold, by the members of a document, whatever is wrong elsewhere in it.
+
+    Raises ``FormatError`` where a file that is named as JSON is none.
+    """
+    if not name.lower().endswith(".json"):
         return DocumentKind.ROBOT
-    members = read_document(
-        read_bounded(name_or_path, MOST_BYTES), name_or_path, MOST_BYTES, DEEPEST
-    ).members()
+    members = read_document(data, name, MOST_BYTES, DEEPEST).members()
     if "library" in members:
         return DocumentKind.LIBRARY
     return DocumentKind.DIAGRAM if "blocks" in members or "links" not in members else DocumentKind.ROBOT

@@ -63,15 +63,6 @@ def read_robot(data: bytes, name: str) -> Robot:
     return robot_from(read_document(data, name, MOST_BYTES))
 
 
-def holds_robot(data: bytes) -> bool:
-    """Whether a JSON document is one of a robot, by its members; also of one with faults elsewhere in it."""
-    try:
-        members = read_document(data, "document", MOST_BYTES).members()
-    except FormatError:
-        return False
-    return "links" in members and "blocks" not in members
-
-
 def robot_from(node: Node) -> Robot:
     """The robot that a JSON object describes."""
     members = closed_members(node, _ROBOT_KEYS, required=("format", "name", "links"))

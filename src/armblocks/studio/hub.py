@@ -19,7 +19,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, ParameterFormula
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
-from armblocks.errors import ArmblocksError, InertiaWarning, InputError, UnknownNameError
+from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputError, UnknownNameError
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
@@ -284,7 +284,9 @@ class Hub:
     # -- robots ----------------------------------------------------------------------------------------------
 
     def _is_robot_file(self, path: str) -> bool:
-        return path.lower().endswith(".m") or formats.holds_robot(self.folder.read(path))
+        with contextlib.suppress(FormatError):  # what cannot be read may be open all the same
+            return formats.kind_of_data(self.folder.read(path), path) is formats.DocumentKind.ROBOT
+        return False
 
     def block_robot(self, document: str, path: Sequence[str], block: str) -> Robot:
         """The robot that a block of an open diagram uses."""

@@ -1,31 +1,27 @@
 """Between what a person types into a parameter's field and the value that the block keeps.
 
-Numbers and arrays may be typed as MATLAB literals: ``2*pi``, ``-1/3``, ``[1 2; 3 4]``, ``45*deg``. They are
-read by the interpreter of MATLAB scripts, which knows plain values only: nothing is evaluated by Python.
+Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the one language of all
+formulas, :mod:`armblocks.diagram.expression_language`: nothing is evaluated by Python.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
 
 from armblocks.diagram import Parameter, ParameterFormula, ParameterKind, TimeTable, UserFunction
-from armblocks.diagram.mask import Scope, formula_value
-from armblocks.errors import ArmblocksError, InputError
-from armblocks.formats import read_script
+from armblocks.diagram.mask import Scope, formula_names, formula_number, formula_value
+from armblocks.errors import InputError, UnknownNameError
 from armblocks.robot import Robot
 
 ResolveRobot = Callable[[str], Robot]
 """From what a page calls a robot (a shipped name, a file of the project) to the robot."""
 
-LONGEST_TEXT = 100_000
-"""Characters of one field."""
-_NAME = re.compile(r"[A-Za-z_]\w*")
-_NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
+_NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER)
+_ALLOWED = "a number, or an array such as [1 2; 3 4]; pi, + - * / ^ and brackets may be used"
 _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 
 
@@ -42,12 +38,12 @@ def parameter_value(
         return rule.default
     if rule.kind is ParameterKind.ROBOT:
         return _robot(rule, typed, place, resolve_robot)
-    if isinstance(typed, str) and scope and set(_NAME.findall(typed)) & set(scope):
-        bare = typed.strip() in scope
-        if bare or rule.kind in (*_NUMERIC, ParameterKind.INTEGER):
+    if isinstance(typed, str) and scope:
+        numeric = rule.kind in _NUMERIC
+        if typed.strip() in scope or (numeric and formula_names(typed, place) & set(scope)):
             formula_value(rule, typed, scope, where)
             return ParameterFormula(typed.strip())
-    if rule.kind in _NUMERIC or rule.kind is ParameterKind.INTEGER:
+    if rule.kind in _NUMERIC:
         typed = number_value(typed, place) if isinstance(typed, str) else _with_infinities(typed)
         if rule.kind is ParameterKind.INTEGER and isinstance(typed, float) and typed.is_integer():
             typed = int(typed)
@@ -55,29 +51,18 @@ def parameter_value(
 
 
 def number_value(text: str, where: str) -> float | list[Any]:
-    """The number, vector or matrix that a MATLAB literal means; a row or a column is a vector.
+    """The number, vector or matrix that a text means; a row or a column is a vector.
 
-    Raises ``InputError`` for anything else.
+    Raises ``UnknownNameError`` for a name that is no constant, ``InputError`` for anything else.
     """
-    allowed = "a number, or an array such as [1 2; 3 4]; pi, + - * / ^ and brackets may be used"
-    if text.strip() in _INFINITIES:
-        return _INFINITIES[text.strip()]
-    if len(text) > LONGEST_TEXT or not text.strip() or any(mark in text for mark in "\n\r\0"):
-        raise InputError("this is no value", where=where, allowed=allowed, fix="type a value")
+    if not text.strip() or any(mark in text for mark in "\n\r\0"):
+        raise InputError("this is no value", where=where, allowed=_ALLOWED, fix="type a value")
     try:
-        variables = read_script(f"deg = pi/180; rad = 1; value = {text};".encode(), "field").variables
-    except ArmblocksError as error:
-        what = error.what.partition(", in: ")[0]  # the line around it is not the user's
-        raise InputError(
-            f"'{_short(text)}': {what}", where=where, allowed=allowed, fix="correct the formula"
-        ) from None
-    value = variables.get("value")
-    if set(variables) != {"deg", "rad", "value"} or not isinstance(value, np.ndarray):
-        raise InputError(f"'{_short(text)}' is no number", where=where, allowed=allowed, fix="type a value")
-    array = np.asarray(value, dtype=np.float64)
-    if array.size == 1:
-        return float(array.reshape(-1)[0])
-    return array.reshape(-1).tolist() if 1 in array.shape else array.tolist()
+        return formula_number(text.strip(), where)
+    except UnknownNameError:
+        raise
+    except InputError as error:  # what else a formula may hold would bury what is wrong
+        raise InputError(error.what, where=where, allowed=_ALLOWED, fix="correct the formula") from None
 
 
 def tuned_value(typed: Any, where: str) -> Any:
@@ -119,7 +104,3 @@ def _with_infinities(value: Any) -> Any:
     if isinstance(value, list):
         return [_with_infinities(entry) for entry in cast("list[Any]", value)]
     return _INFINITIES.get(value, value) if isinstance(value, str) else value
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 60 else text[:57] + "..."

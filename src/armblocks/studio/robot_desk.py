@@ -217,7 +217,7 @@ class RobotDesk:
                 allowed=f"at most {say.MOST_DROPPED}",
                 fix="choose a smaller file",
             )
-        if suffix == ".json" and not formats.holds_robot(data):
+        if formats.kind_of_data(data, request.name) is not formats.DocumentKind.ROBOT:
             key = await self._drawings.show_diagram(page, data, request.name)
             return say.Opening(robots=[], document=key, notes=[])
         robots, notes = _read(data, request.name)
