@@ -98,6 +98,8 @@ export interface Change {
     | RemoveBlocks
     | Connect
     | MoveBlocks
+    | BendWires
+    | SetNotes
     | Rename
     | SetParameters
     | KeepTuned
@@ -109,11 +111,14 @@ export interface Change {
 }
 /**
  * Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
+ *
+ * ``instead``: wires that give way, as where a block is dropped on one.
  */
 export interface AddBlocks {
   kind: "add";
   blocks: NewBlock[];
   wires?: Wire[];
+  instead?: Wire[];
 }
 /**
  * A block to be put on the sheet. ``parameters`` states those that are not at their default.
@@ -135,21 +140,26 @@ export interface Place {
   width?: number | null;
   height?: number | null;
   flipped?: boolean;
+  rotation?: 0 | 90 | 180 | 270;
 }
 /**
  * A wire between two ports, written ``block/port``.
+ *
+ * ``bends``: the way that somebody has drawn, see :func:`armblocks.report.wire_routing.bent`.
  */
 export interface Wire {
   source: string;
   target: string;
+  bends?: number[];
 }
 /**
- * Take blocks and wires off the sheet; the wires of the blocks go with them.
+ * Take blocks, wires and notes off the sheet; the wires of the blocks go with them.
  */
 export interface RemoveBlocks {
   kind: "remove";
   blocks?: string[];
   wires?: Wire[];
+  notes?: string[];
 }
 /**
  * Draw a wire. With ``replace`` the input's present wire gives way.
@@ -160,12 +170,44 @@ export interface Connect {
   replace?: boolean;
 }
 /**
- * Put blocks elsewhere: one drag is one edit, however many blocks were in hand.
+ * Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
+ *
+ * Ways that are drawn between blocks that move alike move with them.
  */
 export interface MoveBlocks {
   kind: "move";
-  places: {
+  places?: {
     [k: string]: Place;
+  };
+  notes?: {
+    [k: string]: SheetNote;
+  };
+}
+/**
+ * Words on the sheet: their top left corner in px.
+ *
+ * This interface was referenced by `undefined`'s JSON-Schema definition
+ * via the `patternProperty` "^/\S+$".
+ */
+export interface SheetNote {
+  x: number;
+  y: number;
+  text: string;
+}
+/**
+ * Lead wires along the bends that they have here; without any the way is chosen again.
+ */
+export interface BendWires {
+  kind: "bend";
+  wires: Wire[];
+}
+/**
+ * Write notes, or change what they say.
+ */
+export interface SetNotes {
+  kind: "notes";
+  notes: {
+    [k: string]: SheetNote;
   };
 }
 /**
@@ -651,6 +693,8 @@ export interface BlockType {
   width: number;
   height: number;
   face: string;
+  inputs: string[];
+  outputs: string[];
   parameters: ParameterRule[];
 }
 /**
@@ -749,6 +793,9 @@ export interface Sheet {
     [k: string]: SheetBlock;
   };
   wires: Wire[];
+  notes: {
+    [k: string]: SheetNote;
+  };
   settings: {
     [k: string]: number | string | null;
   };
@@ -810,6 +857,9 @@ export interface SheetChange {
   };
   wires_added: Wire[];
   wires_removed: Wire[];
+  notes?: {
+    [k: string]: SheetNote;
+  } | null;
   description?: string | null;
   settings?: {
     [k: string]: number | string | null;
@@ -844,6 +894,7 @@ export interface Finding {
 export interface WireKind {
   shape: number[];
   unit: string;
+  bus?: boolean;
 }
 /**
  * A run has begun: what it records and how it is to be shown.

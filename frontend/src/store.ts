@@ -12,6 +12,7 @@ import type {
   Recovery,
   Sheet,
   SheetBlock,
+  SheetNote,
   Tunable,
   ViewOf,
   Wire,
@@ -32,6 +33,7 @@ export interface OpenDocument {
   description: string
   blocks: Record<string, SheetBlock>
   wires: Wire[]
+  notes: Record<string, SheetNote>
   settings: Sheet['settings']
   /** The library block that the sheet belongs to, by its path; empty for a sheet of one's own. */
   linked: string[]
@@ -116,6 +118,7 @@ function changed(document: OpenDocument, event: EventOf<'changed'>): OpenDocumen
     blocks,
     name: document.inside.length ? document.name : state.title,
     wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...change.wires_added],
+    notes: change.notes ?? document.notes,
     description: change.description ?? document.description,
     settings: change.settings ?? document.settings,
     logged: change.logged ?? document.logged,

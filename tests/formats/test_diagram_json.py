@@ -204,7 +204,7 @@ def test_unknown_keys_are_kept_at_every_level() -> None:
     document = json.loads(write(small()))
     document["vendor"] = {"a": [1, {"b": None}]}
     document["blocks"]["gain"]["colour"] = "red"
-    document["layout"]["gain"]["rotation"] = 90
+    document["layout"]["gain"]["shadow"] = 90
     document["layout"]["a note"] = {"text": "hello"}
     document["settings"]["vendor"] = True
     diagram = read(json.dumps(document).encode())

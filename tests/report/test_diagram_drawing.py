@@ -32,7 +32,7 @@ from armblocks.blocks import (
     TransferFunction,
     Trigonometry,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder, PortRef
+from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, PortRef
 from armblocks.face.block_examples import example_block
 from armblocks.report.block_faces import face_size
 from armblocks.report.diagram_drawing import (
@@ -43,11 +43,11 @@ from armblocks.report.diagram_drawing import (
     obstacle,
     wire_nets,
 )
-from armblocks.report.diagram_layout import boxes, sized_box
+from armblocks.report.diagram_layout import boxes, sized_box, standing_box
 from armblocks.report.face_symbols import SIGNS
 from armblocks.report.picture import Curve, Picture, text_marks
 from armblocks.report.text_width import text_width
-from armblocks.report.wire_routing import Net, Obstacle, RoutedNet, WireEnd, route
+from armblocks.report.wire_routing import Net, Obstacle, RoutedNet, WireEnd, bent, route
 
 EXAMPLES = ("kr180model", "falling_pendulum", "puma560_computed_torque", "van_der_pol_pid")
 
@@ -259,3 +259,54 @@ def _on(point: tuple[float, float], path: tuple[tuple[float, float], ...]) -> bo
         min(ax, bx) - 1e-6 <= x <= max(ax, bx) + 1e-6 and min(ay, by) - 1e-6 <= y <= max(ay, by) + 1e-6
         for (ax, ay), (bx, by) in itertools.pairwise(path)
     )
+
+
+# -- ways that somebody has drawn, turned blocks, notes ------------------------------------------------------
+
+
+@pytest.mark.parametrize("rotation", [0, 90, 180, 270])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_every_block_can_be_turned_and_its_ports_stay_on_its_edge(rotation: int, flipped: bool) -> None:
+    for kind in BLOCKS.values():
+        block = example_block(kind)
+        upright = standing_box("b", block, Placement(x=30, y=40, flipped=flipped))
+        box = standing_box("b", block, Placement(x=30, y=40, flipped=flipped, rotation=rotation))
+        assert block_marks(box)
+        for was, spot, way in (
+            *((was, spot, -1) for was, spot in zip(upright.inputs, box.inputs)),
+            *((was, spot, 1) for was, spot in zip(upright.outputs, box.outputs)),
+        ):
+            dx, dy = was.dx, was.dy
+            for _ in range(rotation // 90):
+                dx, dy = -dy, dx
+            assert (spot.dx, spot.dy) == (dx, dy)
+            edge = {
+                (-1, 0): spot.x - box.x,
+                (1, 0): box.x + box.width - spot.x,
+                (0, -1): spot.y - box.y,
+                (0, 1): box.y + box.height - spot.y,
+            }[way * dx, way * dy]
+            assert abs(edge) < 1e-9
+
+
+def test_a_drawn_way_is_kept_and_branches_leave_it() -> None:
+    source, near, far = WireEnd(0, 0, 1, 0), WireEnd(200, 0, 1, 0), WireEnd(200, 100, 1, 0)
+    bends = (60.0, 50.0, 120.0)
+    path = bent(source, bends, far)
+    assert path == ((0, 0), (60, 0), (60, 50), (120, 50), (120, 100), (200, 100))
+    (laid,) = route([], [Net(source, (near, far), ((), bends))])
+    assert laid.paths[1] == path
+    assert laid.paths[0][0] in ((0, 0), (60, 0))
+    assert laid.dots == ((60, 0),)
+    # Where the block is turned the way no longer leads into its port, and is chosen anew.
+    assert bent(source, bends, WireEnd(200, 100, 0, 1)) is None
+    assert bent(source, (), far) is None
+
+
+def test_notes_stand_on_the_drawing_line_by_line() -> None:
+    builder = DiagramBuilder("noted")
+    builder.add("clock", BLOCKS["Clock"]())
+    builder.place("clock", 0, 0)
+    builder.note("/1", Note(x=0, y=120, text="what it shows\nand why"))
+    texts = {mark.text: mark for mark in text_marks(diagram_picture(builder.draft()))}
+    assert texts["and why"].y - texts["what it shows"].y == 17

@@ -16,6 +16,7 @@ from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram
 from armblocks.studio.document import Document
 from armblocks.studio.edits import (
     AddBlocks,
+    BendWires,
     Connect,
     Describe,
     Edit,
@@ -27,8 +28,10 @@ from armblocks.studio.edits import (
     Place,
     RemoveBlocks,
     Rename,
+    SetNotes,
     SetParameters,
     SetSettings,
+    SheetNote,
     Wire,
     applied,
     summary,
@@ -41,8 +44,14 @@ PORTS = ["sine/y", "gain/y", "gain/u", "scope/u1", "Gain 2/u", "Gain 2/y", "nobo
 
 names, ports = st.sampled_from(NAMES), st.sampled_from(PORTS)
 numbers = st.floats(-1e4, 1e4, allow_nan=False)
-wires = st.builds(Wire, source=ports, target=ports)
-places = st.builds(Place, x=numbers, y=numbers, flipped=st.booleans())
+wires = st.builds(Wire, source=ports, target=ports, bends=st.lists(numbers, max_size=3))
+places = st.builds(
+    Place, x=numbers, y=numbers, flipped=st.booleans(), rotation=st.sampled_from([0, 90, 180, 270])
+)
+note_names = st.sampled_from(["/1", "/2"])
+notes = st.dictionaries(
+    note_names, st.builds(SheetNote, x=numbers, y=numbers, text=st.text(max_size=5)), max_size=2
+)
 values = st.sampled_from(
     [2.0, "2*pi", "[1 2 3]", "inf", "import os", "++-", "", None, [1.0], True, "puma560"]
 )
@@ -52,7 +61,10 @@ edits: st.SearchStrategy[Edit] = st.one_of(
     st.builds(AddBlocks, blocks=st.lists(blocks, max_size=2), wires=st.lists(wires, max_size=1)),
     st.builds(RemoveBlocks, blocks=st.lists(names, max_size=2), wires=st.lists(wires, max_size=1)),
     st.builds(Connect, wire=wires, replace=st.booleans()),
-    st.builds(MoveBlocks, places=st.dictionaries(names, places, max_size=2)),
+    st.builds(MoveBlocks, places=st.dictionaries(names, places, max_size=2), notes=notes),
+    st.builds(BendWires, wires=st.lists(wires, min_size=1, max_size=2)),
+    st.builds(SetNotes, notes=notes),
+    st.builds(RemoveBlocks, notes=st.lists(note_names, min_size=1, max_size=2)),
     st.builds(Rename, block=names, name=names),
     st.builds(SetParameters, block=names, values=parameters),
     st.builds(
@@ -114,17 +126,79 @@ def test_wires_to_ports_that_vanish_go_with_the_edit_and_return_with_undo() -> N
     assert not document.dirty
 
 
-def refused(*todo: Edit) -> str:
+def test_bends_go_with_what_they_hang_on() -> None:
+    document = chain()
+    wire = Wire(source="sine/y", target="gain/u", bends=[100, 200, 150])
+    document.edit(BendWires(wires=[wire]))
+    (bends,) = document.diagram.bends.values()
+    assert bends == (100, 200, 150)
+    again = diagram_from_bytes(content(document), "again", BLOCKS, load_robot, draft=True)
+    assert again == document.diagram
+    document.edit(Rename(block="sine", name="wave"))
+    assert [str(wire) for wire in document.diagram.bends] == ["wave/y -> gain/u"]
+    both = {"wave": Place(x=10, y=7), "gain": Place(x=210, y=7)}
+    document.edit(MoveBlocks(places=both))
+    assert list(document.diagram.bends.values()) == [(110, 207, 160)]
+    document.edit(MoveBlocks(places={"gain": Place(x=300, y=7)}))
+    assert list(document.diagram.bends.values()) == [(110, 207, 160)]
+    document.edit(RemoveBlocks(wires=[Wire(source="wave/y", target="gain/u")]))
+    assert document.diagram.bends == {}
+    document.undo()
+    document.edit(BendWires(wires=[Wire(source="wave/y", target="gain/u")]))
+    assert document.undo_title == "bend 1 wire"
+    assert document.diagram.bends == {}
+
+
+def test_a_block_is_put_into_a_wire_in_one_step() -> None:
+    document = chain()
+    before = content(document)
+    document.edit(
+        AddBlocks(
+            blocks=[NewBlock(name="between", type="Gain", place=Place(x=100, y=0))],
+            wires=[Wire(source="sine/y", target="between/u"), Wire(source="between/y", target="gain/u")],
+            instead=[Wire(source="sine/y", target="gain/u")],
+        )
+    )
+    assert [str(wire) for wire in document.diagram.connections] == [
+        "between/y -> gain/u",
+        "sine/y -> between/u",
+    ]
+    document.undo()
+    assert content(document) == before
+
+
+def test_notes_are_written_moved_and_kept_in_the_file() -> None:
+    document = chain()
+    before = content(document)
+    document.edit(SetNotes(notes={"/1": SheetNote(x=5, y=6, text="first\nsecond")}))
+    assert document.undo_title == "write 1 note"
+    again = diagram_from_bytes(content(document), "again", BLOCKS, load_robot, draft=True)
+    assert again.notes == document.diagram.notes
+    document.edit(MoveBlocks(notes={"/1": SheetNote(x=9, y=6, text="first\nsecond")}))
+    assert document.undo_title == "move 1 note"
+    with pytest.raises(ArmblocksError, match="note"):
+        document.edit(MoveBlocks(notes={"/2": SheetNote(x=9, y=6, text="")}))
+    document.edit(RemoveBlocks(notes=["/1"]))
+    assert content(document) == before
+
+
+def chain() -> Document:
+    """A sine into a gain, side by side."""
     document = empty()
     document.edit(
         AddBlocks(
             blocks=[
                 NewBlock(name="sine", type="SineWave", place=Place(x=0, y=0)),
-                NewBlock(name="gain", type="Gain", place=Place(x=0, y=0)),
+                NewBlock(name="gain", type="Gain", place=Place(x=200, y=0)),
             ],
             wires=[Wire(source="sine/y", target="gain/u")],
         )
     )
+    return document
+
+
+def refused(*todo: Edit) -> str:
+    document = chain()
     with pytest.raises(ArmblocksError) as caught:
         for edit in todo:
             document.edit(edit)

@@ -1,18 +1,30 @@
+import type { Place, Wire } from '../protocol'
 import { change, freeName, useStudio } from '../store'
 
 /** px: where blocks may stand. */
 export const GRID = 5
 
-/** Put a new block of a type on the sheet, its middle at a point; it is selected then. */
-export function insertBlock(type: string, at: { x: number; y: number }): void {
+/** Put a new block of a type on the sheet, its middle at a point and in a wire if one is given; it is selected then. */
+export function insertBlock(type: string, at: { x: number; y: number }, wire?: Wire): void {
   const { document, library, select } = useStudio.getState()
   const kind = library.get(type)
   if (!document || !kind) return
   const name = freeName(kind.title.replace(/[/.]/g, ' '), Object.keys(document.blocks))
-  const place = {
+  const place: Place = {
     x: GRID * Math.round((at.x - kind.width / 2) / GRID),
-    y: GRID * Math.round((at.y - kind.height / 2) / GRID),
-    flipped: false,
+    y: wire ? at.y - kind.height / 2 : GRID * Math.round((at.y - kind.height / 2) / GRID),
   }
-  void change({ kind: 'add', blocks: [{ name, type, place }] }).then(() => select([name]))
+  const [input, output] = [kind.inputs[0], kind.outputs[0]]
+  const between = wire && input && output
+  void change({
+    kind: 'add',
+    blocks: [{ name, type, place }],
+    wires: between
+      ? [
+          { source: wire.source, target: `${name}/${input}` },
+          { source: `${name}/${output}`, target: wire.target },
+        ]
+      : [],
+    instead: between ? [wire] : [],
+  }).then(() => select([name]))
 }

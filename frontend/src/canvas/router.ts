@@ -26,7 +26,8 @@ export interface WireEnd {
 export interface Net {
   key: string
   source: WireEnd
-  targets: { key: string; end: WireEnd }[]
+  /** `bends`: the way that somebody has drawn, see `bent`. */
+  targets: { key: string; end: WireEnd; bends?: readonly number[] | undefined }[]
 }
 
 /** Corner points of the path to each target, by the target's key, and the dots where wires branch. */
@@ -53,6 +54,35 @@ const LABEL_PRICE = 9
 const WINDOW = 260
 const MOST_NODES = 60_000
 
+/**
+ * The corner points of a way along `bends`, the coordinates of its straight pieces in turn (px): of a wire that leaves
+ * to the side x, y, x … The first and the last piece go with their ports. `null` without bends, or where the last piece
+ * would not run in the direction of its port. The same as in `report/wire_routing.py`.
+ */
+export function bent(source: WireEnd, bends: readonly number[], target: WireEnd): Point[] | null {
+  let [x, y] = [source.x, source.y]
+  let flat = source.dx !== 0
+  const points: Point[] = [[x, y]]
+  for (const value of bends) {
+    if (flat) x = value
+    else y = value
+    points.push([x, y])
+    flat = !flat
+  }
+  if (!bends.length || flat !== (target.dx === 0)) return null
+  points.push(flat ? [target.x, y] : [x, target.y], [target.x, target.y])
+  return corners(points)
+}
+
+function drawnWays({ source, targets }: Net): Map<string, Point[]> {
+  const found = new Map<string, Point[]>()
+  for (const { key, end, bends } of targets) {
+    const path = bends && bent(source, bends, end)
+    if (path) found.set(key, path)
+  }
+  return found
+}
+
 const ahead = (end: WireEnd): Point => [end.x + STUB * end.dx, end.y + STUB * end.dy]
 const behind = (end: WireEnd): Point => [end.x - STUB * end.dx, end.y - STUB * end.dy]
 
@@ -61,7 +91,9 @@ export function route(obstacles: Obstacle[], nets: Net[], kept: Map<string, Rout
   const laid: Segment[] = []
   for (const [key, routed] of kept) for (const path of routed.paths.values()) lay(laid, key, path)
   const done = new Map<string, RoutedNet>()
-  const order = nets.map((net) => ({ net, length: spread(net) })).sort((a, b) => a.length - b.length || (a.net.key < b.net.key ? -1 : 1))
+  const order = nets
+    .map((net) => ({ net, free: Number(drawnWays(net).size === 0), length: spread(net) }))
+    .sort((a, b) => a.free - b.free || a.length - b.length || (a.net.key < b.net.key ? -1 : 1))
   for (const { net } of order) {
     const routed = new NetRouter(net, obstacles, laid).routed()
     for (const path of routed.paths.values()) lay(laid, net.key, path)
@@ -92,6 +124,7 @@ class NetRouter {
   private readonly down: Float64Array
   private readonly crossRight: Uint8Array
   private readonly crossDown: Uint8Array
+  private readonly drawn: Map<string, Point[]>
 
   constructor(
     private readonly net: Net,
@@ -100,10 +133,13 @@ class NetRouter {
   ) {
     const ends = [net.source, ...net.targets.map((target) => target.end)]
     const stubs = [ahead(net.source), ...net.targets.map((target) => behind(target.end))]
-    const left = Math.min(...ends.map((e) => e.x)) - WINDOW
-    const far = Math.max(...ends.map((e) => e.x)) + WINDOW
-    const top = Math.min(...ends.map((e) => e.y)) - WINDOW
-    const low = Math.max(...ends.map((e) => e.y)) + WINDOW
+    this.drawn = drawnWays(net)
+    const turns = [...this.drawn.values()].flatMap((path) => path.slice(1, -1))
+    const [allX, allY] = [[...ends.map((e) => e.x), ...turns.map(([x]) => x)], [...ends.map((e) => e.y), ...turns.map(([, y]) => y)]]
+    const left = Math.min(...allX) - WINDOW
+    const far = Math.max(...allX) + WINDOW
+    const top = Math.min(...allY) - WINDOW
+    const low = Math.max(...allY) + WINDOW
     const near = obstacles.filter((o) => o.x < far && o.x + o.width > left && o.y < low && o.y + o.height > top)
     const others = laid.filter(
       ({ net: key, a, b }) =>
@@ -116,11 +152,11 @@ class NetRouter {
     // A window full of blocks gets fewer lanes rather than a slow search.
     const lanes = near.length > 60 ? LANES.slice(0, 1) : LANES
     this.xs = merged(
-      stubs.map(([x]) => x),
+      [...stubs, ...turns].map(([x]) => x),
       near.flatMap((o) => lanes.flatMap((lane) => [o.x - lane, o.x + o.width + lane])).filter((x) => x > left && x < far),
     )
     this.ys = merged(
-      stubs.map(([, y]) => y),
+      [...stubs, ...turns].map(([, y]) => y),
       near
         .flatMap((o) => lanes.flatMap((lane) => [Math.min(o.y, o.label[1]) - lane, bottom(o) + lane - 5]))
         .filter((y) => y > top && y < low),
@@ -141,9 +177,14 @@ class NetRouter {
     const paths = new Map<string, Point[]>()
     const start = this.node(ahead(net.source))
     const tree = new Map<number, Set<number>>([[start, new Set()]])
+    for (const [key, path] of this.drawn) {
+      paths.set(key, path)
+      this.follow(tree, path)
+    }
     const goals = [...net.targets].sort((a, b) => distance(net.source, a.end) - distance(net.source, b.end))
     const ending = new Set<number>()
     for (const { key, end } of goals) {
+      if (this.drawn.has(key)) continue
       const goal = this.node(behind(end))
       const walked = this.columns * this.ys.length > MOST_NODES ? null : this.search(tree, start, goal, end)
       if (!walked) {
@@ -165,6 +206,22 @@ class NetRouter {
     for (const [node, joined] of tree)
       if (joined.size + Number(node === start) + Number(ending.has(node)) > 2) dots.push(this.point(node))
     return { paths, dots }
+  }
+
+  /** Make a drawn way part of the tree, so that others can branch from it. */
+  private follow(tree: Map<number, Set<number>>, path: Point[]): void {
+    const { source } = this.net
+    const free = ((path[1]![0] - source.x) * source.dx + (path[1]![1] - source.y) * source.dy) >= STUB
+    const turns = [...(free ? [ahead(source)] : []), ...path.slice(1, -1)].map((point) => this.node(point))
+    for (let k = 1; k < turns.length; k++) {
+      const [from, to] = [turns[k - 1]!, turns[k]!]
+      const stride = Math.floor(from / this.columns) === Math.floor(to / this.columns) ? 1 : this.columns
+      const way = to > from ? stride : -stride
+      for (let node = from; node !== to; node += way) {
+        link(tree, node, node + way)
+        link(tree, node + way, node)
+      }
+    }
   }
 
   private node([x, y]: Point): number {

@@ -21,14 +21,20 @@ export function nameWidth(name: string): number {
 /** Blocks by name, at the places where they are drawn now (which a drag may have changed). */
 export type Places = Record<string, { x: number; y: number }>
 
+/** Whether signals run through a block from top to bottom: its name then stands beside it. */
+export const standing = ({ place }: SheetBlock): boolean => (place.rotation ?? 0) % 180 !== 0
+
 function obstacle(block: SheetBlock, at: { x: number; y: number }): Obstacle {
   const width = nameWidth(block.name)
+  const label = standing(block)
+    ? ([at.x + block.width + 5, at.y + block.height / 2 - 8, width, NAME_ROOM - 4] as const)
+    : ([at.x + (block.width - width) / 2, at.y + block.height + 2, width, NAME_ROOM - 4] as const)
   return {
     x: at.x,
     y: at.y,
     width: block.width,
     height: block.height,
-    label: [at.x + (block.width - width) / 2, at.y + block.height + 2, width, NAME_ROOM - 4],
+    label,
   }
 }
 
@@ -74,6 +80,14 @@ export class SheetRoutes {
   }
 }
 
+/** How far a wire's drawn way moves: with its blocks, while both are dragged alike. */
+function shift(from: SheetBlock, to: SheetBlock, places: Places): [number, number] {
+  const [a, b] = [places[from.name], places[to.name]]
+  if (!a || !b) return [0, 0]
+  const [dx, dy] = [a.x - from.place.x, a.y - from.place.y]
+  return b.x - to.place.x === dx && b.y - to.place.y === dy ? [dx, dy] : [0, 0]
+}
+
 function collect(blocks: Record<string, SheetBlock>, wires: Wire[], places: Places): Net[] {
   const nets = new Map<string, Net>()
   for (const wire of wires) {
@@ -83,8 +97,9 @@ function collect(blocks: Record<string, SheetBlock>, wires: Wire[], places: Plac
     const source = end(from, places[from.name] ?? from.place, portOf(wire.source), true)
     const target = end(to, places[to.name] ?? to.place, portOf(wire.target), false)
     if (!source || !target) continue
+    const bends = wire.bends?.length ? wire.bends.map((value, k) => value + shift(from, to, places)[(k + Number(source.dx === 0)) % 2]!) : undefined
     const net = nets.get(wire.source) ?? { key: wire.source, source, targets: [] }
-    net.targets.push({ key: wireKey(wire), end: target })
+    net.targets.push({ key: wireKey(wire), end: target, bends })
     nets.set(wire.source, net)
   }
   return [...nets.values()]

@@ -1,22 +1,89 @@
-import { BaseEdge, type Edge, type EdgeProps } from '@xyflow/react'
+import { BaseEdge, useReactFlow, type Edge, type EdgeProps } from '@xyflow/react'
 import { memo } from 'react'
+import { create } from 'zustand'
+import type { Wire } from '../protocol'
+import { change } from '../store'
+import { dragged, isFlat } from './bends'
+import { GRID } from './insert'
 import { svgPath, type Point } from './router'
 
-export type WireEdgeType = Edge<{ path: Point[]; dots: Point[]; rank: number; label: string }, 'wire'>
+export type WireEdgeType = Edge<
+  {
+    path: Point[]
+    dots: Point[]
+    rank: number
+    label: string
+    bent: boolean
+    /** The whole way from the source, of which `path` is the last part where the wire branches from another. */
+    way: () => Point[]
+  },
+  'wire'
+>
 
-/** A wire along its routed path: thin for a scalar, heavier for a vector, double for a matrix. */
+/** The wire whose way is being drawn, with the bends that it has so far. */
+export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
+
+const SNAP = 7
+
+/** A wire along its way: thin for a scalar, heavier for a vector, double for a matrix, three lines for a bus. Its pieces can be dragged. */
 export const WireEdge = memo(function WireEdge({ id, data, selected, sourceX, sourceY, targetX, targetY }: EdgeProps<WireEdgeType>) {
   const path = data?.path.length ? data.path : ([[sourceX, sourceY], [targetX, targetY]] as Point[])
-  const rank = Math.min(data?.rank ?? 0, 2)
+  const rank = data?.rank ?? 0
   const line = svgPath(path)
   return (
     <g className={selected ? 'wire selected' : 'wire'}>
       <BaseEdge id={id} path={line} className={`line rank${rank}`} markerEnd="url(#wire-head)" interactionWidth={14} />
-      {rank === 2 && <path d={line} className="core" />}
+      {rank >= 2 && <path d={line} className={rank === 3 ? 'core wide' : 'core'} />}
+      {rank === 3 && <path d={line} className="line rank0 inner" />}
       {data?.dots.map(([x, y]) => (
         <circle key={`${x} ${y}`} cx={x} cy={y} r={2.6 + 0.3 * rank} className="dot" />
       ))}
+      {data && path.slice(1).map((_, piece) => <Piece key={piece} id={id} path={path} piece={piece} way={data.way} />)}
       {data?.label && <title>{data.label}</title>}
     </g>
   )
 })
+
+/** One straight piece of a wire, to be taken hold of. */
+function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: number; way: () => Point[] }) {
+  const flow = useReactFlow()
+  const [[x1, y1], [x2, y2]] = [path[piece]!, path[piece + 1]!]
+  const flat = isFlat(path, piece)
+  const take = (event: React.PointerEvent<SVGLineElement>) => {
+    if (event.button !== 0) return
+    const whole = way()
+    const index = whole.length - path.length + piece
+    if (index < 0 || index > whole.length - 2) return
+    const [source, target] = [id.slice(0, id.indexOf(' -> ')), id.slice(id.indexOf(' -> ') + 4)]
+    const start = { x: event.clientX, y: event.clientY }
+    const element = event.currentTarget
+    const move = (at: PointerEvent) => {
+      const gone = flat ? at.clientY - start.y : at.clientX - start.x
+      if (Math.abs(gone) < 3 && !useBending.getState().wire) return
+      if (!element.hasPointerCapture(at.pointerId)) element.setPointerCapture(at.pointerId)
+      const place = flow.screenToFlowPosition({ x: at.clientX, y: at.clientY }, { snapToGrid: false })
+      useBending.setState({ wire: { source, target, bends: dragged(whole, index, level(whole, index, flat ? place.y : place.x)) } })
+    }
+    const end = (at: PointerEvent) => {
+      element.removeEventListener('pointermove', move)
+      element.removeEventListener('pointerup', end)
+      element.removeEventListener('pointercancel', end)
+      const { wire } = useBending.getState()
+      if (!wire) return
+      if (at.type === 'pointerup') void change({ kind: 'bend', wires: [wire] }).finally(() => useBending.setState({ wire: null }))
+      else useBending.setState({ wire: null })
+    }
+    element.addEventListener('pointermove', move)
+    element.addEventListener('pointerup', end)
+    element.addEventListener('pointercancel', end)
+  }
+  return <line x1={x1} y1={y1} x2={x2} y2={y2} className={flat ? 'piece nopan flat' : 'piece nopan'} onPointerDown={take} />
+}
+
+/** Where a piece comes to lie: level with the next parallel pieces where it is near them, else on the grid. */
+function level(way: Point[], piece: number, wanted: number): number {
+  const axis = isFlat(way, piece) ? 1 : 0
+  const others = way.filter((_, k) => k !== piece && k !== piece + 1).map((point) => point[axis])
+  const near = others.find((other) => Math.abs(other - wanted) < SNAP)
+  return near ?? GRID * Math.round(wanted / GRID)
+}

@@ -14,7 +14,7 @@ from armblocks.diagram.conditional import (
     TriggeredSubsystem,
 )
 from armblocks.diagram.content_key import content_key
-from armblocks.diagram.diagram import Connection, Diagram, Placement
+from armblocks.diagram.diagram import ROTATIONS, Connection, Diagram, Note, Placement
 from armblocks.diagram.difference import DiagramDifference, diagram_difference
 from armblocks.diagram.hierarchy import (
     FlatForm,
@@ -54,6 +54,7 @@ from armblocks.diagram.worked_example import Fed, Feed, WorkedExample, made
 
 __all__ = [
     "REQUIRED",
+    "ROTATIONS",
     "ActionSubsystem",
     "Block",
     "BlockEquations",
@@ -83,6 +84,7 @@ __all__ = [
     "Guard",
     "Inport",
     "Merge",
+    "Note",
     "Outport",
     "Parameter",
     "ParameterFormula",

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.check import check_diagram
-from armblocks.diagram.diagram import Connection, Diagram, Placement, block_in_scope
+from armblocks.diagram.diagram import Connection, Diagram, Note, Placement, block_in_scope
 from armblocks.diagram.mask import ParameterFormula, checked_mask, formula, mask_parameter, values_of
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.diagram.parameter import Parameter, Value
@@ -86,6 +86,8 @@ class DiagramBuilder:
         self._taken: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
         self._layout: dict[str, Placement] = {}
+        self._bends: dict[Connection, tuple[float, ...]] = {}
+        self._notes: dict[str, Note] = {}
         self._logged: dict[PortRef, None] = {}
         self._mask: list[Parameter] = []
         self._mask_values: dict[str, Value] = {}
@@ -196,11 +198,25 @@ class DiagramBuilder:
         width: float | None = None,
         height: float | None = None,
         flipped: bool = False,
+        rotation: int = 0,
     ) -> None:
-        """Say where a block stands on the sheet (pixels, y downwards)."""
+        """Say where a block stands on the sheet, see :class:`~armblocks.diagram.Placement`."""
         name = block if isinstance(block, str) else block.name
         self._known(name)
-        self._layout[name] = Placement(x=x, y=y, width=width, height=height, flipped=flipped)
+        self._layout[name] = Placement(
+            x=x, y=y, width=width, height=height, flipped=flipped, rotation=rotation
+        )
+
+    def bend(self, wire: Connection, bends: Sequence[float]) -> None:
+        """Say which way a wire goes: in turn the x and y of its straight pieces (pixels), from its source on.
+
+        It is forgotten where there is no such wire.
+        """
+        self._bends[wire] = tuple(bends)
+
+    def note(self, name: str, note: Note) -> None:
+        """Put words on the sheet; ``name`` tells them from others."""
+        self._notes[name] = note
 
     def log(self, source: Source) -> None:
         """Have an output seen without a Scope: reports and the studio show its traces.
@@ -223,6 +239,8 @@ class DiagramBuilder:
             blocks=self._blocks,
             connections=tuple(Connection(source, target) for target, source in self._wires.items()),
             layout=self._layout,
+            bends=self._bends,
+            notes=self._notes,
             settings=self.settings,
             extras=self._extras,
             description=self.description,

@@ -34,7 +34,8 @@ class Connection:
 class Placement:
     """Where a block stands on the sheet: top left corner and size in pixels, y downwards.
 
-    ``width`` and ``height`` ``None``: the drawing chooses. ``flipped``: inputs on the right.
+    ``width`` and ``height`` ``None``: the drawing chooses. ``flipped``: inputs on the right. ``rotation``:
+    degrees clockwise, one of 0, 90, 180 and 270, after the flip.
     """
 
     x: float
@@ -42,7 +43,20 @@ class Placement:
     width: float | None = None
     height: float | None = None
     flipped: bool = False
+    rotation: int = 0
 
+
+@dataclass(frozen=True, kw_only=True)
+class Note:
+    """Words on the sheet, of one line or more: their top left corner in pixels."""
+
+    x: float
+    y: float
+    text: str
+
+
+ROTATIONS = (0, 90, 180, 270)
+"""Degrees by which a block may be turned."""
 
 Gate = Mapping[str, PortRef]
 """What feeds the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
@@ -68,18 +82,21 @@ class Diagram:
     """Blocks and wires. Only ``DiagramBuilder.build`` makes one, and what it makes is checked.
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams look alike. ``layout``
-    may name only some blocks. ``mask`` are the parameters that it declares (see
-    :mod:`armblocks.diagram.mask`) and ``mask_values`` what they are, the defaults where nothing is given;
-    blocks whose parameters are formulas have the values that follow from these. ``link`` names the entry of a
-    library file that the diagram is, ``servos.json#JointServo``; it is empty for one of its own. ``extras``
-    are unknown keys of a file, preserved: it has the keys ``""`` (the document), ``"blocks"`` (by block
-    name), and whatever else a file format puts there.
+    may name only some blocks, ``bends`` only some wires: those whose way somebody has drawn, see
+    :func:`armblocks.report.wire_routing.bent`; ``notes`` are annotations by name. ``mask`` are the parameters
+    that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` what they are, the defaults where
+    nothing is given; blocks whose parameters are formulas have the values that follow from these. ``link``
+    names the entry of a library file that the diagram is, ``servos.json#JointServo``; it is empty for one of
+    its own. ``extras`` are unknown keys of a file, preserved: it has the keys ``""`` (the document),
+    ``"blocks"`` (by block name), and whatever else a file format puts there.
     """
 
     name: str
     blocks: Mapping[str, Block]
     connections: tuple[Connection, ...] = ()
     layout: Mapping[str, Placement] = field(default_factory=dict[str, Placement])
+    bends: Mapping[Connection, tuple[float, ...]] = field(default_factory=dict[Connection, tuple[float, ...]])
+    notes: Mapping[str, Note] = field(default_factory=dict[str, Note])
     settings: SimulationOptions = field(default_factory=SimulationOptions)
     extras: Mapping[str, object] = field(default_factory=dict[str, object])
     description: str = ""
@@ -105,7 +122,10 @@ class Diagram:
                 name: block_in_scope(name, block, self.mask_values) for name, block in self.blocks.items()
             }
             object.__setattr__(self, "blocks", blocks)
-        for name in ("blocks", "layout", "extras", "mask_values"):
+        if self.bends:  # those of wires that are gone are gone with them
+            kept = {wire: self.bends[wire] for wire in self.connections if self.bends.get(wire)}
+            object.__setattr__(self, "bends", kept)
+        for name in ("blocks", "layout", "bends", "notes", "extras", "mask_values"):
             ordered = dict(sorted(getattr(self, name).items()))
             object.__setattr__(self, name, MappingProxyType(ordered))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))

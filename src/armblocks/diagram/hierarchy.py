@@ -229,6 +229,8 @@ class _Flattening:
             blocks={path: _plain(block) for path, block in real.items()},
             connections=tuple(connections),
             layout={},
+            bends={},
+            notes={},
             extras={},
             gates=self._gates(real),
             mask=(),

@@ -2,13 +2,16 @@
 
 Blocks are keyed by name and sorted, connections are sorted sentences (``"jtraj/q -> fkine/q"``), the layout
 stands apart from the meaning, and nothing derived, no ids and no times are written. So a changed parameter is
-one line, a moved block is one line of the layout, and two people who add different blocks do not collide::
+one line, a moved block is one line of the layout, and two people who add different blocks do not collide.
+Among the layout stand also the ways of wires that somebody has drawn, under the wire's sentence, and notes,
+under names that begin with ``/``, as no block's does::
 
     {
       "blocks": {"sine": {"parameters": {"frequency": 2, …}, "type": "SineWave"}, …},
       "connections": ["sine/y -> scope/u1"],
       "format": 1,
-      "layout": {"sine": {"x": 40, "y": 40}, …},
+      "layout": {"/1": {"text": "…", "x": 40, "y": 0}, "sine": {"x": 40, "y": 40},
+                 "sine/y -> scope/u1": {"bends": [120]}, …},
       "name": "model",
       "settings": {"stop_time": 10, …}
     }
@@ -40,10 +43,13 @@ from pathlib import Path
 from typing import cast
 
 from armblocks.diagram import (
+    ROTATIONS,
     Block,
     BlockLibrary,
+    Connection,
     Diagram,
     DiagramBuilder,
+    Note,
     Parameter,
     ParameterKind,
     Placement,
@@ -180,6 +186,10 @@ class _Writer:
                 if (value := getattr(place, name)) != default
             }
             layout[key] = {**_members(layout_extras.get(key)), **stated}
+        for wire, bends in diagram.bends.items():
+            layout[str(wire)] = {**_members(layout_extras.get(str(wire))), "bends": list(bends)}
+        for key, note in diagram.notes.items():
+            layout[key] = {**_members(layout_extras.get(key)), **dataclasses.asdict(note)}
         settings = {
             name: value for name in _SETTINGS if (value := getattr(diagram.settings, name)) is not None
         }
@@ -315,7 +325,9 @@ class _Reader:
         settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
         block_nodes = members["blocks"].members() if "blocks" in members else {}
         blocks = {key: self._block(key, entry, extras) for key, entry in block_nodes.items()}
-        placements = _layout(members["layout"], set(blocks), extras) if "layout" in members else {}
+        layout = _Layout()
+        for key, entry in (members["layout"].members() if "layout" in members else {}).items():
+            layout.read(key, entry, set(blocks), extras)
         builder = DiagramBuilder(
             members["name"].text() if "name" in members else name,
             settings=settings,
@@ -334,10 +346,12 @@ class _Reader:
         for entry in members["logged"].elements() if "logged" in members else []:
             with _located(entry):
                 builder.log(_port(entry))
-        for key, place in placements.items():
-            builder.place(
-                key, place.x, place.y, width=place.width, height=place.height, flipped=place.flipped
-            )
+        for key, place in layout.places.items():
+            builder.place(key, **dataclasses.asdict(place))
+        for wire, bends in layout.bends.items():
+            builder.bend(wire, bends)
+        for key, note in layout.notes.items():
+            builder.note(key, note)
         with _located(node):
             return builder.draft() if self.draft else builder.build()
 
@@ -491,23 +505,45 @@ def _port(node: Node) -> PortRef:
     return PortRef(block, port)
 
 
-def _layout(node: Node, blocks: set[str], extras: Extras) -> dict[str, Placement]:
-    """Where the blocks stand. What stands there and is no block belongs to another program and is kept."""
-    places: dict[str, Placement] = {}
-    for key, member in node.members().items():
-        if key not in blocks:
-            extras.setdefault("layout", {})[key] = member.value
-            continue
-        members = _split(member, tuple(_PLACEMENT), extras, "layout", key)
-        closed = {name: members[name] for name in ("x", "y") if name in members}
-        if len(closed) < 2:
-            raise member.error(f"block '{key}' is placed without x or y", allowed="x and y in pixels")
-        extents = {name: members[name].number() for name in ("width", "height") if name in members}
-        places[key] = Placement(
-            x=closed["x"].number(),
-            y=closed["y"].number(),
-            width=extents.get("width"),
-            height=extents.get("height"),
-            flipped="flipped" in members and members["flipped"].boolean(),
-        )
-    return places
+class _Layout:
+    """What an object's layout says of blocks, wires and notes."""
+
+    def __init__(self) -> None:
+        self.places: dict[str, Placement] = {}
+        self.bends: dict[Connection, list[float]] = {}
+        self.notes: dict[str, Note] = {}
+
+    def read(self, key: str, node: Node, blocks: set[str], extras: Extras) -> None:
+        """Take in one entry. What is no block, wire or note belongs to another program and is kept."""
+        stated = node.members() if isinstance(node.value, dict) else {}
+        if key in blocks:
+            self.places[key] = _placement(key, node, extras)
+        elif "bends" in stated and (found := _WIRE.fullmatch(key)):
+            members = _split(node, ("bends",), extras, "layout", key)
+            wire = Connection(PortRef(found[1], found[2]), PortRef(found[3], found[4]))
+            self.bends[wire] = [entry.number() for entry in members["bends"].elements()]
+        elif key.startswith("/") and {"x", "y", "text"} <= stated.keys():
+            members = _split(node, ("x", "y", "text"), extras, "layout", key)
+            x, y = members["x"].number(), members["y"].number()
+            self.notes[key] = Note(x=x, y=y, text=members["text"].text())
+        else:
+            extras.setdefault("layout", {})[key] = node.value
+
+
+def _placement(key: str, node: Node, extras: Extras) -> Placement:
+    members = _split(node, tuple(_PLACEMENT), extras, "layout", key)
+    if not {"x", "y"} <= members.keys():
+        raise node.error(f"block '{key}' is placed without x or y", allowed="x and y in pixels")
+    rotation = members["rotation"].number() if "rotation" in members else 0
+    if rotation not in ROTATIONS:
+        allowed = ", ".join(map(str, ROTATIONS))
+        raise members["rotation"].error(f"block '{key}' is turned by {rotation:g} degrees", allowed=allowed)
+    extents = {name: members[name].number() for name in ("width", "height") if name in members}
+    return Placement(
+        x=members["x"].number(),
+        y=members["y"].number(),
+        width=extents.get("width"),
+        height=extents.get("height"),
+        flipped="flipped" in members and members["flipped"].boolean(),
+        rotation=int(rotation),
+    )

@@ -23,11 +23,21 @@ from armblocks.diagram import (
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.report import block_faces
 from armblocks.report.block_faces import FaceShape
-from armblocks.report.diagram_layout import NAME_ROOM, NAME_SIZE, PORT_TEXT, Box, PortSpot, boxes, sized_box
+from armblocks.report.diagram_layout import (
+    NAME_ROOM,
+    NAME_SIZE,
+    PORT_TEXT,
+    PORT_TEXT_ROOM,
+    Box,
+    PortSpot,
+    boxes,
+    sized_box,
+)
 from armblocks.report.face_marks import Room
-from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text
+from armblocks.report.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text, moved, turned
 from armblocks.report.rates import Rates
 from armblocks.report.sink_faces import Trend
+from armblocks.report.structure_faces import control_ports
 from armblocks.report.style import Theme, Tone
 from armblocks.report.svg import svg_file
 from armblocks.report.text_width import shorten, text_width
@@ -36,6 +46,9 @@ from armblocks.simulation.result import SimulationResult
 
 _MARGIN = 22.0
 _ROUNDING = 5.0
+NOTE_SIZE = 12.0
+NOTE_LINE = 17.0
+"""px: type size and line height of notes."""
 _TRENDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
 _STUB = 16.0
 """px of wire at the ports of a block that is drawn alone."""
@@ -72,7 +85,8 @@ def diagram_picture(
             place = box.x + box.width, box.y - 4
             block.append(Text(*place, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
         marks.append(Group(tuple(block), title=_block_title(name, box)))
-    left, top, right, bottom = _extent(placed, routed)
+    marks += _notes(level)
+    left, top, right, bottom = _extent(placed, routed, level)
     picture = Picture(
         width=right - left + 2 * _MARGIN,
         height=bottom - top + 2 * _MARGIN,
@@ -130,10 +144,12 @@ def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict
     wires: dict[PortRef, list[PortRef]] = {}
     for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
         wires.setdefault(wire.source, []).append(wire.target)
+    drawn = diagram.bends if set(diagram.layout) >= set(diagram.blocks) else {}
     nets = [
         Net(
             _end(placed[source.block].outputs, source.port),
             tuple(_end(placed[target.block].inputs, target.port) for target in targets),
+            tuple(drawn.get(Connection(source, target), ()) for target in targets),
         )
         for source, targets in wires.items()
     ]
@@ -153,6 +169,8 @@ def obstacle(box: Box) -> Obstacle:
 def _label(box: Box) -> tuple[float, float, float, float]:
     """The rectangle of the block's name: below it; above for round sums, which wires enter from below."""
     width = box.name_width
+    if not box.upright:  # wires leave above and below
+        return box.x + box.width + 5, box.y + box.height / 2 - 7, width, NAME_ROOM - 4
     if _shape(box) is FaceShape.CIRCLE:
         return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
     return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
@@ -172,9 +190,12 @@ def _trend(path: str, view: View | None, result: SimulationResult | None) -> Tre
 
 
 def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
-    """A block without its name: outline, port names and face, where its box stands."""
+    """A block without its name: outline, port names and face, where its box stands.
+
+    A block that is turned has its outline turned, and its drawing upright.
+    """
     shape, block = _shape(box), box.block
-    marks: list[Mark] = [block_faces.outline(block, box.x, box.y, box.width, box.height, box.flipped)]
+    marks: list[Mark] = [_outline(box)]
     room = Room(box.x, box.y, box.width, box.height)
     if shape in (FaceShape.CARD, FaceShape.BUS):
         names, room = _port_names(box)
@@ -183,17 +204,37 @@ def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
         marks += _signs(box)
     if shape is FaceShape.BAR:
         return marks
-    heights = tuple(spot.y for spot in box.inputs if spot.dx)
-    tops = tuple((spot.name, spot.x) for spot in box.inputs if not spot.dx)
-    own = block_faces.face_at_ports(block, room, heights, tops, flipped=box.flipped)
-    return marks + (own if own is not None else block_faces.face(block, room, trend, flipped=box.flipped))
+    flipped = box.flipped != (box.rotation == 180)
+    if not box.upright and shape is FaceShape.TRIANGLE:
+        # The number stands in the wide half, which is the upper one of a triangle that points down.
+        points_down = (box.rotation == 90) != box.flipped
+        way = -1 if points_down else 1
+        room = Room(room.x + 0.14 * room.width, room.y + way * 0.14 * room.height, room.width, room.height)
+        flipped = False
+    above = set(control_ports(block))
+    if box.upright:
+        heights = tuple(spot.y for spot in box.inputs if spot.name not in above)
+    else:
+        count = len(box.inputs)
+        heights = tuple(room.y + room.height * (k + 0.5) / count for k in range(count))
+    tops = tuple((spot.name, spot.x) for spot in box.inputs if spot.name in above and not box.rotation)
+    own = block_faces.face_at_ports(block, room, heights, tops, flipped=flipped)
+    return marks + (own if own is not None else block_faces.face(block, room, trend, flipped=flipped))
+
+
+def _outline(box: Box) -> Mark:
+    width, height = (box.width, box.height) if box.upright else (box.height, box.width)
+    drawn = block_faces.outline(box.block, 0.0, 0.0, width, height, box.flipped)
+    for _ in range(box.rotation // 90):
+        drawn, width, height = turned(drawn, height), height, width
+    return moved(drawn, box.x, box.y)
 
 
 def _block(box: Box, trend: Trend | None) -> list[Mark]:
     shape, marks = _shape(box), block_marks(box, trend)
     lx, ly, lw, _ = _label(box)
     name = shorten(box.name, NAME_SIZE, lw + 1)
-    if shape is FaceShape.CIRCLE:
+    if shape is FaceShape.CIRCLE or not box.upright:
         marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
     else:
         marks.append(Text(lx + lw / 2, ly + NAME_SIZE + 1, name, NAME_SIZE, Tone.MUTED, "middle"))
@@ -202,12 +243,15 @@ def _block(box: Box, trend: Trend | None) -> list[Mark]:
 
 def _port_names(box: Box) -> tuple[list[Mark], Room]:
     """Names inside the edges where a side has more than one port, and the room that they leave."""
+    if not box.upright:
+        return _port_names_above_and_below(box)
     marks: list[Mark] = []
     taken = {"left": 0.0, "right": 0.0}
     into, out = block_faces.port_labels(box.block)
+    flipped = box.flipped != (box.rotation == 180)
     for spots, labels, side in (
-        (box.inputs, into, "right" if box.flipped else "left"),
-        (box.outputs, out, "left" if box.flipped else "right"),
+        (box.inputs, into, "right" if flipped else "left"),
+        (box.outputs, out, "left" if flipped else "right"),
     ):
         if not any(labels):
             continue
@@ -220,6 +264,22 @@ def _port_names(box: Box) -> tuple[list[Mark], Room]:
             marks.append(Text(x, spot.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))
     width = box.width - taken["left"] - taken["right"]
     return marks, Room(box.x + taken["left"], box.y, width, box.height)
+
+
+def _port_names_above_and_below(box: Box) -> tuple[list[Mark], Room]:
+    marks: list[Mark] = []
+    top, bottom = box.y, box.y + box.height
+    for spots, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
+        named = [(spot, label) for spot, label in zip(spots, labels) if label]
+        above = any(spot.y == box.y for spot, _ in named)
+        for spot, label in named:
+            y = box.y + PORT_TEXT + 3 if above else box.y + box.height - 5
+            marks.append(Text(spot.x, y, label, PORT_TEXT, Tone.MUTED, "middle"))
+        if named and above:
+            top += PORT_TEXT_ROOM
+        elif named:
+            bottom -= PORT_TEXT_ROOM
+    return marks, Room(box.x, top, box.width, bottom - top)
 
 
 def _signs(box: Box) -> list[Mark]:
@@ -324,9 +384,24 @@ def _arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:
     return Polyline(corners, stroke=None, fill=tone, closed=True)
 
 
-def _extent(placed: dict[str, Box], routed: list[RoutedNet]) -> tuple[float, float, float, float]:
+def _notes(diagram: Diagram) -> list[Mark]:
+    return [
+        Text(note.x, note.y + NOTE_SIZE + NOTE_LINE * row, line, NOTE_SIZE, Tone.INK)
+        for note in diagram.notes.values()
+        for row, line in enumerate(note.text.split("\n"))
+        if line
+    ]
+
+
+def _extent(
+    placed: dict[str, Box], routed: list[RoutedNet], diagram: Diagram
+) -> tuple[float, float, float, float]:
     xs: list[float] = []
     ys: list[float] = []
+    for note in diagram.notes.values():
+        lines = note.text.split("\n")
+        xs += [note.x, note.x + max(text_width(line, NOTE_SIZE) for line in lines)]
+        ys += [note.y, note.y + NOTE_LINE * len(lines)]
     for box in placed.values():
         lx, ly, lw, lh = _label(box)
         xs += [box.x, box.x + box.width, lx, lx + lw]

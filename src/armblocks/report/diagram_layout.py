@@ -15,6 +15,8 @@ NAME_SIZE = 11.0
 NAME_ROOM = 20.0
 """px below a block that its name takes."""
 PORT_TEXT = 9.0
+PORT_TEXT_ROOM = 13.0
+"""px that the names of ports take at the upper or lower edge."""
 _ROW_GAP = 26.0
 _COLUMN_GAP = 52.0
 _LANE = 11.0
@@ -44,8 +46,15 @@ class Box:
     width: float
     height: float
     flipped: bool = False
+    rotation: int = 0
+    """Degrees clockwise."""
     inputs: tuple[PortSpot, ...] = ()
     outputs: tuple[PortSpot, ...] = ()
+
+    @property
+    def upright(self) -> bool:
+        """Whether its signals run from side to side."""
+        return self.rotation % 180 == 0
 
     @property
     def name_width(self) -> float:
@@ -93,10 +102,34 @@ def _numbered(diagram: Diagram) -> dict[str, Block]:
 def standing_box(name: str, block: Block, place: Placement) -> Box:
     """The box of a block that stands at ``place``, whatever is connected to it."""
     sized = sized_box(name, block)
-    width, height = place.width or sized.width, place.height or sized.height
+    width, height = sized.width, sized.height
+    if place.rotation % 180:
+        width, height = _standing(sized)
     return _with_ports(
-        replace(sized, x=place.x, y=place.y, width=width, height=height, flipped=place.flipped)
+        replace(
+            sized,
+            x=place.x,
+            y=place.y,
+            width=place.width or width,
+            height=place.height or height,
+            flipped=place.flipped,
+            rotation=place.rotation,
+        )
     )
+
+
+def _standing(box: Box) -> tuple[float, float]:
+    """Width and height of a block turned by a quarter: its drawing stays upright, its ports go round."""
+    if face_size(box.block)[0] is not FaceShape.CARD:
+        return box.height, box.width
+    labels = port_labels(box.block)
+    pitches = [max((text_width(text, PORT_TEXT) + 6 for text in side), default=0.0) for side in labels]
+    ports = (len(box.block.input_ports()), len(box.block.output_ports()))
+    wide = max(count * max(20.0, pitch) + 8 for count, pitch in zip(ports, pitches))
+    _, width, height = face_size(box.block)
+    named = sum(any(side) for side in labels)
+    room = CONTROL_ROOM * bool(control_ports(box.block))
+    return float(round(max(width, wide))), height + named * PORT_TEXT_ROOM + room
 
 
 def _straightened(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
@@ -133,7 +166,7 @@ def _turned(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
     turned = dict(placed)
     for name, box in placed.items():
         count = len(box.inputs)
-        if face_size(box.block)[0] is not FaceShape.CIRCLE or count not in (2, 3):
+        if face_size(box.block)[0] is not FaceShape.CIRCLE or count not in (2, 3) or box.rotation:
             continue
         centre = box.y + box.height / 2
         height = {
@@ -327,6 +360,22 @@ def sized_box(name: str, block: Block) -> Box:
 
 
 def _with_ports(box: Box) -> Box:
+    """The box with its ports: those of the upright one, gone round with it."""
+    width, height = (box.width, box.height) if box.upright else (box.height, box.width)
+    upright = _with_upright_ports(replace(box, x=0.0, y=0.0, width=width, height=height))
+    inputs, outputs = upright.inputs, upright.outputs
+    for _ in range(box.rotation // 90):
+        inputs = tuple(_gone_round(spot, height) for spot in inputs)
+        outputs = tuple(_gone_round(spot, height) for spot in outputs)
+        width, height = height, width
+    return replace(box, x=0.0, y=0.0, inputs=inputs, outputs=outputs).at(box.x, box.y)
+
+
+def _gone_round(spot: PortSpot, height: float) -> PortSpot:
+    return PortSpot(spot.name, height - spot.y, spot.x, -spot.dy, spot.dx)
+
+
+def _with_upright_ports(box: Box) -> Box:
     shape, _, _ = face_size(box.block)
     into, out = [p.name for p in box.block.input_ports()], [p.name for p in box.block.output_ports()]
     left, right = box.x, box.x + box.width

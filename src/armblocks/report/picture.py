@@ -152,6 +152,28 @@ def moved(mark: Mark, dx: float, dy: float) -> Mark:
             return replace(mark, x=mark.x + dx, y=mark.y + dy)
 
 
+def turned(mark: Mark, height: float) -> Mark:
+    """The mark turned a quarter clockwise with a sheet of this height; texts move and stay upright."""
+    match mark:
+        case Polyline():
+            points = np.asarray(mark.points, dtype=np.float64)
+            return replace(mark, points=np.stack([height - points[:, 1], points[:, 0]], axis=1))
+        case Curve():
+            commands = tuple(
+                (c[0], *(v for x, y in zip(c[1::2], c[2::2]) for v in (height - float(y), float(x))))
+                for c in mark.commands
+            )
+            return replace(mark, commands=commands)
+        case Group():
+            return replace(mark, marks=tuple(turned(inner, height) for inner in mark.marks))
+        case Rectangle() | Raster():
+            return replace(
+                mark, x=height - mark.y - mark.height, y=mark.x, width=mark.height, height=mark.width
+            )
+        case Disc() | Text():
+            return replace(mark, x=height - mark.y, y=mark.x)
+
+
 def text_marks(picture: Picture) -> list[Text]:
     """All texts of a picture, in painting order: what the checks of overlap read."""
 

@@ -68,6 +68,35 @@ class Net:
 
     source: WireEnd
     targets: tuple[WireEnd, ...]
+    bends: tuple[tuple[float, ...], ...] = ()
+    """For each target the way that somebody has drawn, see :func:`bent`; empty where the router chooses."""
+
+    def drawn(self) -> dict[WireEnd, tuple[Point, ...]]:
+        """The ways that are drawn and lead from port to port."""
+        found: dict[WireEnd, tuple[Point, ...]] = {}
+        for target, bends in zip(self.targets, self.bends):
+            if (path := bent(self.source, bends, target)) is not None:
+                found[target] = path
+        return found
+
+
+def bent(source: WireEnd, bends: Sequence[float], target: WireEnd) -> tuple[Point, ...] | None:
+    """The corner points of a way along ``bends``, the coordinates of its straight pieces in turn (px).
+
+    Of a wire that leaves to the side these are x, y, x …; the first and the last piece go with their ports,
+    so the way holds together wherever blocks are moved. ``None`` where there are no bends, or where the last
+    piece would not run in the direction of its port (a block was turned).
+    """
+    x, y, flat = source.x, source.y, source.dx != 0
+    points: list[Point] = [(x, y)]
+    for value in bends:
+        x, y = (value, y) if flat else (x, value)
+        points.append((x, y))
+        flat = not flat
+    if not bends or flat != (target.dx == 0):
+        return None
+    points.append((target.x, y) if flat else (x, target.y))
+    return _corners([*points, (target.x, target.y)])
 
 
 @dataclass(frozen=True)
@@ -79,9 +108,9 @@ class RoutedNet:
 
 
 def route(obstacles: Sequence[Obstacle], nets: Sequence[Net]) -> list[RoutedNet]:
-    """Wires for every net, in the order given; the short ones are laid first."""
+    """Wires for every net, in the order given; those that are drawn are laid first, then the short ones."""
     router = _Router(obstacles, nets)
-    order = sorted(range(len(nets)), key=lambda k: (_length(nets[k]), k))
+    order = sorted(range(len(nets)), key=lambda k: (not nets[k].drawn(), _length(nets[k]), k))
     done: dict[int, RoutedNet] = {k: router.lay(k, nets[k]) for k in order}
     return [done[k] for k in range(len(nets))]
 
@@ -101,6 +130,9 @@ class _Router:
         ]
         xs = [x for x, _ in stubs]
         ys = [y for _, y in stubs]
+        corners = [point for net in nets for path in net.drawn().values() for point in path[1:-1]]
+        xs += [x for x, _ in corners]
+        ys += [y for _, y in corners]
         side_x = [v for o in obstacles for lane in _LANES for v in (o.x - lane, o.x + o.width + lane)]
         side_y = [v for o in obstacles for lane in _LANES for v in (o.top - lane, o.bottom + lane - 5)]
         self.xs = _merged([*xs, *(e.x for e in ends if e.dx == 0)], side_x)
@@ -150,26 +182,42 @@ class _Router:
         goals = sorted(net.targets, key=lambda t: (abs(t.x - origin[0]) + abs(t.y - origin[1]), t.y, t.x))
         heading = (net.source.dx, net.source.dy)
         stems: dict[WireEnd, list[Node]] = {}
+        drawn = net.drawn()
+        for path in drawn.values():
+            begin = [_ahead(net.source)] if _is_ahead(net.source, path[1]) else []
+            nodes = [self._node(*point) for point in (*begin, *path[1:-1])]
+            for a, b in pairwise(node for corner in pairwise(nodes) for node in _between(*corner)):
+                if a != b:
+                    self._join(number, tree, a, b)
         for target in goals:
+            if target in drawn:
+                continue
             goal = self._node(*_behind(target))
             walked = self._search(number, tree, start, heading, goal, (target.dx, target.dy))
             if walked is None:
                 stems[target] = []
                 continue
             for a, b in pairwise(walked):
-                tree.setdefault(a, set()).add(b)
-                tree.setdefault(b, set()).add(a)
-                self._occupy(number, a, b)
+                self._join(number, tree, a, b)
             stems[target] = walked
         return self._drawn(net, start, tree, stems)
+
+    def _join(self, number: int, tree: dict[Node, set[Node]], a: Node, b: Node) -> None:
+        tree.setdefault(a, set()).add(b)
+        tree.setdefault(b, set()).add(a)
+        self._occupy(number, a, b)
 
     def _drawn(
         self, net: Net, start: Node, tree: dict[Node, set[Node]], stems: dict[WireEnd, list[Node]]
     ) -> RoutedNet:
         source = (net.source.x, net.source.y)
         paths: list[tuple[Point, ...]] = []
-        ending = {self._node(*_behind(t)) for t in net.targets if stems[t]}
+        drawn = net.drawn()
+        ending = {self._node(*_behind(t)) for t in net.targets if stems.get(t)}
         for target in net.targets:
+            if target in drawn:
+                paths.append(drawn[target])
+                continue
             walked = stems[target]
             points = [(self.xs[c], self.ys[r]) for r, c in walked]
             if not walked:
@@ -278,6 +326,19 @@ class _Router:
                     came[reached, k2] = (node, k)
                     heapq.heappush(queue, (price + guess(reached), price, reached, k2))
         return None
+
+
+def _is_ahead(end: WireEnd, point: Point) -> bool:
+    """Whether a wire that leaves a port is free to turn before it comes to a point."""
+    return (point[0] - end.x) * end.dx + (point[1] - end.y) * end.dy >= _STUB
+
+
+def _between(a: Node, b: Node) -> list[Node]:
+    """The nodes on the straight way from one to another, both included."""
+    (r0, c0), (r1, c1) = a, b
+    if r0 == r1:
+        return [(r0, c) for c in range(c0, c1 + (1 if c1 >= c0 else -1), 1 if c1 >= c0 else -1)]
+    return [(r, c0) for r in range(r0, r1 + (1 if r1 >= r0 else -1), 1 if r1 >= r0 else -1)]
 
 
 def _walk(came: dict[tuple[Node, int], tuple[Node, int] | None], end: tuple[Node, int]) -> list[Node]:

@@ -28,6 +28,12 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     if before.connections is not after.connections:
         for wire in set(before.connections) ^ set(after.connections):
             found.add((*path, wire.target.block, f"{wire.target.port} <- wire"))
+    for wire in before.bends.keys() | after.bends.keys():
+        if before.bends.get(wire) != after.bends.get(wire):
+            found.add((*path, wire.target.block, f"{wire.target.port} <- bends"))
+    for note in before.notes.keys() | after.notes.keys():
+        if before.notes.get(note) != after.notes.get(note):
+            found.add((*path, "/", note))
     for of_whole in ("name", "description", "settings", "extras"):
         if getattr(before, of_whole) != getattr(after, of_whole):
             found.add((*path, "/", of_whole))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection
 
-from armblocks.diagram import Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units
+from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.hierarchy import joined, levels_of
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
@@ -59,7 +59,9 @@ def _wires(diagram: Diagram) -> dict[str, WireKind]:
     }
     named = {str(ref): kind for ref, kind in kinds.items()}
     for port, carried in form.carried.items():
-        if isinstance(carried, PortRef) and carried in kinds:
+        if isinstance(carried, Bus):
+            named[str(port)] = WireKind(shape=[], unit="", bus=True)
+        elif carried in kinds:
             named[str(port)] = kinds[carried]
     return named
 

@@ -21,6 +21,7 @@ from armblocks.diagram import (
     Block,
     Connection,
     Diagram,
+    Note,
     ParameterKind,
     Placement,
     PortRef,
@@ -30,6 +31,7 @@ from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.report.diagram_layout import standing_box
 from armblocks.studio.nesting import grouped, unlinked, with_block
 from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
 from armblocks.studio.typed_settings import with_settings
@@ -54,6 +56,16 @@ class Place(Message):
     width: float | None = None
     height: float | None = None
     flipped: bool = False
+    rotation: Literal[0, 90, 180, 270] = 0
+    """Degrees clockwise."""
+
+
+class SheetNote(Message):
+    """Words on the sheet: their top left corner in px."""
+
+    x: float
+    y: float
+    text: Annotated[str, Field(max_length=10_000)]
 
 
 class NewBlock(Message):
@@ -66,26 +78,35 @@ class NewBlock(Message):
 
 
 class Wire(Message):
-    """A wire between two ports, written ``block/port``."""
+    """A wire between two ports, written ``block/port``.
+
+    ``bends``: the way that somebody has drawn, see :func:`armblocks.report.wire_routing.bent`.
+    """
 
     source: str
     target: str
+    bends: list[float] = Field(default_factory=list[float])
 
 
 class AddBlocks(Message):
-    """Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate."""
+    """Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
+
+    ``instead``: wires that give way, as where a block is dropped on one.
+    """
 
     kind: Literal["add"] = "add"
     blocks: list[NewBlock]
     wires: list[Wire] = Field(default_factory=list[Wire])
+    instead: list[Wire] = Field(default_factory=list[Wire])
 
 
 class RemoveBlocks(Message):
-    """Take blocks and wires off the sheet; the wires of the blocks go with them."""
+    """Take blocks, wires and notes off the sheet; the wires of the blocks go with them."""
 
     kind: Literal["remove"] = "remove"
     blocks: list[str] = Field(default_factory=list[str])
     wires: list[Wire] = Field(default_factory=list[Wire])
+    notes: list[str] = Field(default_factory=list[str])
 
 
 class Connect(Message):
@@ -97,10 +118,28 @@ class Connect(Message):
 
 
 class MoveBlocks(Message):
-    """Put blocks elsewhere: one drag is one edit, however many blocks were in hand."""
+    """Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
+
+    Ways that are drawn between blocks that move alike move with them.
+    """
 
     kind: Literal["move"] = "move"
-    places: dict[str, Place]
+    places: dict[str, Place] = Field(default_factory=dict[str, Place])
+    notes: dict[str, SheetNote] = Field(default_factory=dict[str, SheetNote])
+
+
+class BendWires(Message):
+    """Lead wires along the bends that they have here; without any the way is chosen again."""
+
+    kind: Literal["bend"] = "bend"
+    wires: list[Wire]
+
+
+class SetNotes(Message):
+    """Write notes, or change what they say."""
+
+    kind: Literal["notes"] = "notes"
+    notes: dict[Annotated[str, Field(pattern=r"^/\S+$", max_length=100)], SheetNote]
 
 
 class Rename(Message):
@@ -168,6 +207,8 @@ Edit = Annotated[
     | RemoveBlocks
     | Connect
     | MoveBlocks
+    | BendWires
+    | SetNotes
     | Rename
     | SetParameters
     | KeepTuned
@@ -195,6 +236,10 @@ def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagra
             return _connect([edit.wire], diagram, replace=edit.replace)
         case MoveBlocks():
             return _move(edit, diagram)
+        case BendWires():
+            return _bend(edit.wires, diagram)
+        case SetNotes():
+            return _note(edit.notes, diagram)
         case Rename():
             return _rename(edit, diagram)
         case SetParameters():
@@ -220,12 +265,20 @@ def summary(edit: Edit) -> str:
     match edit:
         case AddBlocks():
             return f"add {_listed([block.name for block in edit.blocks])}"
-        case RemoveBlocks(blocks=blocks, wires=wires):
-            return f"delete {_listed(blocks)}" if blocks else f"delete {_counted(len(wires), 'wire')}"
+        case RemoveBlocks(blocks=blocks, wires=wires, notes=notes):
+            if blocks:
+                return f"delete {_listed(blocks)}"
+            return f"delete {_counted(len(wires), 'wire') if wires else _counted(len(notes), 'note')}"
         case Connect():
             return f"connect {edit.wire.source} to {edit.wire.target}"
         case MoveBlocks():
-            return f"move {_listed(list(edit.places))}"
+            if edit.places:
+                return f"move {_listed(list(edit.places))}"
+            return f"move {_counted(len(edit.notes), 'note')}"
+        case BendWires():
+            return f"bend {_counted(len(edit.wires), 'wire')}"
+        case SetNotes():
+            return f"write {_counted(len(edit.notes), 'note')}"
         case Rename():
             return f"rename {edit.block}"
         case SetParameters():
@@ -269,6 +322,8 @@ def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diag
         blocks[new.name] = _made(new, diagram.mask_values, resolve_robot)
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
+    if edit.instead:
+        added = _remove(RemoveBlocks(wires=edit.instead), added)
     return _connect(edit.wires, added, replace=False)
 
 
@@ -303,17 +358,12 @@ def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
     gone = {_known(name, diagram) for name in edit.blocks}
     cut = {_connection(wire) for wire in edit.wires}
     for wire in cut:
-        if wire not in diagram.connections:
-            raise DiagramError(
-                f"there is no wire {wire}",
-                where=f"diagram '{diagram.name}'",
-                allowed="a wire of this sheet",
-                fix="reload the page if it shows one there",
-            )
+        _present(wire, diagram)
     return dataclasses.replace(
         diagram,
         blocks={name: block for name, block in diagram.blocks.items() if name not in gone},
         layout={name: place for name, place in diagram.layout.items() if name not in gone},
+        notes={name: note for name, note in diagram.notes.items() if name not in edit.notes},
         connections=tuple(
             wire
             for wire in diagram.connections
@@ -321,6 +371,17 @@ def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
         ),
         logged=tuple(ref for ref in diagram.logged if ref.block not in gone),
     )
+
+
+def _present(wire: Connection, diagram: Diagram) -> Connection:
+    if wire not in diagram.connections:
+        raise DiagramError(
+            f"there is no wire {wire}",
+            where=f"diagram '{diagram.name}'",
+            allowed="a wire of this sheet",
+            fix="reload the page if it shows one there",
+        )
+    return wire
 
 
 def _log(edit: LogSignal, diagram: Diagram) -> Diagram:
@@ -345,7 +406,10 @@ def _connect(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagr
                 fix="delete that wire first, or join the signals with a Sum or a Mux",
             )
         connections[made.target] = made
-    return dataclasses.replace(diagram, connections=tuple(connections.values())) if wires else diagram
+    if not wires:
+        return diagram
+    connected = dataclasses.replace(diagram, connections=tuple(connections.values()))
+    return _bend([wire for wire in wires if wire.bends], connected)
 
 
 def _connection(wire: Wire) -> Connection:
@@ -374,9 +438,43 @@ def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
 
 def _move(edit: MoveBlocks, diagram: Diagram) -> Diagram:
     layout = dict(diagram.layout)
+    shifts: dict[str, tuple[float, float]] = {}
     for name, place in edit.places.items():
-        layout[_known(name, diagram)] = _placement(place)
-    return dataclasses.replace(diagram, layout=layout)
+        before, after = layout[_known(name, diagram)], _placement(place)
+        layout[name] = after
+        if dataclasses.replace(before, x=after.x, y=after.y) == after:
+            shifts[name] = (after.x - before.x, after.y - before.y)
+    bends = dict(diagram.bends)
+    for wire, values in diagram.bends.items():
+        shift = shifts.get(wire.source.block)
+        if shift is not None and shift == shifts.get(wire.target.block):
+            flat = _leaves_sideways(wire, diagram)
+            bends[wire] = tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(values))
+    moved = dataclasses.replace(diagram, layout=layout, bends=bends)
+    return _note(edit.notes, moved, known=True)
+
+
+def _leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
+    block, place = diagram.blocks[wire.source.block], diagram.layout[wire.source.block]
+    spots = standing_box(wire.source.block, block, place).outputs
+    return any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
+
+
+def _bend(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
+    bends = dict(diagram.bends)
+    for wire in wires:
+        bends[_present(_connection(wire), diagram)] = tuple(wire.bends)
+    return dataclasses.replace(diagram, bends=bends)
+
+
+def _note(notes: Mapping[str, SheetNote], diagram: Diagram, *, known: bool = False) -> Diagram:
+    if not notes:
+        return diagram
+    for name in notes if known else ():
+        if name not in diagram.notes:
+            raise UnknownNameError("note", name, diagram.notes, where=f"diagram '{diagram.name}'")
+    changed = {name: Note(**note.model_dump()) for name, note in notes.items()}
+    return dataclasses.replace(diagram, notes={**diagram.notes, **changed})
 
 
 def _placement(place: Place) -> Placement:
@@ -394,11 +492,13 @@ def _rename(edit: Rename, diagram: Diagram) -> Diagram:
     def moved(ref: PortRef) -> PortRef:
         return PortRef(renamed(ref.block), ref.port)
 
+    wires = {wire: Connection(moved(wire.source), moved(wire.target)) for wire in diagram.connections}
     return dataclasses.replace(
         diagram,
         blocks={renamed(name): block for name, block in diagram.blocks.items()},
         layout={renamed(name): place for name, place in diagram.layout.items()},
-        connections=tuple(Connection(moved(wire.source), moved(wire.target)) for wire in diagram.connections),
+        connections=tuple(wires.values()),
+        bends={wires[wire]: bends for wire, bends in diagram.bends.items()},
         logged=tuple(moved(ref) for ref in diagram.logged),
     )
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from armblocks.studio.edits import Edit, Message, Place, Wire
+from armblocks.studio.edits import Edit, Message, Place, SheetNote, Wire
 from armblocks.studio.robot_messages import (
     Opening,
     Readings,
@@ -81,6 +81,7 @@ class Sheet(Message):
     description: str
     blocks: dict[str, SheetBlock]
     wires: list[Wire]
+    notes: dict[str, SheetNote]
     settings: dict[str, float | str | None]
     logged: list[str]
     """Outputs, ``block/port``, that are seen without a Scope."""
@@ -97,6 +98,7 @@ class SheetChange(Message):
     """Blocks that are new or other than before; ``None`` for those that are gone."""
     wires_added: list[Wire]
     wires_removed: list[Wire]
+    notes: dict[str, SheetNote] | None = None
     description: str | None = None
     settings: dict[str, float | str | None] | None = None
     logged: list[str] | None = None
@@ -117,6 +119,8 @@ class WireKind(Message):
 
     shape: list[int]
     unit: str
+    bus: bool = False
+    """Whether it is a bundle of signals."""
 
 
 class BlockType(Message):
@@ -130,6 +134,9 @@ class BlockType(Message):
     width: float
     height: float
     face: str
+    inputs: list[str]
+    outputs: list[str]
+    """Ports that it has with the default parameters."""
     parameters: list[ParameterRule]
 
 

@@ -169,6 +169,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
         },
         connections=(*inner_wires, *(Connection(port, PortRef(key, "u")) for port, key in outs.items())),
         layout=_inner_layout(diagram, list(group), list(ins.values()), list(outs.values())),
+        bends=diagram.bends,
         logged=tuple(ref for ref in diagram.logged if ref.block in group),
     )
     outer_wires = [

@@ -16,7 +16,7 @@ from armblocks.report.diagram_drawing import block_marks
 from armblocks.report.diagram_layout import Box, boxes, drawn_blocks, standing_box
 from armblocks.report.picture import Picture
 from armblocks.report.svg import svg_marks
-from armblocks.studio.edits import DEFAULT_ROBOT, Place, Wire
+from armblocks.studio.edits import DEFAULT_ROBOT, Place, SheetNote, Wire
 from armblocks.studio.messages import BlockType, ParameterRule, PortSpot, Sheet, SheetBlock, SheetChange
 from armblocks.studio.parameter_values import parameter_json
 
@@ -34,7 +34,7 @@ def arranged(diagram: Diagram) -> Diagram:
     """The diagram laid out anew, from left to right."""
     found = boxes(dataclasses.replace(diagram, layout={}))
     layout = {name: Placement(x=round(box.x), y=round(box.y)) for name, box in found.items()}
-    return dataclasses.replace(diagram, layout=layout)
+    return dataclasses.replace(diagram, layout=layout, bends={})
 
 
 def sheet(diagram: Diagram) -> Sheet:
@@ -45,7 +45,8 @@ def sheet(diagram: Diagram) -> Sheet:
         name=diagram.name,
         description=diagram.description,
         blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
-        wires=[_wire(wire) for wire in diagram.connections],
+        wires=[_wire(wire, diagram) for wire in diagram.connections],
+        notes=_notes(diagram),
         settings=_settings(diagram.settings),
         logged=[str(ref) for ref in diagram.logged],
     )
@@ -59,11 +60,14 @@ def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
         same = before.blocks.get(name) is block and (shown[name] is shows[name] or shown[name] == shows[name])
         if not same or before.layout.get(name) != after.layout.get(name):
             blocks[name] = _sheet_block(name, block, after)
-    old, new = set(before.connections), set(after.connections)
+    old, new = (
+        {(wire, diagram.bends.get(wire, ())) for wire in diagram.connections} for diagram in (before, after)
+    )
     return SheetChange(
         blocks=blocks,
-        wires_added=[_wire(wire) for wire in sorted(new - old)],
-        wires_removed=[_wire(wire) for wire in sorted(old - new)],
+        wires_added=[_wire(wire, after) for wire, _ in sorted(new - old)],
+        wires_removed=[_wire(wire, before) for wire, _ in sorted(old - new)],
+        notes=_notes(after) if after.notes != before.notes else None,
         description=after.description if after.description != before.description else None,
         settings=_settings(after.settings) if after.settings != before.settings else None,
         logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
@@ -88,6 +92,8 @@ def _block_type(kind: type[Block]) -> BlockType:
         width=box.width,
         height=box.height,
         face=_face(box),
+        inputs=[port.name for port in block.input_ports()],
+        outputs=[port.name for port in block.output_ports()],
         parameters=[
             _rule(rule, block) for rule in kind.parameters() if rule.kind is not ParameterKind.DIAGRAM
         ],
@@ -119,7 +125,7 @@ def _default(kind: type[Block]) -> Block:
 def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
     place = diagram.layout[name]
     shown = drawn_blocks(diagram)[name]
-    drawn = _drawn(shown, place.width, place.height, place.flipped)
+    drawn = _drawn(shown, dataclasses.replace(place, x=0.0, y=0.0))
     own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
     if shown is not block:
         own["parameters"] = _parameters(block)
@@ -127,9 +133,8 @@ def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
 
 
 @lru_cache(maxsize=4096)
-def _drawn(block: Block, width: float | None, height: float | None, flipped: bool) -> SheetBlock:
-    """A block in a place of its own: blocks that look alike are drawn once."""
-    place = Placement(x=0.0, y=0.0, width=width, height=height, flipped=flipped)
+def _drawn(block: Block, place: Placement) -> SheetBlock:
+    """A block at the origin: blocks that look alike are drawn once."""
     box = standing_box("", block, place)
     into, out = port_labels(block)
     return SheetBlock(
@@ -188,8 +193,13 @@ def _spots(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[PortSpot]
     ]
 
 
-def _wire(wire: Connection) -> Wire:
-    return Wire(source=str(wire.source), target=str(wire.target))
+def _wire(wire: Connection, diagram: Diagram) -> Wire:
+    bends = list(diagram.bends.get(wire, ()))
+    return Wire(source=str(wire.source), target=str(wire.target), bends=bends)
+
+
+def _notes(diagram: Diagram) -> dict[str, SheetNote]:
+    return {name: SheetNote(**dataclasses.asdict(note)) for name, note in diagram.notes.items()}
 
 
 def _settings(options: SimulationOptions) -> dict[str, Any]:

@@ -1,0 +1,71 @@
+import type { Place, SheetBlock } from '../protocol'
+import { change, freeName, useStudio } from '../store'
+
+/** What is done with the selected blocks at once: each is one step of undo. */
+
+export function chosenBlocks(): SheetBlock[] {
+  const { document, selection } = useStudio.getState()
+  return [...selection].map((name) => document?.blocks[name]).filter((block) => block !== undefined)
+}
+
+function place(change_: (block: SheetBlock) => Partial<Place>): void {
+  const chosen = chosenBlocks()
+  const places = Object.fromEntries(chosen.map((block) => [block.name, { ...block.place, ...change_(block) }]))
+  const same = chosen.every((block) => JSON.stringify(places[block.name]) === JSON.stringify(block.place))
+  if (!same) void change({ kind: 'move', places })
+}
+
+export const flip = (): void => place(({ place }) => ({ flipped: !place.flipped }))
+
+export function rotate(): void {
+  place(({ place }) => ({ rotation: (((place.rotation ?? 0) + 90) % 360) as 0 | 90 | 180 | 270 }))
+}
+
+export const shift = (dx: number, dy: number): void => place(({ place }) => ({ x: place.x + dx, y: place.y + dy }))
+
+export type Edge = 'left' | 'centre' | 'right' | 'top' | 'middle' | 'bottom'
+
+const right = ({ place, width }: SheetBlock) => place.x + width
+const bottom = ({ place, height }: SheetBlock) => place.y + height
+
+/** Bring the selected blocks into one line: by an edge, or by their middles. */
+export function align(edge: Edge): void {
+  const chosen = chosenBlocks()
+  const [left, far] = [Math.min(...chosen.map(({ place }) => place.x)), Math.max(...chosen.map(right))]
+  const [top, low] = [Math.min(...chosen.map(({ place }) => place.y)), Math.max(...chosen.map(bottom))]
+  const to: Record<Edge, (block: SheetBlock) => Partial<Place>> = {
+    left: () => ({ x: left }),
+    centre: ({ width }) => ({ x: (left + far - width) / 2 }),
+    right: ({ width }) => ({ x: far - width }),
+    top: () => ({ y: top }),
+    middle: ({ height }) => ({ y: (top + low - height) / 2 }),
+    bottom: ({ height }) => ({ y: low - height }),
+  }
+  place(to[edge])
+}
+
+/** The same gap between each of the selected blocks and the next; the outer two stay. */
+export function distribute(axis: 'x' | 'y'): void {
+  const size = axis === 'x' ? 'width' : 'height'
+  const chosen = chosenBlocks().sort((a, b) => a.place[axis] - b.place[axis])
+  const [first, last] = [chosen[0], chosen.at(-1)]
+  if (!first || !last || chosen.length < 3) return
+  const room = last.place[axis] + last[size] - first.place[axis]
+  const gap = (room - chosen.reduce((sum, block) => sum + block[size], 0)) / (chosen.length - 1)
+  const at = new Map<string, number>()
+  let next = first.place[axis]
+  for (const block of chosen) {
+    at.set(block.name, next)
+    next += block[size] + gap
+  }
+  place(({ name }) => ({ [axis]: at.get(name) }))
+}
+
+/** Put the selected blocks into a subsystem of their own. */
+export function group(): void {
+  const { document, select } = useStudio.getState()
+  const chosen = chosenBlocks()
+  if (!document || !chosen.length) return
+  const name = freeName('Subsystem', Object.keys(document.blocks))
+  void change({ kind: 'group', blocks: chosen.map((block) => block.name), name }).then(() => select([name]))
+}
