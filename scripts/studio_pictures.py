@@ -22,6 +22,7 @@ def take(link: str, theme: str) -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_path, args=FLAGS)
         page = browser.new_page(viewport={"width": 1440, "height": 860}, color_scheme=theme)  # pyright: ignore
+        page.add_init_script("localStorage.setItem('armblocks-tour-seen', 'yes')")
         page.goto(link)
         page.locator(".robot canvas").wait_for(timeout=60_000)
         page.keyboard.press("Control+Enter")

@@ -3,10 +3,14 @@ import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps,
 import { lazy, Suspense } from 'react'
 import { Canvas } from './canvas/canvas'
 import { ConnectDialog } from './canvas/connect_dialog'
+import { CommandPalette } from './command_palette'
+import { Tour } from './documents/tour'
 import { BlockDialog } from './inspector/block_dialog'
 import { OpenDialog } from './documents/open_dialog'
 import { RecoveryDialog } from './documents/recovery_dialog'
 import { SaveDialog } from './documents/save_dialog'
+import { Explorer } from './library/explorer'
+import { Find } from './library/find'
 import { Palette } from './library/palette'
 import { QuickInsert } from './library/quick_insert'
 import { Notices } from './notices'
@@ -25,6 +29,7 @@ const RobotView = lazy(() => import('./robot/robot_view'))
 
 const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
   library: Palette,
+  explorer: Explorer,
   canvas: Canvas,
   scopes: Scopes,
   tune: TunePanel,
@@ -51,6 +56,7 @@ function arrange({ api }: DockviewReadyEvent): void {
     position: { referencePanel: 'canvas', direction: 'left' },
     initialWidth: 216,
   })
+  api.addPanel({ id: 'explorer', component: 'explorer', title: 'Model', position: { referencePanel: 'library' }, inactive: true })
   api.addPanel({
     id: 'robot',
     component: 'robot',
@@ -90,6 +96,9 @@ export function App() {
       <Configuration />
       <QuickInsert />
       <ConnectDialog />
+      <CommandPalette />
+      <Find />
+      <Tour />
       <Shortcuts />
       {editing && (
         <Suspense fallback={<p className="robot-editor empty">Loading the robot editor …</p>}>

@@ -23,6 +23,8 @@ export interface Envelope {
     | Save
     | Ping
     | Files
+    | AskOutline
+    | Find
     | Close
     | Recover
     | Run
@@ -346,6 +348,21 @@ export interface Files {
   kind: "files";
 }
 /**
+ * Ask for the tree of sheets, an :class:`Outline`.
+ */
+export interface AskOutline {
+  kind: "outline";
+  document: string;
+}
+/**
+ * Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`.
+ */
+export interface Find {
+  kind: "find";
+  document: string;
+  text: string;
+}
+/**
  * Put a document away; ``discard`` where it has edits that no file holds.
  */
 export interface Close {
@@ -641,7 +658,7 @@ export interface ServerMessage {
     | RunProgress
     | RobotShown
     | RobotOpened;
-  values?: Opening | RobotTables | Readings | null;
+  values?: Opening | RobotTables | Readings | Outline | Found | null;
 }
 /**
  * The answer to a request: ``fault`` where it was refused.
@@ -1079,4 +1096,21 @@ export interface Readings {
   torque: number[];
   singular: string;
   limits: string[];
+}
+/**
+ * The sheets of a model as a tree.
+ */
+export interface Outline {
+  name: string;
+  blocks: number;
+  subsystems: Outline[];
+}
+/**
+ * A block that was sought; ``match`` is the value that fits, ``""`` where name or type does.
+ */
+export interface Found {
+  inside: string[];
+  name: string;
+  title: string;
+  match: string;
 }

@@ -1,5 +1,6 @@
 import { Kbd, Modal, Table } from '@mantine/core'
 import { create } from 'zustand'
+import { commands } from './commands'
 
 const useShortcuts = create<{ opened: boolean }>(() => ({ opened: false }))
 
@@ -7,26 +8,14 @@ export function openShortcuts(): void {
   useShortcuts.setState({ opened: true })
 }
 
-const SHORTCUTS: [keys: string, what: string][] = [
-  ['letters', 'add a block: type its name on the sheet'],
-  ['>', 'draw a wire by the names of its ends'],
-  ['Enter', 'open the block: its parameters, or the sheet inside'],
-  ['Esc', 'out of the subsystem, or select nothing'],
-  ['Tab', 'go from block to block'],
-  ['arrows', 'move the selected blocks, with Shift by single pixels'],
-  ['Del', 'delete blocks and wires'],
-  ['Ctrl+G', 'group the selected blocks into a subsystem'],
-  ['Ctrl+I', 'flip the selected blocks'],
-  ['Ctrl+D', 'duplicate'],
-  ['Ctrl+C, X, V', 'copy, cut, paste'],
-  ['Ctrl+A', 'select all blocks'],
-  ['Ctrl+Z, Ctrl+Y', 'undo, redo'],
-  ['Ctrl+S', 'save; with Shift under another name'],
-  ['Ctrl+O', 'open'],
-  ['Ctrl+Enter', 'run, or go on after a pause'],
-  ['Ctrl+E', 'configuration parameters: solver, tolerances, stop time'],
-  ['Space', 'fit the sheet into the window'],
-  ['?', 'this list'],
+/** What is no command: how one moves about. */
+const HABITS: [keys: string, what: string][] = [
+  ['letters', 'Add a block: type its name on the sheet'],
+  ['Enter', 'Open the block: its parameters, or the sheet inside; edit the note'],
+  ['Tab', 'Go from block to block'],
+  ['arrows', 'Move what is selected, with Shift by single pixels'],
+  ['Del', 'Delete blocks, wires and notes'],
+  ['Ctrl+K', 'All commands by name'],
 ]
 
 export function Shortcuts() {
@@ -35,7 +24,7 @@ export function Shortcuts() {
     <Modal opened={opened} onClose={() => useShortcuts.setState({ opened: false })} title="Keys" size="md">
       <Table>
         <Table.Tbody>
-          {SHORTCUTS.map(([keys, what]) => (
+          {[...HABITS, ...commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))].map(([keys, what]) => (
             <Table.Tr key={keys}>
               <Table.Td>
                 <Kbd>{keys}</Kbd>

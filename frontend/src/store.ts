@@ -79,6 +79,8 @@ interface Studio {
   run: RunView | null
   selection: ReadonlySet<string>
   editing: string | null
+  /** A block that is to be brought into the middle of the window. */
+  sought: string | null
   notices: Notice[]
   select: (names: Iterable<string>) => void
   edit: (block: string | null) => void
@@ -96,6 +98,7 @@ export const useStudio = create<Studio>((set) => ({
   run: null,
   selection: new Set(),
   editing: null,
+  sought: null,
   notices: [],
   select: (names) => set({ selection: new Set(names) }),
   edit: (editing) => set({ editing }),
@@ -322,6 +325,14 @@ export function alter(kind: 'undo' | 'redo' | 'arrange'): void {
 export function look(inside: string[]): void {
   const document = useStudio.getState().document
   if (document) void ask({ kind: 'look', document: document.state.document, inside })
+}
+
+/** Show a block: its sheet, with it selected. */
+export async function showBlock(inside: string[], name: string): Promise<void> {
+  const { document } = useStudio.getState()
+  if (!document) return
+  if (document.inside.join('/') !== inside.join('/')) await ask({ kind: 'look', document: document.state.document, inside })
+  useStudio.setState({ selection: new Set([name]), sought: name })
 }
 
 /** A name for a new block that no other has: "Gain", "Gain 2", … */

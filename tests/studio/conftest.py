@@ -109,6 +109,7 @@ def watched(browser: Browser, link: str) -> Generator[Page]:
     """A page, logged in, that must say no error on its console; it shows the first example."""
     context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
     context.grant_permissions(["clipboard-read", "clipboard-write"])
+    context.add_init_script("localStorage.setItem('armblocks-tour-seen', 'yes')")
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
     faults: list[str] = []

@@ -4,8 +4,9 @@ import { Handle, Position, type Node, type NodeProps } from '@xyflow/react'
 import { memo, useState } from 'react'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
 import { change } from '../store'
+import { standing } from './sheet_layout'
 
-export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[]; value: string }, 'block'>
+export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
 
 const side = ({ dx, dy }: PortSpot, output: boolean): Position => {
   const [x, y] = output ? [dx, dy] : [-dx, -dy]
@@ -67,7 +68,7 @@ function Name({ block }: { block: SheetBlock }) {
   if (!editing)
     return (
       <div
-        className="name"
+        className={standing(block) ? 'name beside' : 'name'}
         onDoubleClick={(event) => {
           event.stopPropagation()
           setEditing(true)
@@ -78,7 +79,7 @@ function Name({ block }: { block: SheetBlock }) {
     )
   return (
     <input
-      className="name nodrag"
+      className={standing(block) ? 'name nodrag beside' : 'name nodrag'}
       aria-label={`Name of ${block.name}`}
       autoFocus
       defaultValue={block.name}

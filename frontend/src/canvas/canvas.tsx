@@ -13,23 +13,25 @@ import {
   type NodeChange,
 } from '@xyflow/react'
 import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
-import type { Place, SheetBlock } from '../protocol'
-import { ask, change, freeName, look, useStudio } from '../store'
-import { BlockNode, type BlockNodeType } from './block_node'
 import { openQuickInsert } from '../library/quick_insert'
+import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
 import { WireValues } from '../run/wire_values'
-import { openShortcuts } from '../shortcuts'
-import { openConnectDialog } from './connect_dialog'
-import { copy, cut, duplicate, paste } from './clipboard'
+import { ask, change, look, useStudio } from '../store'
+import { ArrangeBar } from './arrange_bar'
+import { BlockNode } from './block_node'
 import { GRID, insertBlock } from './insert'
-import { SheetRoutes, blockOf, portOf, wireKey, type Places } from './sheet_layout'
-import { WireEdge, type WireEdgeType } from './wire_edge'
+import { NoteNode } from './note_node'
+import { SheetGraph, type SheetNode } from './sheet_graph'
+import { useSheetKeys } from './sheet_keys'
+import { SheetRoutes, wireKey, type Places } from './sheet_layout'
+import { Welcome } from './welcome'
+import { useBending, WireEdge, type WireEdgeType } from './wire_edge'
 
-const nodeTypes = { block: BlockNode }
+const nodeTypes = { block: BlockNode, note: NoteNode }
 const edgeTypes = { wire: WireEdge }
-const NONE: never[] = []
-const NUDGE = 5
 const SETTLE_MS = 120
+/** px from a wire at which a block that is dropped goes into it. */
+const INTO_WIRE = 12
 
 export function Canvas() {
   const document = useStudio((s) => s.document)
@@ -87,67 +89,29 @@ async function breakLink(linked: string[]): Promise<void> {
 function Sheet() {
   const blocks = useStudio((s) => s.document!.blocks)
   const wires = useStudio((s) => s.document!.wires)
+  const notes = useStudio((s) => s.document!.notes)
   const findings = useStudio((s) => s.document!.findings)
   const kinds = useStudio((s) => s.document!.wireKinds)
   const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const selection = useStudio((s) => s.selection)
   const select = useStudio((s) => s.select)
+  const bending = useBending((s) => s.wire)
   const scheme = useComputedColorScheme('light')
-  const flow = useReactFlow()
+  const flow = useReactFlow<SheetNode, WireEdgeType>()
   const [drag, setDrag] = useState<Places>({})
   const [chosenWires, setChosenWires] = useState<ReadonlySet<string>>(new Set())
-  const routes = useRef(new SheetRoutes())
-  const measured = useRef(new Map<string, { width: number; height: number }>())
+  const [{ graph, routes }] = useState(() => ({ graph: new SheetGraph(), routes: new SheetRoutes() }))
 
   // A place that the server has taken over needs no memory of the drag any more.
-  useEffect(() => setDrag({}), [blocks])
+  useEffect(() => setDrag({}), [blocks, notes])
 
-  const nodes = useMemo<BlockNodeType[]>(
-    () =>
-      Object.values(blocks).map((block) => ({
-        id: block.name,
-        type: 'block',
-        position: drag[block.name] ?? { x: block.place.x, y: block.place.y },
-        selected: selection.has(block.name),
-        width: block.width,
-        height: block.height,
-        measured: measured.current.get(block.name) ?? { width: block.width, height: block.height },
-        ariaLabel: `${block.name}, ${block.title}`,
-        data: { block, findings: findings.filter((found) => `${found.block}/`.startsWith(`${level}${block.name}/`)), value: '' },
-      })),
-    [blocks, drag, selection, findings, level],
-  )
-
-  const routed = useMemo(() => routes.current.update(blocks, wires, drag), [blocks, wires, drag])
-  const edges = useMemo<WireEdgeType[]>(
-    () =>
-      wires.map((wire) => {
-        const net = routed.get(wire.source)
-        const kind = kinds[level + wire.source]
-        const key = wireKey(wire)
-        const first = wires.find((other) => other.source === wire.source) === wire
-        return {
-          id: key,
-          type: 'wire',
-          source: blockOf(wire.source),
-          sourceHandle: portOf(wire.source),
-          target: blockOf(wire.target),
-          targetHandle: portOf(wire.target),
-          selected: chosenWires.has(key),
-          ariaLabel: `wire from ${wire.source} to ${wire.target}`,
-          data: {
-            path: [...(net?.paths.get(key) ?? NONE)],
-            dots: first ? (net?.dots ?? NONE) : NONE,
-            rank: kind?.shape.length ?? 0,
-            label: `${wire.source} to ${wire.target}${kind?.shape.length ? `, ${kind.shape.join(' × ')}` : ''}${kind?.unit ? `, ${kind.unit}` : ''}`,
-          },
-        }
-      }),
-    [wires, routed, kinds, chosenWires, level],
-  )
+  const shown = useMemo(() => (bending ? wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire)) : wires), [wires, bending])
+  const routed = useMemo(() => routes.update(blocks, shown, drag), [routes, blocks, shown, drag])
+  const nodes = useMemo(() => graph.nodes(blocks, notes, findings, level, drag, selection), [graph, blocks, notes, findings, level, drag, selection])
+  const edges = useMemo(() => graph.edges(shown, routed, kinds, level, chosenWires), [graph, shown, routed, kinds, level, chosenWires])
 
   const onNodesChange = useCallback(
-    (changes: NodeChange<BlockNodeType>[]) => {
+    (changes: NodeChange<SheetNode>[]) => {
       const places: Places = {}
       let chosen: Set<string> | null = null
       for (const one of changes) {
@@ -156,90 +120,47 @@ function Sheet() {
           chosen ??= new Set(useStudio.getState().selection)
           if (one.selected) chosen.add(one.id)
           else chosen.delete(one.id)
-        } else if (one.type === 'dimensions' && one.dimensions) measured.current.set(one.id, one.dimensions)
+        } else if (one.type === 'dimensions' && one.dimensions) graph.measured.set(one.id, one.dimensions)
       }
       if (Object.keys(places).length) setDrag((now) => ({ ...now, ...places }))
       if (chosen) select(chosen)
     },
-    [select],
+    [graph, select],
   )
-
-  const move = useCallback((places: Places) => {
-    const { document } = useStudio.getState()
-    const moved: Record<string, Place> = {}
-    for (const [name, { x, y }] of Object.entries(places)) {
-      const place = document?.blocks[name]?.place
-      if (place && (place.x !== x || place.y !== y)) moved[name] = { ...place, x, y }
-    }
-    if (Object.keys(moved).length) void change({ kind: 'move', places: moved })
-  }, [])
 
   const connect = useCallback(({ source, sourceHandle, target, targetHandle }: Connection) => {
     if (sourceHandle && targetHandle)
       void change({ kind: 'connect', wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` } })
   }, [])
 
-  const remove = useCallback(() => {
-    const { document, selection } = useStudio.getState()
-    const gone = wires.filter((wire) => chosenWires.has(wireKey(wire)))
-    const names = [...selection].filter((name) => document?.blocks[name])
-    if (names.length || gone.length) void change({ kind: 'remove', blocks: names, wires: gone })
-    select([])
-    setChosenWires(new Set())
-  }, [wires, chosenWires, select])
-
   const drop = useCallback(
     (event: React.DragEvent) => {
       const type = event.dataTransfer.getData('application/x-armblocks-block')
       if (!type) return
       event.preventDefault()
-      insertBlock(type, flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }))
+      const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
+      const into = wireAt(at, edges)
+      if (into) insertBlock(type, { x: at.x, y: into.y }, into.wire)
+      else insertBlock(type, at)
     },
-    [flow],
+    [flow, edges],
   )
 
   const sheet = useRef<HTMLDivElement>(null)
-  const onKeyDown = (event: KeyboardEvent) => {
-    // Keys belong to the sheet while it has the focus, and while nothing has it (a focused block may have gone);
-    // a button elsewhere keeps only the keys that press it.
-    const focused = event.target instanceof Element ? event.target : null
-    if (focused instanceof HTMLInputElement || focused?.closest('[role="dialog"], [role="menu"], [role="slider"]')) return
-    const ours = focused === window.document.body || sheet.current?.contains(focused)
-    if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return
-    const chosen = [...useStudio.getState().selection].map((name) => blocks[name]).filter((block) => block !== undefined)
-    const plain = !event.ctrlKey && !event.metaKey && !event.altKey
-    const step = event.shiftKey ? 1 : NUDGE
-    const arrows: Record<string, [number, number]> = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }
-    const arrow = arrows[event.key]
-    if (event.key === 'Delete' || event.key === 'Backspace') remove()
-    else if (event.key === 'Enter' && plain && chosen[0]) open(chosen[0])
-    else if (arrow && plain && chosen.length)
-      move(Object.fromEntries(chosen.map(({ name, place }) => [name, { x: place.x + arrow[0], y: place.y + arrow[1] }])))
-    else if (event.key === '>' && plain) openConnectDialog()
-    else if (event.key === '?' && plain) openShortcuts()
-    else if (event.key === ' ' && plain) void flow.fitView({ duration: 150 })
-    else if (event.key === 'Escape' && level && !chosen.length) look(useStudio.getState().document!.inside.slice(0, -1))
-    else if (event.key === 'Escape') select([])
-    else if (plain && /^\p{L}$/u.test(event.key)) openQuickInsert(event.key)
-    else if (event.ctrlKey || event.metaKey) {
-      const key = event.key.toLowerCase()
-      if (key === 'a') select(Object.keys(blocks))
-      else if (key === 'i') flip(chosen)
-      else if (key === 'g') group(chosen)
-      else if (key === 'd') duplicate(chosen, wires)
-      else if (key === 'c') void copy(chosen, wires)
-      else if (key === 'x') void cut(chosen, wires)
-      else if (key === 'v') void paste()
-      else return
-    } else return
-    event.preventDefault()
-    event.stopPropagation()
-  }
-
+  const sought = useStudio((s) => s.sought)
   useEffect(() => {
-    addEventListener('keydown', onKeyDown)
-    return () => removeEventListener('keydown', onKeyDown)
-  })
+    const block = sought === null ? undefined : blocks[sought]
+    if (!block) return
+    useStudio.setState({ sought: null })
+    const { place, width, height } = block
+    // After the sheet has fitted itself into the window, where it has just been opened.
+    setTimeout(() => {
+      void flow.setCenter(place.x + width / 2, place.y + height / 2, { zoom: Math.max(flow.getZoom(), 0.8), duration: 150 })
+      sheet.current?.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(block.name)}"]`)?.focus({ preventScroll: true })
+    }, 2 * SETTLE_MS)
+  }, [sought, blocks, flow])
+
+  useSheetKeys(sheet, flow, chosenWires, setChosenWires)
   // The sheet fits its panel, whatever size that takes, until somebody moves it.
   useEffect(() => {
     const element = sheet.current
@@ -258,7 +179,7 @@ function Sheet() {
     return leave
   }, [flow])
 
-  const empty = Object.keys(blocks).length === 0
+  const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   return (
     <div className="canvas" ref={sheet} onFocus={selectFocused} onDragOver={(event) => event.preventDefault()} onDrop={drop}>
       <svg className="defs" width="0" height="0" aria-hidden>
@@ -266,7 +187,7 @@ function Sheet() {
           <path d="M0 0.300L8 4L0 7.700Z" className="f-wire" />
         </marker>
       </svg>
-      <ReactFlow<BlockNodeType, WireEdgeType>
+      <ReactFlow<SheetNode, WireEdgeType>
         nodes={nodes}
         edges={edges}
         nodeTypes={nodeTypes}
@@ -274,7 +195,7 @@ function Sheet() {
         colorMode={scheme}
         onNodesChange={onNodesChange}
         onNodeDragStop={(_, __, moved) => move(Object.fromEntries(moved.map(({ id, position }) => [id, position])))}
-        onNodeDoubleClick={(_, node) => open(node.data.block)}
+        onNodeDoubleClick={(_, node) => node.type === 'block' && openBlock(node.data.block)}
         onEdgesChange={(changes) => {
           const chosen = new Set(chosenWires)
           for (const one of changes) {
@@ -306,19 +227,13 @@ function Sheet() {
         aria-label="Diagram"
       >
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
-        <Controls showInteractive={false} />
+        {!empty && <Controls showInteractive={false} />}
         <WireValues />
         {Object.keys(blocks).length > 40 && <MiniMap pannable zoomable />}
       </ReactFlow>
-      {empty && (
-        <div className="empty over">
-          <p>
-            Type to add a block, or drag one from the library.
-            <br />
-            The examples are in the menu at the top left.
-          </p>
-        </div>
-      )}
+      <ArrangeBar />
+      {empty && level === '' && <Welcome />}
+      {empty && level !== '' && <p className="empty over">Nothing is inside yet: type to add a block, such as In and Out.</p>}
     </div>
   )
 }
@@ -330,21 +245,35 @@ function selectFocused({ target }: React.FocusEvent): void {
 }
 
 /** A double click: into a subsystem that has no mask, else the parameters of a block. */
-function open(block: SheetBlock): void {
+export function openBlock(block: SheetBlock): void {
   const { document, edit } = useStudio.getState()
   if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
   else edit(block.name)
 }
 
-/** Put the blocks into a subsystem of their own. */
-function group(chosen: SheetBlock[]): void {
-  const { document, select } = useStudio.getState()
-  if (!document || !chosen.length) return
-  const name = freeName('Subsystem', Object.keys(document.blocks))
-  void change({ kind: 'group', blocks: chosen.map((block) => block.name), name }).then(() => select([name]))
+/** Put blocks and notes where they are now, as one step. */
+export function move(to: Places): void {
+  const { document } = useStudio.getState()
+  const places: Record<string, Place> = {}
+  const notes: Record<string, SheetNote> = {}
+  for (const [id, { x, y }] of Object.entries(to)) {
+    const place = document?.blocks[id]?.place
+    const note = document?.notes[id]
+    if (place && (place.x !== x || place.y !== y)) places[id] = { ...place, x, y }
+    if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
+  }
+  if (Object.keys(places).length || Object.keys(notes).length) void change({ kind: 'move', places, notes })
 }
 
-function flip(chosen: SheetBlock[]): void {
-  if (chosen.length)
-    void change({ kind: 'move', places: Object.fromEntries(chosen.map(({ name, place }) => [name, { ...place, flipped: !place.flipped }])) })
+/** The wire whose level piece passes under a point, and the height of that piece. */
+function wireAt(at: { x: number; y: number }, edges: WireEdgeType[]): { wire: Wire; y: number } | undefined {
+  for (const { source, sourceHandle, target, targetHandle, data } of edges) {
+    const path = data?.path ?? []
+    for (let k = 1; k < path.length; k++) {
+      const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
+      if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > Math.min(ax, bx) && at.x < Math.max(ax, bx))
+        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay }
+    }
+  }
+  return undefined
 }

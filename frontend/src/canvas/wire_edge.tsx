@@ -57,10 +57,10 @@ function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: num
     const [source, target] = [id.slice(0, id.indexOf(' -> ')), id.slice(id.indexOf(' -> ') + 4)]
     const start = { x: event.clientX, y: event.clientY }
     const element = event.currentTarget
+    element.setPointerCapture(event.pointerId)
     const move = (at: PointerEvent) => {
       const gone = flat ? at.clientY - start.y : at.clientX - start.x
       if (Math.abs(gone) < 3 && !useBending.getState().wire) return
-      if (!element.hasPointerCapture(at.pointerId)) element.setPointerCapture(at.pointerId)
       const place = flow.screenToFlowPosition({ x: at.clientX, y: at.clientY }, { snapToGrid: false })
       useBending.setState({ wire: { source, target, bends: dragged(whole, index, level(whole, index, flat ? place.y : place.x)) } })
     }

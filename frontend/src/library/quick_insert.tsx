@@ -1,9 +1,9 @@
-import { Modal, TextInput } from '@mantine/core'
-import { useEffect, useMemo, useState } from 'react'
+import { useMemo } from 'react'
 import { create } from 'zustand'
 import { insertBlock } from '../canvas/insert'
 import { useStudio } from '../store'
 import { Face } from './palette'
+import { PickList } from './pick_list'
 import { matching } from './search'
 
 const MOST_SHOWN = 8
@@ -25,45 +25,24 @@ export function openQuickInsert(typed: string, at: { x: number; y: number } | nu
 export function QuickInsert() {
   const { opened, typed, at } = useQuickInsert()
   const library = useStudio((s) => s.welcome?.library)
-  const [chosen, setChosen] = useState(0)
   const found = useMemo(() => matching(library ?? [], typed).slice(0, MOST_SHOWN), [library, typed])
-  useEffect(() => setChosen(0), [typed])
   const close = () => useQuickInsert.setState({ opened: false })
-  const insert = (index: number) => {
-    const kind = found[index]
-    if (!kind) return
-    close()
-    insertBlock(kind.type, at ? place(at) : freePlace())
-  }
   return (
-    <Modal opened={opened} onClose={close} withCloseButton={false} size="sm" padding="xs" yOffset="18vh" title={undefined}>
-      <TextInput
-        aria-label="Add a block"
-        placeholder="Add a block: type its name"
-        data-autofocus
-        value={typed}
-        onChange={(event) => useQuickInsert.setState({ typed: event.currentTarget.value })}
-        onKeyDown={(event) => {
-          if (event.key === 'ArrowDown') setChosen(Math.min(chosen + 1, found.length - 1))
-          else if (event.key === 'ArrowUp') setChosen(Math.max(chosen - 1, 0))
-          else if (event.key === 'Enter') insert(chosen)
-          else return
-          event.preventDefault()
-        }}
-      />
-      <div role="listbox" aria-label="Blocks" className="found">
-        {found.map((kind, index) => (
-          <button key={kind.type} type="button" role="option" aria-selected={index === chosen} onClick={() => insert(index)} onMouseEnter={() => setChosen(index)}>
-            <Face kind={kind} />
-            <span>
-              <b>{kind.title}</b>
-              <small>{kind.summary}</small>
-            </span>
-          </button>
-        ))}
-        {found.length === 0 && <p className="empty">No block matches “{typed}”.</p>}
-      </div>
-    </Modal>
+    <PickList
+      opened={opened}
+      onClose={close}
+      label="Add a block"
+      placeholder="Add a block: type its name"
+      list="Blocks"
+      typed={typed}
+      onTyped={(next) => useQuickInsert.setState({ typed: next })}
+      nothing={`No block matches “${typed}”.`}
+      items={found.map((kind) => ({ key: kind.type, face: <Face kind={kind} />, title: kind.title, note: kind.summary }))}
+      onPick={(index) => {
+        const kind = found[index]
+        if (kind) insertBlock(kind.type, at ? place(at) : freePlace())
+      }}
+    />
   )
 }
 

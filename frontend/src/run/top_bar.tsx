@@ -35,6 +35,13 @@ async function run(speed: string): Promise<void> {
   await ask({ kind: 'run', document: document.state.document, speed: speed ? Number(speed) : null, tuned: tried })
 }
 
+/** Start the model, or let a paused run go on. */
+export function startOrResume(): void {
+  const { run: shown } = useStudio.getState()
+  if (shown?.state === 'paused') void ask({ kind: 'control', run: shown.run, action: 'resume' })
+  else if (shown?.state !== 'running') void run(speed)
+}
+
 let speed = ''
 
 export function TopBar() {
@@ -47,20 +54,18 @@ export function TopBar() {
     useCursor.setState({ time: null, playing: false })
     control('back')
   }
-  const start = () => (state === 'paused' ? control('resume') : void run(speed))
 
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       if (!(event.ctrlKey || event.metaKey)) return
       const pressed = event.key.toLowerCase()
-      if (pressed === 'enter') start()
+      if (pressed === 'enter') startOrResume()
       else if (pressed === 'e') openConfiguration()
       else if (pressed === 'o') show('open')
       else if (pressed === 's' && event.shiftKey) show('save_as')
       else if (pressed === 's') void save()
       else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) alter('undo')
       else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) alter('redo')
-      else if (pressed === 'k') openQuickInsert('')
       else return
       event.preventDefault()
     }
@@ -80,7 +85,7 @@ export function TopBar() {
         <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!document} onClick={() => alter('arrange')} />
       </Group>
       <Group gap={4} role="group" aria-label="Run" className="run-controls">
-        <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!document || state === 'running'} onClick={start}>
+        <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!document || state === 'running'} onClick={startOrResume}>
           {state === 'paused' ? 'Resume' : 'Run'}
         </Button>
         <Tool label={busy ? 'Step back' : 'One instant back'} icon={IconPlayerSkipBackFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? goBack() : stepCursor(-1))} />

@@ -1,5 +1,5 @@
 import { ActionIcon, Tooltip } from '@mantine/core'
-import { IconAntennaBars5, IconPinned, IconPinnedOff } from '@tabler/icons-react'
+import { IconAntennaBars5, IconPinned, IconPinnedOff, IconRoute } from '@tabler/icons-react'
 import { useEdges, useStore, ViewportPortal } from '@xyflow/react'
 import { useEffect, useRef, useState } from 'react'
 import { create } from 'zustand'
@@ -147,6 +147,13 @@ function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level:
           {isPinned ? <IconPinnedOff size={15} /> : <IconPinned size={15} />}
         </ActionIcon>
       </Tooltip>
+      {edge.data?.bent && (
+        <Tooltip label="Let the wire find its own way again">
+          <ActionIcon size="sm" variant="subtle" color="gray" aria-label="Reset the route" onClick={() => void change({ kind: 'bend', wires: [{ source: ref, target: `${edge.target}/${edge.targetHandle}` }] })}>
+            <IconRoute size={15} />
+          </ActionIcon>
+        </Tooltip>
+      )}
     </div>
   )
 }

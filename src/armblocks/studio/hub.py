@@ -26,12 +26,14 @@ from armblocks.studio.check import check
 from armblocks.studio.document_journal import Performed
 from armblocks.studio.nesting import inside, linked_part, with_robot
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
+from armblocks.studio.outline import find, outline
 from armblocks.studio.parameter_values import parameter_json, parameter_value
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
 from armblocks.studio.run_process import RunProcess, Worker
 from armblocks.studio.run_record import RunRecord, Said
+from armblocks.studio.run_report import report_of
 from armblocks.studio.run_settings import setting_rules, solver_choices
 from armblocks.studio.sheet import library, sheet, sheet_change
 from armblocks.studio.state_folder import StateFolder
@@ -134,6 +136,10 @@ class Hub:
                 return None
             case say.Files():
                 return {"files": self.folder.files(), "recent": self._recent()}
+            case say.AskOutline():
+                return outline(self.documents[request.document].document.diagram)
+            case say.Find():
+                return find(self.documents[request.document].document.diagram, request.text)
             case say.TypedValue():
                 return self._typed(request)
             case say.TypedSettings():
@@ -383,6 +389,13 @@ class Hub:
         run.start(job)
         self._spare = Worker()
         return run.key
+
+    async def report(self, document: str) -> bytes:
+        """The report of the last run of a document, a page; raises ``ArmblocksError``."""
+        jobs = [run.job for run in self.runs.values() if run.document == self.documents[document].key]
+        if not jobs:
+            raise InputError("there is no run to report", where="report", fix="run the model first")
+        return await report_of(jobs[-1])
 
     def close(self) -> None:
         """End every run, and leave the documents so that nothing is lost."""

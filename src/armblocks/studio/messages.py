@@ -37,6 +37,23 @@ class PortSpot(Message):
     dy: int
 
 
+class Outline(Message):
+    """The sheets of a model as a tree."""
+
+    name: str
+    blocks: int
+    subsystems: list[Outline]
+
+
+class Found(Message):
+    """A block that was sought; ``match`` is the value that fits, ``""`` where name or type does."""
+
+    inside: list[str]
+    name: str
+    title: str
+    match: str
+
+
 class ParameterRule(Message):
     """One parameter of a type of block, as its dialog needs it."""
 
@@ -343,6 +360,21 @@ class Files(Message):
     kind: Literal["files"] = "files"
 
 
+class AskOutline(Message):
+    """Ask for the tree of sheets, an :class:`Outline`."""
+
+    kind: Literal["outline"] = "outline"
+    document: str
+
+
+class Find(Message):
+    """Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`."""
+
+    kind: Literal["find"] = "find"
+    document: str
+    text: Annotated[str, Field(max_length=200)]
+
+
 class Close(Message):
     """Put a document away; ``discard`` where it has edits that no file holds."""
 
@@ -462,6 +494,8 @@ Request = Annotated[
     | Save
     | Ping
     | Files
+    | AskOutline
+    | Find
     | Close
     | Recover
     | Run
@@ -619,5 +653,5 @@ class ServerMessage(Message):
     """Only for the page's types: everything that the server sends as text."""
 
     event: Event
-    values: Opening | RobotTables | Readings | None = None
+    values: Opening | RobotTables | Readings | Outline | Found | None = None
     """Some of what replies carry as their value."""

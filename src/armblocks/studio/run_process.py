@@ -50,6 +50,8 @@ class RunProcess:
         self.key = key
         self.document = document
         self.state = "running"
+        self.job: dict[str, Any] = {}
+        """What the worker was given."""
         self._worker = worker
         self._tell = tell
         self._loop = asyncio.get_running_loop()
@@ -58,7 +60,8 @@ class RunProcess:
 
     def start(self, job: dict[str, Any]) -> None:
         """Hand the worker its job, see :func:`armblocks.studio.run_worker.work`."""
-        self._worker.pipe.send_bytes(json.dumps({**job, "run": self.key, "document": self.document}).encode())
+        self.job = {**job, "run": self.key, "document": self.document}
+        self._worker.pipe.send_bytes(json.dumps(self.job).encode())
         Thread(target=self._read, args=(self._worker.pipe,), daemon=True).start()
         self._passing = self._loop.create_task(self._pass_on())
 

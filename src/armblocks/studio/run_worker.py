@@ -14,6 +14,7 @@ import json
 import math
 import signal
 import sys
+from collections.abc import Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from time import perf_counter, sleep
@@ -48,7 +49,7 @@ MOST_NUMBERS = 16_000_000
 def work(pipe: Connection) -> None:
     """Import what a run needs, wait for the job, run it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server
-    _limit()
+    limit_process()
     importlib.import_module("armblocks.compiler.native_integrator")  # slow, and needed by every run
     with contextlib.suppress(EOFError, OSError):
         job = json.loads(pipe.recv_bytes())
@@ -61,7 +62,8 @@ def stride_of(run: DiagramRun) -> int:
     return 1 if numbers <= MOST_NUMBERS else math.ceil(2 * numbers / MOST_NUMBERS)
 
 
-def _limit() -> None:
+def limit_process() -> None:
+    """Give this process no more memory and time than a run may have."""
     if sys.platform == "win32":
         return
     import resource
@@ -70,14 +72,30 @@ def _limit() -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS))
 
 
+def begun(job: Mapping[str, Any]) -> RunHistory:
+    """The run of a job before its first step; raises ``ArmblocksError``."""
+    folder = Path(job["folder"])
+    diagram = formats.diagram_from_bytes(
+        job["diagram"].encode(),
+        "model",
+        BLOCKS,
+        formats.load_robot,
+        folder=folder,
+        read_library=ProjectFolder(folder).read_library,
+    )
+    history = RunHistory(CompiledDiagram(diagram))
+    for path, value in job["tuned"].items():
+        history.tune(path, tuned_value(value, path))
+    return history
+
+
 class _Run:
     def __init__(self, pipe: Connection, job: dict[str, Any]) -> None:
         self.pipe = pipe
         self.key: str = job["run"]
         self.document: str = job["document"]
         self.speed: float | None = job["speed"]
-        self.folder = Path(job["folder"])
-        self.source: str = job["diagram"]
+        self.job = job
         self.tuned: dict[str, Any] = job["tuned"]
         self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
         self.time = 0.0
@@ -105,17 +123,7 @@ class _Run:
             )
 
     def _go(self) -> None:
-        diagram = formats.diagram_from_bytes(
-            self.source.encode(),
-            "model",
-            BLOCKS,
-            formats.load_robot,
-            folder=self.folder,
-            read_library=ProjectFolder(self.folder).read_library,
-        )
-        history = RunHistory(CompiledDiagram(diagram))
-        for path, value in self.tuned.items():
-            history.tune(path, tuned_value(value, path))
+        history = begun(self.job)
         self.stride = stride_of(history.run)
         self._tell_start(history.run)
         self.began = perf_counter()

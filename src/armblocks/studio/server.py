@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
+from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from pydantic import ValidationError
 
-from armblocks.errors import FormatError, UnknownNameError
-from armblocks.report.diagram_drawing import diagram_svg
+from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
+from armblocks.report.diagram_file import drawing_bytes
 from armblocks.studio.guard import Guard, Keys
 from armblocks.studio.hub import Hub, Page
 from armblocks.studio.project_folder import ProjectFolder
 
 WEB = Path(__file__).parent / "web"
 """The built page; made by the front end's build, not kept in the repository."""
+
+DRAWING_TYPES = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 
 
 def built_page(folder: Path = WEB) -> Path:
@@ -31,6 +38,15 @@ def built_page(folder: Path = WEB) -> Path:
             fix="install Node.js 20.19 or newer and run 'pip install .' again, or install a released wheel",
         )
     return folder
+
+
+@lru_cache(maxsize=64)
+def example_drawing(name: str) -> bytes:
+    """A shipped example as SVG; raises ``UnknownNameError``."""
+    known = formats.list_examples()
+    if name not in known:
+        raise UnknownNameError("example", name, known)
+    return drawing_bytes(formats.load_diagram(name, BLOCKS), "svg")
 
 
 def studio_app(folder: ProjectFolder, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
@@ -57,13 +73,33 @@ def studio_app(folder: ProjectFolder, keys: Keys, hosts: frozenset[str], web: Pa
         answer.set_cookie(keys.cookie_name, keys.session, httponly=True, samesite="strict", path="/")
         return answer
 
-    @app.get("/drawing/{document}.svg")
-    async def drawing(document: str) -> Response:  # pyright: ignore[reportUnusedFunction]
+    @app.get("/drawing/{document}.{kind}")
+    async def drawing(  # pyright: ignore[reportUnusedFunction]
+        document: str, kind: str, sheet: str = "", theme: Literal["light", "dark"] | None = None
+    ) -> Response:
+        """A sheet as a file to keep; drawn aside, so that nobody else waits for it."""
         try:
-            found = hub.documents[document]
-        except UnknownNameError:
-            return PlainTextResponse("there is no such document", 404)
-        return Response(diagram_svg(found.document.diagram), media_type="image/svg+xml")
+            diagram = hub.documents[document].document.diagram
+            data = await asyncio.to_thread(drawing_bytes, diagram, kind, sheet=sheet, theme=theme)
+        except UnknownNameError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type=DRAWING_TYPES[kind])
+
+    @app.get("/example/{name}.svg")
+    async def example(name: str) -> Response:  # pyright: ignore[reportUnusedFunction]
+        """The drawing of a shipped example, for the gallery."""
+        try:
+            data = await asyncio.to_thread(example_drawing, name)
+        except UnknownNameError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type=DRAWING_TYPES["svg"])
+
+    @app.get("/report/{document}")
+    async def report(document: str) -> Response:  # pyright: ignore[reportUnusedFunction]
+        try:
+            return Response(await hub.report(document), media_type="text/html")
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
 
     @app.websocket("/ws")
     async def talk(socket: WebSocket) -> None:  # pyright: ignore[reportUnusedFunction]

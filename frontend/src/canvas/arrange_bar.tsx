@@ -1,0 +1,50 @@
+import { ActionIcon, Tooltip } from '@mantine/core'
+import {
+  IconFlipVertical,
+  IconLayoutAlignBottom,
+  IconLayoutAlignCenter,
+  IconLayoutAlignLeft,
+  IconLayoutAlignMiddle,
+  IconLayoutAlignRight,
+  IconLayoutAlignTop,
+  IconLayoutDistributeHorizontal,
+  IconLayoutDistributeVertical,
+  IconRotateClockwise,
+} from '@tabler/icons-react'
+import { useStudio } from '../store'
+import { align, distribute, flip, rotate } from './arranging'
+
+const TURNS = [
+  { label: 'Rotate (Ctrl+R)', icon: IconRotateClockwise, run: rotate },
+  { label: 'Flip (Ctrl+I)', icon: IconFlipVertical, run: flip },
+]
+const ALIGNS = [
+  { label: 'Align left edges', icon: IconLayoutAlignLeft, run: () => align('left') },
+  { label: 'Align centres', icon: IconLayoutAlignCenter, run: () => align('centre') },
+  { label: 'Align right edges', icon: IconLayoutAlignRight, run: () => align('right') },
+  { label: 'Align top edges', icon: IconLayoutAlignTop, run: () => align('top') },
+  { label: 'Align middles', icon: IconLayoutAlignMiddle, run: () => align('middle') },
+  { label: 'Align bottom edges', icon: IconLayoutAlignBottom, run: () => align('bottom') },
+]
+const SPREADS = [
+  { label: 'Equal gaps from left to right', icon: IconLayoutDistributeVertical, run: () => distribute('x') },
+  { label: 'Equal gaps from top to bottom', icon: IconLayoutDistributeHorizontal, run: () => distribute('y') },
+]
+
+/** What can be done with the selected blocks, at the head of the sheet while several are selected. */
+export function ArrangeBar() {
+  const count = useStudio((s) => [...s.selection].filter((name) => s.document?.blocks[name]).length)
+  if (count < 2) return null
+  const shown = [...TURNS, ...ALIGNS, ...(count > 2 ? SPREADS : [])]
+  return (
+    <div className="arrange-bar" role="toolbar" aria-label="Arrange the selected blocks">
+      {shown.map(({ label, icon: Icon, run }) => (
+        <Tooltip key={label} label={label} openDelay={300}>
+          <ActionIcon variant="subtle" color="gray" aria-label={label} onClick={run}>
+            <Icon size={17} />
+          </ActionIcon>
+        </Tooltip>
+      ))}
+    </div>
+  )
+}

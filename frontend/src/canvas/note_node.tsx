@@ -1,0 +1,75 @@
+import type { Node, NodeProps } from '@xyflow/react'
+import { memo, useEffect, useRef, useState } from 'react'
+import { create } from 'zustand'
+import type { SheetNote } from '../protocol'
+import { change, useStudio } from '../store'
+
+export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
+
+/** The note that is being written, new ones before they are on the sheet included. */
+const useWriting = create<{ id: string | null }>(() => ({ id: null }))
+
+/** Begin a note at a place on the sheet. */
+export function writeNote(x: number, y: number): void {
+  const { document, select } = useStudio.getState()
+  if (!document) return
+  const taken = Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0)
+  const id = `/${Math.max(0, ...taken) + 1}`
+  void change({ kind: 'notes', notes: { [id]: { x: Math.round(x), y: Math.round(y), text: 'Note' } } }).then((version) => {
+    if (version === undefined) return
+    select([id])
+    useWriting.setState({ id })
+  })
+}
+
+export const editNote = (id: string): void => useWriting.setState({ id })
+
+/** Words on the sheet; a double click edits them in place. */
+export const NoteNode = memo(function NoteNode({ id, data: { note }, selected }: NodeProps<NoteNodeType>) {
+  const writing = useWriting((s) => s.id === id)
+  return (
+    <div className={selected ? 'note selected' : 'note'} onDoubleClick={() => editNote(id)}>
+      {writing ? <Writing id={id} note={note} /> : note.text}
+    </div>
+  )
+})
+
+function Writing({ id, note }: { id: string; note: SheetNote }) {
+  const [text, setText] = useState(note.text)
+  const done = () => {
+    useWriting.setState({ id: null })
+    const said = text.trimEnd()
+    if (!said) void change({ kind: 'remove', notes: [id] })
+    else if (said !== note.text) void change({ kind: 'notes', notes: { [id]: { ...note, text: said } } })
+  }
+  const field = useRef<HTMLTextAreaElement>(null)
+  // A new note cannot have the focus before React Flow has measured and shown it.
+  useEffect(() => {
+    let handle = 0
+    const focus = () => {
+      field.current?.focus()
+      if (window.document.activeElement !== field.current) handle = requestAnimationFrame(focus)
+    }
+    focus()
+    return () => cancelAnimationFrame(handle)
+  }, [])
+  const lines = text.split('\n')
+  return (
+    <textarea
+      className="nodrag nopan nowheel"
+      aria-label="Note"
+      ref={field}
+      rows={lines.length}
+      cols={Math.max(12, ...lines.map((line) => line.length + 1))}
+      value={text}
+      onFocus={(event) => event.target.select()}
+      onChange={(event) => setText(event.target.value)}
+      onBlur={done}
+      onKeyDown={(event) => {
+        event.stopPropagation()
+        if (event.key === 'Enter' && (event.ctrlKey || event.metaKey)) event.currentTarget.blur()
+        if (event.key === 'Escape') useWriting.setState({ id: null })
+      }}
+    />
+  )
+}

@@ -1,0 +1,128 @@
+import type { Finding, SheetBlock, SheetNote, Wire, WireKind } from '../protocol'
+import type { BlockNodeType } from './block_node'
+import { wholeWay } from './bends'
+import type { NoteNodeType } from './note_node'
+import type { Point, RoutedNet } from './router'
+import { blockOf, portOf, wireKey, type Places } from './sheet_layout'
+import type { WireEdgeType } from './wire_edge'
+
+export type SheetNode = BlockNodeType | NoteNodeType
+
+const NO_FINDINGS: Finding[] = []
+const NO_POINTS: Point[] = []
+const SCALAR: WireKind = { shape: [], unit: '' }
+
+/** Things by name, made anew only where what they are made from is other than before: so an edit draws what it touches. */
+class Kept<T> {
+  private known = new Map<string, { from: readonly unknown[]; made: T }>()
+  private seen = new Map<string, { from: readonly unknown[]; made: T }>()
+
+  get(name: string, from: readonly unknown[], make: () => T): T {
+    const old = this.known.get(name)
+    const entry = old && old.from.every((value, k) => Object.is(value, from[k])) ? old : { from, made: make() }
+    this.seen.set(name, entry)
+    return entry.made
+  }
+
+  /** What was not asked for since the last call is forgotten. */
+  turn(): void {
+    this.known = this.seen
+    this.seen = new Map()
+  }
+}
+
+/** The nodes and edges of one sheet, for React Flow. */
+export class SheetGraph {
+  /** Sizes that React Flow has measured. */
+  readonly measured = new Map<string, { width: number; height: number }>()
+  private blocks = new Kept<BlockNodeType>()
+  private notes = new Kept<NoteNodeType>()
+  private wires = new Kept<WireEdgeType>()
+
+  nodes(
+    blocks: Record<string, SheetBlock>,
+    notes: Record<string, SheetNote>,
+    findings: Finding[],
+    level: string,
+    drag: Places,
+    selection: ReadonlySet<string>,
+  ): SheetNode[] {
+    const found = byBlock(findings, level)
+    const made: SheetNode[] = Object.values(blocks).map((block) => {
+      const { name } = block
+      const own = found.get(name) ?? NO_FINDINGS
+      const [x, y] = [drag[name]?.x ?? block.place.x, drag[name]?.y ?? block.place.y]
+      const measured = this.measured.get(name)
+      const selected = selection.has(name)
+      return this.blocks.get(name, [block, own === NO_FINDINGS ? '' : JSON.stringify(own), x, y, measured, selected], () => ({
+        id: name,
+        type: 'block',
+        position: { x, y },
+        selected,
+        width: block.width,
+        height: block.height,
+        measured: measured ?? { width: block.width, height: block.height },
+        ariaLabel: `${name}, ${block.title}`,
+        data: { block, findings: own },
+      }))
+    })
+    for (const [id, note] of Object.entries(notes)) {
+      const [x, y] = [drag[id]?.x ?? note.x, drag[id]?.y ?? note.y]
+      const measured = this.measured.get(id)
+      const selected = selection.has(id)
+      made.push(
+        this.notes.get(id, [note, x, y, measured, selected], () => ({
+          id,
+          type: 'note',
+          position: { x, y },
+          selected,
+          ...(measured ? { measured } : {}),
+          ariaLabel: `Note: ${note.text}`,
+          data: { note },
+        })),
+      )
+    }
+    this.blocks.turn()
+    this.notes.turn()
+    return made
+  }
+
+  edges(wires: Wire[], routed: Map<string, RoutedNet>, kinds: Record<string, WireKind>, level: string, chosen: ReadonlySet<string>): WireEdgeType[] {
+    const dotted = new Set<string>()
+    const made = wires.map((wire) => {
+      const net = routed.get(wire.source)
+      const kind = kinds[level + wire.source] ?? SCALAR
+      const key = wireKey(wire)
+      const dots = dotted.has(wire.source) ? NO_POINTS : (net?.dots ?? NO_POINTS)
+      dotted.add(wire.source)
+      const path = net?.paths.get(key) ?? NO_POINTS
+      const rank = kind.bus ? 3 : Math.min(kind.shape.length, 2)
+      const label = `${wire.source} to ${wire.target}${kind.shape.length ? `, ${kind.shape.join(' × ')}` : ''}${kind.unit ? `, ${kind.unit}` : ''}`
+      const selected = chosen.has(key)
+      return this.wires.get(key, [path, dots, net, rank, label, selected, wire], () => ({
+        id: key,
+        type: 'wire',
+        source: blockOf(wire.source),
+        sourceHandle: portOf(wire.source),
+        target: blockOf(wire.target),
+        targetHandle: portOf(wire.target),
+        selected,
+        ariaLabel: `wire from ${wire.source} to ${wire.target}`,
+        data: { path, dots, rank, label, bent: Boolean(wire.bends?.length), way: () => (net ? wholeWay(net, key) : []) },
+      }))
+    })
+    this.wires.turn()
+    return made
+  }
+}
+
+/** What the check found, by the block of this sheet that it is in. */
+function byBlock(findings: Finding[], level: string): Map<string, Finding[]> {
+  const found = new Map<string, Finding[]>()
+  for (const finding of findings) {
+    if (!finding.block.startsWith(level)) continue
+    const name = finding.block.slice(level.length).split('/')[0]!
+    found.set(name, [...(found.get(name) ?? []), finding])
+  }
+  return found
+}

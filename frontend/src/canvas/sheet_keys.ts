@@ -1,0 +1,99 @@
+import type { ReactFlowInstance } from '@xyflow/react'
+import { useEffect, type RefObject } from 'react'
+import { commands, pressed } from '../commands'
+import { openQuickInsert } from '../library/quick_insert'
+import { openShortcuts } from '../shortcuts'
+import { change, look, useStudio } from '../store'
+import { chosenBlocks } from './arranging'
+import { move, openBlock } from './canvas'
+import { openConnectDialog } from './connect_dialog'
+import { editNote, writeNote } from './note_node'
+import type { SheetNode } from './sheet_graph'
+import { wireKey, type Places } from './sheet_layout'
+import type { WireEdgeType } from './wire_edge'
+
+const NUDGE = 5
+
+/** What commands do with the sheet on the screen; `null` while there is none. */
+export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = { fit: null, middle: null }
+
+/** Begin a note in the middle of what is seen. */
+export function addNote(): void {
+  const at = sheetView.middle?.()
+  if (at) writeNote(at.x, at.y)
+}
+
+/** The keys of the sheet: they are its own while it has the focus, and while nothing has it. */
+export function useSheetKeys(
+  sheet: RefObject<HTMLDivElement | null>,
+  flow: ReactFlowInstance<SheetNode, WireEdgeType>,
+  chosenWires: ReadonlySet<string>,
+  chooseWires: (keys: ReadonlySet<string>) => void,
+): void {
+  const remove = () => {
+    const { document, selection, select } = useStudio.getState()
+    const wires = (document?.wires ?? []).filter((wire) => chosenWires.has(wireKey(wire)))
+    const blocks = [...selection].filter((name) => document?.blocks[name])
+    const notes = [...selection].filter((name) => document?.notes[name])
+    if (blocks.length || wires.length || notes.length) void change({ kind: 'remove', blocks, wires, notes })
+    select([])
+    chooseWires(new Set())
+  }
+
+  const plain = (event: KeyboardEvent): boolean => {
+    const { document, selection, select } = useStudio.getState()
+    if (!document) return false
+    const step = event.shiftKey ? 1 : NUDGE
+    const arrows: Record<string, [number, number]> = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }
+    const arrow = arrows[event.key]
+    const [first] = selection
+    if (event.key === 'Delete' || event.key === 'Backspace') remove()
+    else if (event.key === 'Enter' && first && document.notes[first]) editNote(first)
+    else if (event.key === 'Enter' && chosenBlocks()[0]) openBlock(chosenBlocks()[0]!)
+    else if (arrow && selection.size) {
+      const to: Places = {}
+      for (const id of selection) {
+        const at = document.blocks[id]?.place ?? document.notes[id]
+        if (at) to[id] = { x: at.x + arrow[0], y: at.y + arrow[1] }
+      }
+      move(to)
+    } else if (event.key === '>') openConnectDialog()
+    else if (event.key === '?') openShortcuts()
+    else if (event.key === '"') addNote()
+    else if (event.key === ' ') sheetView.fit?.()
+    else if (event.key === 'Escape' && document.inside.length && !selection.size) look(document.inside.slice(0, -1))
+    else if (event.key === 'Escape') select([])
+    else if (/^\p{L}$/u.test(event.key)) openQuickInsert(event.key)
+    else return false
+    return true
+  }
+
+  const onKeyDown = (event: KeyboardEvent) => {
+    // A focused block may have gone, and then nothing has the focus; a button elsewhere keeps only the keys that press it.
+    const focused = event.target instanceof Element ? event.target : null
+    if (focused instanceof HTMLInputElement || focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')) return
+    const ours = focused === window.document.body || sheet.current?.contains(focused)
+    if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return
+    const command = commands().find(({ onSheet, keys }) => onSheet && keys && pressed(keys, event))
+    if (command) command.run()
+    else if (event.ctrlKey || event.metaKey || event.altKey || !plain(event)) return
+    event.preventDefault()
+    event.stopPropagation()
+  }
+
+  useEffect(() => {
+    addEventListener('keydown', onKeyDown)
+    return () => removeEventListener('keydown', onKeyDown)
+  })
+  useEffect(() => {
+    sheetView.fit = () => void flow.fitView({ duration: 150 })
+    sheetView.middle = () => {
+      const box = sheet.current!.getBoundingClientRect()
+      return flow.screenToFlowPosition({ x: box.x + box.width / 2, y: box.y + box.height / 2 })
+    }
+    return () => {
+      sheetView.fit = null
+      sheetView.middle = null
+    }
+  }, [flow, sheet])
+}

@@ -1,0 +1,34 @@
+import { Anchor } from '@mantine/core'
+import { openTour } from '../documents/tour'
+import { ask, useStudio } from '../store'
+
+/** An empty sheet: how to begin, and the examples with their pictures. */
+export function Welcome() {
+  const examples = useStudio((s) => s.welcome?.examples ?? {})
+  return (
+    <div className="welcome">
+      <div>
+        <header>
+          <h2>Type to add a block</h2>
+          <p>
+            Or drag one from the library, or begin with an example.{' '}
+            <Anchor component="button" size="sm" onClick={openTour}>
+              Take the tour
+            </Anchor>
+          </p>
+        </header>
+        <div className="gallery" role="list" aria-label="Examples">
+          {Object.entries(examples).map(([name, description]) => (
+            <div key={name} role="listitem" style={{ display: 'contents' }}>
+              <button type="button" onClick={() => void ask({ kind: 'open', example: name })}>
+                <img src={`example/${name}.svg`} alt="" loading="lazy" />
+                <b>{name}</b>
+                <small>{description}</small>
+              </button>
+            </div>
+          ))}
+        </div>
+      </div>
+    </div>
+  )
+}

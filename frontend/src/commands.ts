@@ -1,0 +1,96 @@
+import { align, distribute, flip, group, rotate, chosenBlocks } from './canvas/arranging'
+import { copy, cut, duplicate, paste } from './canvas/clipboard'
+import { openConnectDialog } from './canvas/connect_dialog'
+import { addNote, sheetView } from './canvas/sheet_keys'
+import { save, show } from './documents/dialogs'
+import { exportDrawing, openReport } from './documents/export'
+import { openTour } from './documents/tour'
+import { openFind } from './library/find'
+import { openQuickInsert } from './library/quick_insert'
+import { openConfiguration } from './run/configuration'
+import { startOrResume } from './run/top_bar'
+import { openShortcuts } from './shortcuts'
+import { alter, ask, look, useStudio } from './store'
+
+/** Something that can be done: in the command palette, in the list of keys, and by its key. */
+export interface Command {
+  title: string
+  /** As people write it, `Ctrl+Shift+G`; several ways apart by a comma. */
+  keys?: string
+  /** Whether the key is heard only while the sheet has the focus. */
+  onSheet?: boolean
+  /** Whether it can be done now; always where it is not said. */
+  possible?: () => boolean
+  run: () => void
+}
+
+const chosen = () => chosenBlocks().length > 0
+const several = () => chosenBlocks().length > 1
+const ran = () => useStudio.getState().run !== null
+const wires = () => useStudio.getState().document?.wires ?? []
+
+/** Every command, in the order of the palette. */
+export function commands(): Command[] {
+  return LIST
+}
+
+const LIST: Command[] = [
+  { title: 'Run, or go on after a pause', keys: 'Ctrl+Enter', run: startOrResume },
+  { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: openFind },
+  { title: 'Add a block', run: () => openQuickInsert('') },
+  { title: 'Draw a wire by the names of its ends', keys: '>', run: openConnectDialog },
+  { title: 'Write a note', keys: '"', run: addNote },
+  { title: 'Undo', keys: 'Ctrl+Z', run: () => alter('undo') },
+  { title: 'Redo', keys: 'Ctrl+Y', run: () => alter('redo') },
+  { title: 'Save', keys: 'Ctrl+S', run: () => void save() },
+  { title: 'Save under another name', keys: 'Ctrl+Shift+S', run: () => show('save_as') },
+  { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
+  { title: 'New diagram', run: () => void ask({ kind: 'new' }) },
+  { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
+  { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
+  { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
+  { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: chosen, run: () => duplicate(chosenBlocks(), wires()) },
+  { title: 'Copy', keys: 'Ctrl+C', onSheet: true, possible: chosen, run: () => void copy(chosenBlocks(), wires()) },
+  { title: 'Cut', keys: 'Ctrl+X', onSheet: true, possible: chosen, run: () => void cut(chosenBlocks(), wires()) },
+  { title: 'Paste', keys: 'Ctrl+V', onSheet: true, run: () => void paste() },
+  {
+    title: 'Select all',
+    keys: 'Ctrl+A',
+    onSheet: true,
+    run: () => {
+      const { document, select } = useStudio.getState()
+      select([...Object.keys(document?.blocks ?? {}), ...Object.keys(document?.notes ?? {})])
+    },
+  },
+  { title: 'Align left edges', possible: several, run: () => align('left') },
+  { title: 'Align centres', possible: several, run: () => align('centre') },
+  { title: 'Align right edges', possible: several, run: () => align('right') },
+  { title: 'Align top edges', possible: several, run: () => align('top') },
+  { title: 'Align middles', possible: several, run: () => align('middle') },
+  { title: 'Align bottom edges', possible: several, run: () => align('bottom') },
+  { title: 'Equal gaps from left to right', possible: several, run: () => distribute('x') },
+  { title: 'Equal gaps from top to bottom', possible: several, run: () => distribute('y') },
+  { title: 'Arrange the sheet', run: () => alter('arrange') },
+  { title: 'Fit the sheet into the window', keys: 'Space', run: () => sheetView.fit?.() },
+  {
+    title: 'Out of the subsystem',
+    keys: 'Esc',
+    possible: () => Boolean(useStudio.getState().document?.inside.length),
+    run: () => look(useStudio.getState().document!.inside.slice(0, -1)),
+  },
+  { title: 'Report of this run', possible: ran, run: openReport },
+  { title: 'Export the sheet as SVG', run: () => exportDrawing('svg') },
+  { title: 'Export the sheet as PNG', run: () => exportDrawing('png') },
+  { title: 'Export the sheet as PDF', run: () => exportDrawing('pdf') },
+  { title: 'Configuration parameters', keys: 'Ctrl+E', run: openConfiguration },
+  { title: 'Take the tour', run: openTour },
+  { title: 'All keys', keys: '?', run: openShortcuts },
+]
+
+/** Whether these keys are the ones pressed. */
+export function pressed(keys: string, event: KeyboardEvent): boolean {
+  const parts = keys.split('+')
+  const key = parts.at(-1)!.toLowerCase()
+  const [ctrl, shift] = [parts.includes('Ctrl'), parts.includes('Shift')]
+  return ctrl && (event.ctrlKey || event.metaKey) && event.shiftKey === shift && event.key.toLowerCase() === key
+}

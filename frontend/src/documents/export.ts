@@ -1,0 +1,27 @@
+import { useStudio } from '../store'
+
+const CHECK = { headers: { 'X-Armblocks': '1' } }
+
+/** Save a drawing of the sheet on the screen: what `armblocks diagram` writes, in the colours of this page for SVG and PNG. */
+export function exportDrawing(kind: 'svg' | 'png' | 'pdf'): void {
+  const { document } = useStudio.getState()
+  if (!document) return
+  const query = new URLSearchParams({ sheet: document.inside.join('/') })
+  void download(`drawing/${document.state.document}.${kind}?${query}`, [document.state.title, ...document.inside].join('-') + `.${kind}`)
+}
+
+async function download(path: string, name: string): Promise<void> {
+  const answer = await fetch(path, CHECK)
+  if (!answer.ok) throw new Error(await answer.text())
+  const link = window.document.createElement('a')
+  link.href = URL.createObjectURL(await answer.blob())
+  link.download = name
+  link.click()
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000)
+}
+
+/** Open the report of the model in another tab: the one that the command line writes. */
+export function openReport(): void {
+  const { document } = useStudio.getState()
+  if (document) window.open(`report/${document.state.document}`, '_blank')
+}

@@ -1,0 +1,118 @@
+import { Button, CloseButton, Group, Paper, Text } from '@mantine/core'
+import { useEffect, useLayoutEffect, useState } from 'react'
+import { create } from 'zustand'
+import { useStudio } from '../store'
+
+const SEEN = 'armblocks-tour-seen'
+const WIDTH = 320
+const GAP = 14
+
+interface Stop {
+  /** What of the page it is about; the first that is there. */
+  at: string
+  title: string
+  text: string
+}
+
+const STOPS: Stop[] = [
+  { at: '.sheet', title: 'The sheet', text: 'Blocks and wires of the model. Drag from port to port to wire; drag a piece of a wire to lead it elsewhere; double-click a block to open it.' },
+  { at: '.palette', title: 'The library', text: 'All blocks by family. Drag one to the sheet, onto a wire to put it in between. Faster: type its name on the sheet.' },
+  { at: '.run-controls', title: 'Run', text: 'Run (Ctrl+Enter), pause, step forward and back, stop. Beside it the stop time and the speed against real time.' },
+  { at: '.scopes-panel, .chart', title: 'Scopes', text: 'What was recorded: zoom with the mouse, measure between cursors, export. Click a wire on the sheet to log its signal too.' },
+  { at: '.timeline', title: 'One time for everything', text: 'Drag the cursor or play the run: scopes, values on wires and the arm all show this instant.' },
+  { at: '.robot', title: 'The arm', text: 'Turn the view with the mouse. The arm stands as the signals say at the instant of the cursor.' },
+  { at: '[aria-label="Menu"]', title: 'Where to go on', text: 'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.' },
+]
+
+const useTour = create<{ stop: number | null }>(() => ({ stop: null }))
+
+export const openTour = (): void => useTour.setState({ stop: 0 })
+
+function leave(): void {
+  useTour.setState({ stop: null })
+  localStorage.setItem(SEEN, 'yes')
+}
+
+/** A walk of two minutes through the page: offered at the first visit, and whenever asked for. */
+export function Tour() {
+  const { stop } = useTour()
+  const offered = useStudio((s) => s.document !== null)
+  const [box, setBox] = useState<DOMRect | null>(null)
+  const [asked, setAsked] = useState(() => localStorage.getItem(SEEN) === 'yes')
+  const here = stop === null ? undefined : STOPS[stop]
+  useLayoutEffect(() => {
+    const found = here && document.querySelector(here.at)
+    setBox(found ? found.getBoundingClientRect() : null)
+  }, [here])
+  useEffect(() => {
+    if (stop === null) return
+    const onKey = (event: KeyboardEvent) => {
+      if (event.key !== 'Escape') return
+      leave()
+      event.stopPropagation()
+    }
+    addEventListener('keydown', onKey, true)
+    return () => removeEventListener('keydown', onKey, true)
+  }, [stop])
+  if (!here) {
+    if (asked || !offered) return null
+    const done = () => {
+      localStorage.setItem(SEEN, 'yes')
+      setAsked(true)
+    }
+    return (
+      <Paper className="tour offer" withBorder shadow="md" p="sm" role="dialog" aria-label="A first look">
+        <Text size="sm" fw={600}>
+          New here? Two minutes show you around.
+        </Text>
+        <Group gap="xs" mt={8}>
+          <Button size="compact-sm" onClick={() => (done(), openTour())}>
+            Take the tour
+          </Button>
+          <Button size="compact-sm" variant="default" onClick={done}>
+            Not now
+          </Button>
+        </Group>
+      </Paper>
+    )
+  }
+  const last = stop === STOPS.length - 1
+  return (
+    <>
+      {box && <div className="tour-mark" style={{ left: box.x, top: box.y, width: box.width, height: box.height }} />}
+      <Paper className="tour" withBorder shadow="lg" p="sm" role="dialog" aria-label={here.title} style={beside(box)}>
+        <Group justify="space-between" wrap="nowrap">
+          <Text fw={600}>{here.title}</Text>
+          <CloseButton size="sm" aria-label="Leave the tour" onClick={leave} />
+        </Group>
+        <Text size="sm" my={6}>
+          {here.text}
+        </Text>
+        <Group justify="space-between">
+          <Text size="xs" c="dimmed">
+            {stop! + 1} of {STOPS.length}
+          </Text>
+          <Group gap="xs">
+            {stop! > 0 && (
+              <Button size="compact-sm" variant="default" onClick={() => useTour.setState({ stop: stop! - 1 })}>
+                Back
+              </Button>
+            )}
+            <Button size="compact-sm" data-autofocus autoFocus key={stop} onClick={() => (last ? leave() : useTour.setState({ stop: stop! + 1 }))}>
+              {last ? 'Done' : 'Next'}
+            </Button>
+          </Group>
+        </Group>
+      </Paper>
+    </>
+  )
+}
+
+/** Where the words stand: right of what they are about, left of it, or else over its middle. */
+function beside(box: DOMRect | null): React.CSSProperties {
+  if (!box) return { left: (innerWidth - WIDTH) / 2, top: innerHeight / 3, width: WIDTH }
+  const top = Math.min(Math.max(box.y + 8, 8), innerHeight - 190)
+  if (box.right + GAP + WIDTH < innerWidth) return { left: box.right + GAP, top, width: WIDTH }
+  if (box.x - GAP - WIDTH > 0) return { left: box.x - GAP - WIDTH, top, width: WIDTH }
+  return { left: box.x + (box.width - WIDTH) / 2, top: box.y > 220 ? box.y - 170 : Math.min(box.bottom + GAP, innerHeight - 190), width: WIDTH }
+}

@@ -1,0 +1,68 @@
+import { Kbd, Modal, TextInput } from '@mantine/core'
+import { useEffect, useRef, useState, type ReactNode } from 'react'
+
+export interface PickItem {
+  key: string
+  title: string
+  note?: string
+  face?: ReactNode
+  keys?: string
+}
+
+interface PickListProps {
+  opened: boolean
+  onClose: () => void
+  label: string
+  placeholder: string
+  /** What the list is called. */
+  list: string
+  typed: string
+  onTyped: (typed: string) => void
+  items: PickItem[]
+  nothing: string
+  onPick: (index: number) => void
+}
+
+/** Type a few letters, choose with the arrows, press Enter: how blocks, commands and places are found. */
+export function PickList({ opened, onClose, label, placeholder, list, typed, onTyped, items, nothing, onPick }: PickListProps) {
+  const [chosen, setChosen] = useState(0)
+  const found = useRef<HTMLDivElement>(null)
+  useEffect(() => setChosen(0), [typed, opened])
+  useEffect(() => found.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' }), [chosen])
+  const pick = (index: number) => {
+    if (!items[index]) return
+    onClose()
+    onPick(index)
+  }
+  return (
+    <Modal opened={opened} onClose={onClose} withCloseButton={false} size="md" padding="xs" yOffset="16vh" title={undefined}>
+      <TextInput
+        aria-label={label}
+        placeholder={placeholder}
+        data-autofocus
+        value={typed}
+        onChange={(event) => onTyped(event.currentTarget.value)}
+        onKeyDown={(event) => {
+          if (event.key === 'ArrowDown') setChosen(Math.min(chosen + 1, items.length - 1))
+          else if (event.key === 'ArrowUp') setChosen(Math.max(chosen - 1, 0))
+          else if (event.key === 'Enter') pick(chosen)
+          else return
+          event.preventDefault()
+        }}
+      />
+      <div role="listbox" aria-label={list} className="found" ref={found}>
+        {items.map(({ key, title, note, face, keys }, index) => (
+          <button key={key} type="button" role="option" aria-selected={index === chosen} tabIndex={-1} onClick={() => pick(index)} onMouseMove={() => setChosen(index)}>
+            {face}
+            <span className="what">
+              <b>{title}</b>
+              {note && <small>{note}</small>}
+            </span>
+            {keys && <Kbd size="xs">{keys}</Kbd>}
+          </button>
+        ))}
+      </div>
+      {items.length === 0 && <p className="empty">{nothing}</p>}
+    </Modal>
+  )
+}

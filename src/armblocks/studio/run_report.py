@@ -1,0 +1,66 @@
+"""The report of a run, as one page: the command line's, made in a process of its own.
+
+The model is run again with the values with which the run began; the same steps give the same numbers. What
+was tuned or stopped on the way is not repeated.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import tempfile
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.studio.run_worker import begun, limit_process
+
+MOST_SECONDS = 300.0
+
+
+async def report_of(job: Mapping[str, Any]) -> bytes:
+    """The page, HTML, for the job of a run (see :mod:`armblocks.studio.run_worker`).
+
+    Raises ``SimulationError`` with what the run or the report refused, or where it takes too long.
+    """
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_write, args=(theirs, dict(job)), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        return await asyncio.to_thread(_received, ours)
+    finally:
+        process.kill()
+        ours.close()
+
+
+def _received(pipe: Connection) -> bytes:
+    try:
+        said = pipe.recv_bytes() if pipe.poll(MOST_SECONDS) else b""
+    except EOFError:
+        said = b""
+    if not said:
+        fix = "shorten the run, or use 'armblocks run'"
+        raise SimulationError("the report could not be made in the time and memory it may have", fix=fix)
+    if said[:1] == b"E":
+        raise SimulationError(said[1:].decode(), where="report")
+    return said[1:]
+
+
+def _write(pipe: Connection, job: dict[str, Any]) -> None:
+    """In the process: run the model, write the report, send its page."""
+    limit_process()
+    from armblocks.report import write_report
+
+    try:
+        run = begun(job).run
+        run.advance()
+        diagram, result = run.diagram, run.result()
+        with tempfile.TemporaryDirectory() as folder:
+            page = write_report(Path(folder), diagram, result, formats=(), data=()).page
+            pipe.send_bytes(b"H" + page.read_bytes())
+    except ArmblocksError as error:
+        pipe.send_bytes(b"E" + str(error).encode())

@@ -1,0 +1,250 @@
+"""What people do with the sheet itself: lead wires, turn blocks, write notes, find, command, export."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from armblocks.blocks import BLOCKS
+
+
+@pytest.fixture(scope="module")
+def shared(open_studio: Callable[[Path], Page], tmp_path_factory: pytest.TempPathFactory) -> Page:
+    return open_studio(tmp_path_factory.mktemp("sheets"))
+
+
+@pytest.fixture
+def sheet(shared: Page) -> Iterator[Page]:
+    """The page of the studio that this file shares, showing a fresh copy of an example."""
+    page = shared
+    page.keyboard.press("Escape")
+    menu(page, re.compile("^van_der_pol_pid"))
+    expect(page.locator(".title")).to_have_text("van_der_pol_pid")
+    expect(block(page, "PID")).to_be_visible()
+    yield page
+
+
+def menu(page: Page, entry: str | re.Pattern[str]) -> None:
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name=entry).click()
+
+
+def block(page: Page, name: str) -> Locator:
+    return page.locator(f'.react-flow__node[data-id="{name}"]')
+
+
+def edge(page: Page, wire: str) -> Locator:
+    return page.locator(f'.react-flow__edge[data-id="{wire}"]')
+
+
+def middle(found: Locator) -> tuple[float, float]:
+    box = found.bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def command(page: Page, typed: str) -> None:
+    page.keyboard.press("Control+k")
+    page.get_by_role("textbox", name="Command").fill(typed)
+    page.get_by_role("textbox", name="Command").press("Enter")
+    expect(page.get_by_role("dialog")).to_be_hidden()
+
+
+def way(page: Page, wire: str) -> str | None:
+    return edge(page, wire).locator("path.line").first.get_attribute("d")
+
+
+def test_a_wire_is_led_by_hand_follows_its_block_and_finds_its_own_way_again(sheet: Page) -> None:
+    wire = "PID/y -> u/u1"
+    before = way(sheet, wire)
+    x, y = middle(edge(sheet, wire).locator(".piece").first)
+    sheet.mouse.move(x, y)
+    sheet.mouse.down()
+    sheet.mouse.move(x, y - 40, steps=4)
+    sheet.mouse.up()
+    expect(sheet.get_by_role("button", name="Undo bend 1 wire (Ctrl+Z)")).to_be_enabled()
+    led = way(sheet, wire)
+    assert led != before
+    block(sheet, "PID").click()
+    sheet.keyboard.press("ArrowDown")
+    expect(sheet.get_by_role("button", name="Undo move PID (Ctrl+Z)")).to_be_enabled()
+    moved = way(sheet, wire)
+    assert moved not in (led, before)
+    sheet.keyboard.press("Control+z")
+    expect(edge(sheet, wire).locator("path.line").first).to_have_attribute("d", led or "")
+    edge(sheet, wire).locator(".piece").nth(2).click(force=True)
+    sheet.get_by_role("button", name="Reset the route").click()
+    expect(edge(sheet, wire).locator("path.line").first).to_have_attribute("d", before or "")
+
+
+def test_a_block_that_is_dropped_on_a_wire_goes_into_it(sheet: Page) -> None:
+    wires = sheet.locator(".react-flow__edge")
+    count = wires.count()
+    sheet.get_by_role("textbox", name="Search the library").fill("Saturation")
+    piece = edge(sheet, "x2/y -> x1/u").locator(".piece").first
+    x, y = middle(piece)
+    pane = sheet.locator(".canvas").bounding_box()
+    assert pane is not None
+    sheet.locator('.kind[data-type="Saturation"]').drag_to(
+        sheet.locator(".canvas"), target_position={"x": x - pane["x"], "y": y - pane["y"]}
+    )
+    expect(edge(sheet, "x2/y -> Saturation/u")).to_have_count(1)
+    expect(edge(sheet, "Saturation/y -> x1/u")).to_have_count(1)
+    expect(wires).to_have_count(count + 1)
+    sheet.keyboard.press("Control+z")
+    expect(wires).to_have_count(count)
+    sheet.get_by_role("button", name="Clear the search").click()
+
+
+def test_blocks_are_turned_and_aligned(sheet: Page) -> None:
+    block(sheet, "damping").click()
+    sheet.keyboard.press("Control+r")
+    expect(sheet.get_by_role("button", name="Undo move damping (Ctrl+Z)")).to_be_enabled()
+    expect(block(sheet, "damping").locator(".name")).to_have_class(re.compile("beside"))
+    sheet.keyboard.press("Control+z")
+    sheet.keyboard.press("Control+a")
+    bar = sheet.get_by_role("toolbar", name="Arrange the selected blocks")
+    bar.get_by_role("button", name="Align top edges").click()
+    expect(sheet.get_by_role("button", name=re.compile("Undo move"))).to_be_enabled()
+    boxes = [block(sheet, name).bounding_box() for name in ("PID", "x1", "one")]
+    assert len({round(box["y"]) for box in boxes if box}) == 1
+    sheet.keyboard.press("Control+z")
+    command(sheet, "equal gaps from left")
+    expect(sheet.get_by_role("button", name=re.compile("Undo move"))).to_be_enabled()
+
+
+def test_a_note_is_written_moved_saved_and_deleted(sheet: Page) -> None:
+    sheet.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
+    sheet.keyboard.press('"')
+    field = sheet.get_by_role("textbox", name="Note")
+    expect(field).to_be_focused()
+    field.fill("Van der Pol\nheld by a PID")
+    field.press("Control+Enter")
+    note = sheet.locator(".note")
+    expect(note).to_have_text("Van der Pol\nheld by a PID")
+    before = note.bounding_box()
+    note.click()
+    sheet.keyboard.press("ArrowUp")
+    expect(sheet.get_by_role("button", name="Undo move 1 note (Ctrl+Z)")).to_be_enabled()
+    after = note.bounding_box()
+    assert before is not None
+    assert after is not None
+    assert after["y"] < before["y"]
+    sheet.keyboard.press("Delete")
+    expect(note).to_have_count(0)
+    sheet.keyboard.press("Control+z")
+    expect(note).to_have_count(1)
+    answer = sheet.evaluate(EXPORTED)
+    assert "held by a PID" in answer
+
+
+EXPORTED = """async () => {
+    const { shown } = JSON.parse(sessionStorage.getItem('armblocks-shown'))
+    return await (await fetch(`drawing/${shown.document}.svg`)).text()
+}"""
+
+
+def test_find_goes_to_a_block_in_a_subsystem_and_the_explorer_shows_where(sheet: Page) -> None:
+    block(sheet, "PID").click()
+    sheet.keyboard.press("Control+g")
+    expect(block(sheet, "Subsystem")).to_be_visible()
+    sheet.keyboard.press("Control+f")
+    sheet.get_by_role("textbox", name="Find").fill("PID")
+    found = sheet.get_by_role("listbox", name="Found").get_by_role("option")
+    expect(found.first).to_contain_text("in Subsystem")
+    sheet.get_by_role("textbox", name="Find").press("Enter")
+    expect(block(sheet, "PID")).to_have_class(re.compile("selected"))
+    expect(sheet.locator(".breadcrumbs")).to_contain_text("Subsystem")
+    sheet.get_by_text("Model", exact=True).click()
+    tree = sheet.get_by_role("tree", name="Subsystems of the model")
+    expect(tree.locator(".here")).to_contain_text("Subsystem")
+    tree.get_by_text("van_der_pol_pid").click()
+    expect(block(sheet, "Subsystem")).to_be_visible()
+    axe(sheet)
+    sheet.get_by_text("Library", exact=True).click()
+
+
+def test_an_empty_sheet_offers_examples_and_the_tour_goes_round(sheet: Page) -> None:
+    menu(sheet, "New diagram")
+    cards = sheet.locator(".gallery button")
+    expect(cards).not_to_have_count(0)
+    picture = cards.first.locator("img")
+    picture.evaluate("(image) => image.decode()")  # an error where there is no picture
+    axe(sheet)
+    sheet.get_by_role("button", name="Take the tour").click()
+    axe(sheet)
+    for _ in range(6):
+        sheet.get_by_role("button", name="Next").click()
+    sheet.get_by_role("button", name="Done").click()
+    expect(sheet.locator(".tour")).to_have_count(0)
+    cards.filter(has_text="bouncing_ball").click()
+    expect(sheet.locator(".title")).to_have_text("bouncing_ball")
+
+
+def test_the_sheet_is_exported_and_the_run_reported(sheet: Page) -> None:
+    for kind, begins in (("SVG", b"<?xml"), ("PNG", b"\x89PNG"), ("PDF", b"%PDF")):
+        with sheet.expect_download() as waiting:
+            command(sheet, f"as {kind}")
+        saved = waiting.value
+        assert saved.suggested_filename == f"van_der_pol_pid.{kind.lower()}"
+        data = Path(saved.path()).read_bytes()
+        assert data.startswith(begins) or (kind == "SVG" and data.startswith(b"<svg"))
+    sheet.keyboard.press("Control+Enter")
+    expect(sheet.locator(".run-state")).to_contain_text("done", ignore_case=True)
+    with sheet.context.expect_page() as opened:
+        command(sheet, "report of this")
+    report = opened.value
+    expect(report.locator("h1")).to_contain_text("van_der_pol_pid")
+    report.close()
+
+
+def test_every_block_of_the_library_is_added_opened_and_saved(sheet: Page) -> None:
+    menu(sheet, "New diagram")
+    expect(sheet.get_by_text("Type to add a block")).to_be_visible()
+    names = [f"b{k}" for k in range(len(list(BLOCKS)))]
+    blocks = [
+        {"name": name, "type": kind, "parameters": {}, "place": {"x": 160 * (k % 20), "y": 130 * (k // 20)}}
+        for k, (name, kind) in enumerate(zip(names, BLOCKS))
+    ]
+    clip = json.dumps({"armblocks-blocks": 1, "blocks": blocks, "wires": []})
+    sheet.evaluate("(text) => navigator.clipboard.writeText(text)", clip)
+    sheet.keyboard.press("Control+v")
+    expect(sheet.locator(".react-flow__node")).to_have_count(len(names))
+    for name in names[:: max(len(names) // 12, 1)]:
+        sheet.keyboard.press("Control+f")
+        sheet.get_by_role("textbox", name="Find").fill(name)
+        expect(sheet.get_by_role("listbox", name="Found").get_by_role("option").first).to_contain_text(name)
+        sheet.get_by_role("textbox", name="Find").press("Enter")
+        expect(block(sheet, name)).to_be_focused()
+        inside = block(sheet, name).locator(".block").get_attribute("title")
+        sheet.keyboard.press("Enter")
+        if inside is not None and "Subsystem" in inside:
+            expect(sheet.locator(".breadcrumbs")).to_contain_text(name)
+            sheet.keyboard.press("Escape")
+            sheet.keyboard.press("Escape")
+            expect(block(sheet, name)).to_be_visible()
+            continue
+        expect(sheet.get_by_role("dialog")).to_contain_text(name)
+        sheet.keyboard.press("Escape")
+        expect(sheet.get_by_role("dialog")).to_be_hidden()
+    sheet.keyboard.press("Control+s")
+    sheet.get_by_label("File", exact=True).fill("every block.json")
+    sheet.get_by_role("button", name="Save", exact=True).click()
+    expect(sheet.locator(".title")).to_have_text("every block")
+
+
+def axe(page: Page) -> None:
+    script = Path(__file__).parents[2] / "frontend" / "node_modules" / "axe-core" / "axe.min.js"
+    page.evaluate(script.read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
+    serious = [
+        (rule["id"], rule["nodes"][0]["html"][:200])
+        for rule in found["violations"]
+        if rule["impact"] in ("serious", "critical")
+    ]
+    assert serious == []
