@@ -233,7 +233,7 @@ def test_every_block_of_the_library_is_added_opened_and_saved(sheet: Page) -> No
         sheet.keyboard.press("Escape")
         expect(sheet.get_by_role("dialog")).to_be_hidden()
     sheet.keyboard.press("Control+s")
-    sheet.get_by_label("File", exact=True).fill("every block.json")
+    sheet.get_by_role("combobox", name="File").fill("every block.json")
     sheet.get_by_role("button", name="Save", exact=True).click()
     expect(sheet.locator(".title")).to_have_text("every block")
 
