@@ -505,6 +505,11 @@ def _port(node: Node) -> PortRef:
     return PortRef(block, port)
 
 
+def _members_if_any(node: Node) -> Mapping[str, Node]:
+    value: object = node.value
+    return node.members() if isinstance(value, dict) else {}
+
+
 class _Layout:
     """What an object's layout says of blocks, wires and notes."""
 
@@ -515,7 +520,7 @@ class _Layout:
 
     def read(self, key: str, node: Node, blocks: set[str], extras: Extras) -> None:
         """Take in one entry. What is no block, wire or note belongs to another program and is kept."""
-        stated = node.members() if isinstance(node.value, dict) else {}
+        stated = _members_if_any(node)
         if key in blocks:
             self.places[key] = _placement(key, node, extras)
         elif "bends" in stated and (found := _WIRE.fullmatch(key)):

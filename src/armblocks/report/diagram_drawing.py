@@ -144,7 +144,9 @@ def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict
     wires: dict[PortRef, list[PortRef]] = {}
     for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
         wires.setdefault(wire.source, []).append(wire.target)
-    drawn = diagram.bends if set(diagram.layout) >= set(diagram.blocks) else {}
+    drawn: Mapping[Connection, tuple[float, ...]] = {}
+    if set(diagram.layout) >= set(diagram.blocks):
+        drawn = diagram.bends
     nets = [
         Net(
             _end(placed[source.block].outputs, source.port),
