@@ -6,6 +6,7 @@ from armblocks.blocks import (
     angles,
     arithmetic,
     arm_plant,
+    arm_quantities,
     branching,
     constraints,
     continuous,
@@ -23,6 +24,7 @@ from armblocks.blocks import (
     from_file,
     gains,
     joint_control,
+    joint_drives,
     joint_paths,
     joint_pid,
     joint_sensors,
@@ -72,6 +74,7 @@ from armblocks.blocks.arithmetic import (
     UnaryMinus,
 )
 from armblocks.blocks.arm_plant import ArmPlant
+from armblocks.blocks.arm_quantities import JacobianInverse, LoadedRne, Manipulability, RobotEnergy
 from armblocks.blocks.branching import If, SwitchCase
 from armblocks.blocks.constraints import AlgebraicConstraint
 from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
@@ -121,18 +124,8 @@ from armblocks.blocks.ending import Assertion, StopSimulation
 from armblocks.blocks.expression import Expression
 from armblocks.blocks.from_file import FromFile
 from armblocks.blocks.gains import SineWaveFunction, SliderGain, WeightedSampleTime
-from armblocks.blocks.joint_control import (
-    ComputedTorque,
-    FeedForward,
-    GravityCompensation,
-    JacobianInverse,
-    JointPD,
-    JointStops,
-    LoadedRne,
-    Manipulability,
-    MotorDrive,
-    RobotEnergy,
-)
+from armblocks.blocks.joint_control import ComputedTorque, FeedForward, GravityCompensation, JointPD
+from armblocks.blocks.joint_drives import JointStops, MotorDrive
 from armblocks.blocks.joint_paths import CirclePath, CTraj, MultiSegment, Trapezoidal
 from armblocks.blocks.joint_pid import JointPID, SampledJointPID
 from armblocks.blocks.joint_sensors import Encoder, JointSensor, Tachometer
@@ -319,7 +312,9 @@ BLOCKS = BlockLibrary(
         orientations,
         poses,
         joint_paths,
+        arm_quantities,
         joint_control,
+        joint_drives,
         joint_pid,
         joint_sensors,
         drives,

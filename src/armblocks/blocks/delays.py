@@ -42,15 +42,10 @@ OUTPUT = Port("y", "what is held")
 
 
 @dataclass(frozen=True, kw_only=True)
-class UnitDelay(Block):
-    """The input one tick before: y(k) = u(k-1), y(0) = initial."""
+class OneTickDelay(Block):
+    """What a Unit Delay and a Memory with a sample time are."""
 
-    family: ClassVar[str] = "discrete"
-    title: ClassVar[str] = "Unit Delay"
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
-    example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine as it was one tick ago, held until the next.",
-    )
     sampled: ClassVar[bool] = True
 
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at the first tick")
@@ -85,7 +80,18 @@ class UnitDelay(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Memory(Block):
+class UnitDelay(OneTickDelay):
+    """The input one tick before: y(k) = u(k-1), y(0) = initial."""
+
+    family: ClassVar[str] = "discrete"
+    title: ClassVar[str] = "Unit Delay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine as it was one tick ago, held until the next.",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Memory(OneTickDelay):
     """The input at the tick before, as Simulink's Memory with a sample time: y(k) = u(k-1), y(0) = initial.
 
     Simulink's Memory in a continuous part gives the input one solver step before. What that is depends on
@@ -95,43 +101,11 @@ class Memory(Block):
 
     family: ClassVar[str] = "discrete"
     title: ClassVar[str] = "Memory"
-    spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sampled sine one tick late: the sample time is that of what feeds it.",
         parameters={"sample_time": -1.0},
         inputs={"u": made("ZeroOrderHold", sample_time=0.5).by(u=made("SineWave"))},
     )
-    sampled: ClassVar[bool] = True
-
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at the first tick")
-    sample_time: ArrayLike = sample_time_parameter()
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (INPUT,)
-
-    def bus_inputs(self) -> tuple[str, ...]:
-        return ("u",)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (OUTPUT,)
-
-    def assumed_output_shapes(self) -> Shapes:
-        return {"y": shape_of(self.initial)}
-
-    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": x["x"]}
-
-    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"x": u["u"]}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"x": p["initial"]}
-
-    def initial_outputs(self, p: Signals) -> Signals:
-        return {"y": p["initial"]}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -68,7 +69,83 @@ def _answer(kind: str, **parameters: Any) -> WorkedExample:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PID(Block):
+class ContinuousPidBlock(Block):
+    """What continuous PID controllers have in common: all but what the actions work on."""
+
+    P: ArrayLike = gain_parameter(1.0, "proportional gain")
+    I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
+    D: ArrayLike = gain_parameter(0.0, "derivative gain", "s")
+    N: ArrayLike = bandwidth_parameter()
+    limit_output: bool = limit_output_parameter()
+    lower: ArrayLike = lower_limit_parameter()
+    upper: ArrayLike = upper_limit_parameter()
+    anti_windup: str = anti_windup_parameter()
+    Kb: ArrayLike = gain_parameter(1.0, "back-calculation gain", "1/s")
+    initial_integral: ArrayLike = gain_parameter(0.0, "integral action at the start")
+    initial_filter: ArrayLike = gain_parameter(0.0, "filter state at the start")
+    form: str = form_parameter()
+    external_reset: str = external_reset_parameter()
+    tracking: bool = tracking_parameter()
+    Kt: ArrayLike = gain_parameter(1.0, "tracking gain", "1/s")
+
+    def check(self) -> None:
+        _check(self, limited=self.limit_output)
+
+    def further_ports(self) -> tuple[Port, ...]:
+        """The inputs that parameters ask for."""
+        reset = (Port("reset", "the trigger", shape=()),) if self.external_reset != "none" else ()
+        tracking = (Port("tracking", "what the output shall be close to"),) if self.tracking else ()
+        return (*reset, *tracking)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the control action"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _shape(self, inputs)}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return pid_states(_shape(self, inputs))
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return self._law.modes(_shape(self, inputs))
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return self._law.guards(_shape(self, inputs))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._law.output(x, self.errors(u, p), p)}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._law.derivatives(x, self.errors(u, p), p, u.get("tracking"))
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._law.guard_values(x, self.errors(u, p), p, u.get("tracking"), u.get("reset"))
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._law.mode_values(x, self.errors(u, p), p, u.get("tracking"))
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return self._law.resets(x, p, e)
+
+    def initial_states(self, p: Signals) -> Signals:
+        return pid_start(p)
+
+    @abstractmethod
+    def errors(self, u: Signals, p: Signals) -> Errors:
+        """What each of the three actions works on."""
+
+    @property
+    def _law(self) -> ContinuousPid:
+        return ContinuousPid(
+            form=self.form,
+            limited=self.limit_output,
+            anti_windup=self.anti_windup,
+            external_reset=self.external_reset,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PID(ContinuousPidBlock):
     """Proportional, integral and filtered derivative action: y = (P + I/s + D N s/(s + N)) u.
 
     That is Simulink's PID Controller; in the ideal form y = P (1 + I/s + D N s/(s + N)) u. States:
@@ -82,76 +159,15 @@ class PID(Block):
     title: ClassVar[str] = "PID Controller"
     example: ClassVar[WorkedExample] = _answer("one", I=1.5, D=0.4)
 
-    P: ArrayLike = gain_parameter(1.0, "proportional gain")
-    I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
-    D: ArrayLike = gain_parameter(0.0, "derivative gain", "s")
-    N: ArrayLike = bandwidth_parameter()
-    limit_output: bool = limit_output_parameter()
-    lower: ArrayLike = lower_limit_parameter()
-    upper: ArrayLike = upper_limit_parameter()
-    anti_windup: str = anti_windup_parameter()
-    Kb: ArrayLike = gain_parameter(1.0, "back-calculation gain", "1/s")
-    initial_integral: ArrayLike = gain_parameter(0.0, "integral action at the start")
-    initial_filter: ArrayLike = gain_parameter(0.0, "filter state at the start")
-    form: str = form_parameter()
-    external_reset: str = external_reset_parameter()
-    tracking: bool = tracking_parameter()
-    Kt: ArrayLike = gain_parameter(1.0, "tracking gain", "1/s")
-
-    def check(self) -> None:
-        _check(self, limited=self.limit_output)
-
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the error"), *_further_ports(self.external_reset, self.tracking))
+        return (Port("u", "the error"), *self.further_ports())
 
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the control action"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _shape(self, inputs)}
-
-    def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return pid_states(_shape(self, inputs))
-
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._law.modes(_shape(self, inputs))
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self._law.guards(_shape(self, inputs))
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._law.output(x, self._errors(u, p), p)}
-
-    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.derivatives(x, self._errors(u, p), p, u.get("tracking"))
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.guard_values(x, self._errors(u, p), p, u.get("tracking"), u.get("reset"))
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.mode_values(x, self._errors(u, p), p, u.get("tracking"))
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return self._law.resets(x, p, e)
-
-    def initial_states(self, p: Signals) -> Signals:
-        return pid_start(p)
-
-    def _errors(self, u: Signals, p: Signals) -> Errors:
+    def errors(self, u: Signals, p: Signals) -> Errors:
         return one_error(u["u"])
-
-    @property
-    def _law(self) -> ContinuousPid:
-        return ContinuousPid(
-            form=self.form,
-            limited=self.limit_output,
-            anti_windup=self.anti_windup,
-            external_reset=self.external_reset,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
-class PID2DOF(Block):
+class PID2DOF(ContinuousPidBlock):
     """PID with two degrees of freedom: y = P (b r - u) + I/s (r - u) + D N s/(s + N) (c r - u).
 
     The weights b and c let a step of the reference r pass softly while disturbances are still fought hard.
@@ -162,13 +178,24 @@ class PID2DOF(Block):
     title: ClassVar[str] = "PID Controller (2DOF)"
     example: ClassVar[WorkedExample] = _answer("two", P=4.0, I=3.0, D=1.0, b=0.4, c=0.0)
 
+    b: ArrayLike = gain_parameter(1.0, "weight of the reference in the proportional action")
+    c: ArrayLike = gain_parameter(1.0, "weight of the reference in the derivative action")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (*_TWO_INPUTS, *self.further_ports())
+
+    def errors(self, u: Signals, p: Signals) -> Errors:
+        return weighted_errors(u["r"], u["u"], p)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledPidBlock(Block):
+    """What sampled PID controllers have in common: all but what the actions work on."""
+
     P: ArrayLike = gain_parameter(1.0, "proportional gain")
     I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
     D: ArrayLike = gain_parameter(0.0, "derivative gain", "s")
     N: ArrayLike = bandwidth_parameter()
-    b: ArrayLike = gain_parameter(1.0, "weight of the reference in the proportional action")
-    c: ArrayLike = gain_parameter(1.0, "weight of the reference in the derivative action")
-    limit_output: bool = limit_output_parameter()
     lower: ArrayLike = lower_limit_parameter()
     upper: ArrayLike = upper_limit_parameter()
     anti_windup: str = anti_windup_parameter()
@@ -179,16 +206,18 @@ class PID2DOF(Block):
     external_reset: str = external_reset_parameter()
     tracking: bool = tracking_parameter()
     Kt: ArrayLike = gain_parameter(1.0, "tracking gain", "1/s")
+    integrator_method: str = method_parameter("rule of the integral")
+    filter_method: str = method_parameter("rule of the filter")
+    sample_time: ArrayLike = sample_time_parameter()
 
     def check(self) -> None:
-        _check(self, limited=self.limit_output)
+        _check(self, limited=True)
 
-    def input_ports(self) -> tuple[Port, ...]:
-        return (
-            Port("r", "the reference"),
-            Port("u", "the measured output of the plant"),
-            *_further_ports(self.external_reset, self.tracking),
-        )
+    def further_ports(self) -> tuple[Port, ...]:
+        """The inputs that parameters ask for."""
+        reset = (Port("reset", "the trigger", shape=()),) if self.external_reset != "none" else ()
+        tracking = (Port("tracking", "what the output shall be close to"),) if self.tracking else ()
+        return (*reset, *tracking)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the control action"),)
@@ -196,48 +225,35 @@ class PID2DOF(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": _shape(self, inputs)}
 
-    def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return pid_states(_shape(self, inputs))
-
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._law.modes(_shape(self, inputs))
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self._law.guards(_shape(self, inputs))
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return self._law.states(_shape(self, inputs))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._law.output(x, self._errors(u, p), p)}
+        return {"y": self._law.output(x, self.errors(u, p), p, u.get("reset"))}
 
-    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.derivatives(x, self._errors(u, p), p, u.get("tracking"))
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.guard_values(x, self._errors(u, p), p, u.get("tracking"), u.get("reset"))
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.mode_values(x, self._errors(u, p), p, u.get("tracking"))
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return self._law.resets(x, p, e)
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._law.updates(x, self.errors(u, p), p, u.get("reset"), u.get("tracking"))
 
     def initial_states(self, p: Signals) -> Signals:
-        return pid_start(p)
+        return self._law.start(p)
 
-    def _errors(self, u: Signals, p: Signals) -> Errors:
-        return weighted_errors(u["r"], u["u"], p)
+    @abstractmethod
+    def errors(self, u: Signals, p: Signals) -> Errors:
+        """What each of the three actions works on."""
 
     @property
-    def _law(self) -> ContinuousPid:
-        return ContinuousPid(
+    def _law(self) -> SampledPid:
+        return SampledPid(
             form=self.form,
-            limited=self.limit_output,
             anti_windup=self.anti_windup,
             external_reset=self.external_reset,
+            integrator_method=self.integrator_method,
+            filter_method=self.filter_method,
         )
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscretePID(Block):
+class DiscretePID(SampledPidBlock):
     """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
 
     That is Simulink's Discrete PID Controller with forward Euler rules; ``backward_euler`` and
@@ -252,64 +268,15 @@ class DiscretePID(Block):
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = _answer("one", I=1.5, sample_time=0.1)
 
-    P: ArrayLike = gain_parameter(1.0, "proportional gain")
-    I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
-    D: ArrayLike = gain_parameter(0.0, "derivative gain", "s")
-    N: ArrayLike = bandwidth_parameter()
-    lower: ArrayLike = lower_limit_parameter()
-    upper: ArrayLike = upper_limit_parameter()
-    anti_windup: str = anti_windup_parameter()
-    Kb: ArrayLike = gain_parameter(1.0, "back-calculation gain", "1/s")
-    initial_integral: ArrayLike = gain_parameter(0.0, "integral action at the start")
-    initial_filter: ArrayLike = gain_parameter(0.0, "filter state at the start")
-    form: str = form_parameter()
-    external_reset: str = external_reset_parameter()
-    tracking: bool = tracking_parameter()
-    Kt: ArrayLike = gain_parameter(1.0, "tracking gain", "1/s")
-    integrator_method: str = method_parameter("rule of the integral")
-    filter_method: str = method_parameter("rule of the filter")
-    sample_time: ArrayLike = sample_time_parameter()
-
-    def check(self) -> None:
-        _check(self, limited=True)
-
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the error"), *_further_ports(self.external_reset, self.tracking))
+        return (Port("u", "the error"), *self.further_ports())
 
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the control action"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _shape(self, inputs)}
-
-    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._law.states(_shape(self, inputs))
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._law.output(x, self._errors(u, p), p, u.get("reset"))}
-
-    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.updates(x, self._errors(u, p), p, u.get("reset"), u.get("tracking"))
-
-    def initial_states(self, p: Signals) -> Signals:
-        return self._law.start(p)
-
-    def _errors(self, u: Signals, p: Signals) -> Errors:
+    def errors(self, u: Signals, p: Signals) -> Errors:
         return one_error(u["u"])
-
-    @property
-    def _law(self) -> SampledPid:
-        return SampledPid(
-            form=self.form,
-            anti_windup=self.anti_windup,
-            external_reset=self.external_reset,
-            integrator_method=self.integrator_method,
-            filter_method=self.filter_method,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscretePID2DOF(Block):
+class DiscretePID2DOF(SampledPidBlock):
     """Sampled PID with two degrees of freedom: P acts on b r - u, I on r - u, D on c r - u.
 
     The weights b and c let a step of the reference r pass softly while disturbances are still fought hard.
@@ -321,66 +288,14 @@ class DiscretePID2DOF(Block):
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = _answer("two", P=4.0, I=3.0, D=1.0, N=8.0, b=0.4, sample_time=0.1)
 
-    P: ArrayLike = gain_parameter(1.0, "proportional gain")
-    I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
-    D: ArrayLike = gain_parameter(0.0, "derivative gain", "s")
-    N: ArrayLike = bandwidth_parameter()
     b: ArrayLike = gain_parameter(1.0, "weight of the reference in the proportional action")
     c: ArrayLike = gain_parameter(1.0, "weight of the reference in the derivative action")
-    lower: ArrayLike = lower_limit_parameter()
-    upper: ArrayLike = upper_limit_parameter()
-    anti_windup: str = anti_windup_parameter()
-    Kb: ArrayLike = gain_parameter(1.0, "back-calculation gain", "1/s")
-    initial_integral: ArrayLike = gain_parameter(0.0, "integral action at the start")
-    initial_filter: ArrayLike = gain_parameter(0.0, "filter state at the start")
-    form: str = form_parameter()
-    external_reset: str = external_reset_parameter()
-    tracking: bool = tracking_parameter()
-    Kt: ArrayLike = gain_parameter(1.0, "tracking gain", "1/s")
-    integrator_method: str = method_parameter("rule of the integral")
-    filter_method: str = method_parameter("rule of the filter")
-    sample_time: ArrayLike = sample_time_parameter()
-
-    def check(self) -> None:
-        _check(self, limited=True)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (
-            Port("r", "the reference"),
-            Port("u", "the measured output of the plant"),
-            *_further_ports(self.external_reset, self.tracking),
-        )
+        return (*_TWO_INPUTS, *self.further_ports())
 
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the control action"),)
-
-    def output_shapes(self, inputs: Shapes) -> Shapes:
-        return {"y": _shape(self, inputs)}
-
-    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._law.states(_shape(self, inputs))
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._law.output(x, self._errors(u, p), p, u.get("reset"))}
-
-    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._law.updates(x, self._errors(u, p), p, u.get("reset"), u.get("tracking"))
-
-    def initial_states(self, p: Signals) -> Signals:
-        return self._law.start(p)
-
-    def _errors(self, u: Signals, p: Signals) -> Errors:
+    def errors(self, u: Signals, p: Signals) -> Errors:
         return weighted_errors(u["r"], u["u"], p)
-
-    @property
-    def _law(self) -> SampledPid:
-        return SampledPid(
-            form=self.form,
-            anti_windup=self.anti_windup,
-            external_reset=self.external_reset,
-            integrator_method=self.integrator_method,
-            filter_method=self.filter_method,
-        )
 
 
 def _check(block: Block, limited: bool) -> None:
@@ -393,15 +308,6 @@ def _check(block: Block, limited: bool) -> None:
             allowed="limits together with limit_output=True",
             fix="set limit_output, or leave lower and upper out",
         )
-
-
-def _further_ports(external_reset: str, tracking: bool) -> tuple[Port, ...]:
-    found = list[Port]()
-    if external_reset != "none":
-        found.append(Port("reset", "the trigger", shape=()))
-    if tracking:
-        found.append(Port("tracking", "what the output shall be close to"))
-    return tuple(found)
 
 
 def _shape(block: Block, inputs: Shapes) -> Shape:
