@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
+from armblocks import blocks
 from armblocks.blocks import BLOCKS, Constant, Derivative
 from armblocks.diagram import (
     Block,
@@ -100,6 +101,11 @@ def test_it_says_what_it_is(kind: type[Block]) -> None:
     assert kind.family
     assert kind.title
     assert BLOCKS[kind.type_name()] is kind
+
+
+def test_it_is_imported_by_its_name(kind: type[Block]) -> None:
+    assert kind.type_name() in blocks.__all__
+    assert getattr(blocks, kind.type_name()) is kind
 
 
 def test_it_is_final_and_frozen(kind: type[Block]) -> None:

@@ -225,6 +225,18 @@ def test_units_pass_through_blocks() -> None:
     assert units["mixed/y"] == ""
 
 
+def test_what_is_added_to_a_speed_is_a_speed() -> None:
+    builder = DiagramBuilder("d")
+    traj, wanted = builder.add("traj", JTraj()), builder.add("wanted", Step())
+    builder.add("error", Sum(signs="+-"), wanted, traj["qd"])
+    builder.add("both", Mux(), wanted, traj["qd"])
+    clock, load = builder.add("clock", Clock()), builder.add("load", Step())
+    builder.add("mixed", Sum(signs="+++"), load, traj["q"], clock)
+    units = {slot.name: slot.unit for slot in trace_diagram(builder.build()).signals_layout}
+    assert units["wanted/y"] == units["error/y"] == units["both/y"] == "rad/s"
+    assert units["load/y"] == units["mixed/y"] == ""
+
+
 @pytest.mark.parametrize(
     ("unit", "rate"), [("m", "m/s"), ("m/s", "m/s2"), ("rad/s2", "rad/s3"), ("", ""), ("N m", "N m/s")]
 )

@@ -1,4 +1,10 @@
-"""All kinds of blocks, by family. ``BLOCKS`` is the library of every class that a family's file defines."""
+"""All kinds of blocks. ``BLOCKS`` is the library of every class that a file of this package defines.
+
+A new file stands in the list of modules below, in the order in which blocks are listed, and its classes in
+the imports and in ``__all__``. These names are written out because type checkers and editors only know what
+a text says: a list made from ``BLOCKS`` would leave ``from armblocks.blocks import Gain`` unknown to them.
+``tests/contracts`` holds both lists against each other.
+"""
 
 from types import ModuleType
 

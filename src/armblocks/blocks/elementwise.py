@@ -24,3 +24,8 @@ def common_unit(units: Mapping[str, str]) -> str:
     """The unit that all have, or ``""``."""
     found = set(units.values())
     return found.pop() if len(found) == 1 else ""
+
+
+def unit_of_terms(units: Mapping[str, str]) -> Mapping[str, str]:
+    """The unit of each of some quantities that are added, compared or chosen from: that of the others."""
+    return dict.fromkeys(units, common_unit({name: unit for name, unit in units.items() if unit}))

@@ -13,7 +13,7 @@ import casadi
 from casadi import SX, atan2, if_else, mtimes
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.elementwise import common_unit, numbered_ports
+from armblocks.blocks.elementwise import common_unit, numbered_ports, unit_of_terms
 from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
@@ -111,6 +111,9 @@ class Sum(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the sum"),)
+
+    def input_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return unit_of_terms(inputs)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}

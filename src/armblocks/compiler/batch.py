@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import load_rows, store_rows
 from armblocks.compiler.layout import BatchLayout, Layout
-from armblocks.compiler.llvm_ir import Inputs, Registers, emit_operations
 from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.tape import Tape
+from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 
 __all__ = ["BatchLayout", "Layout", "emit_batch"]
 

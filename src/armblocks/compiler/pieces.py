@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body, Module
-from armblocks.compiler.llvm_ir import Inputs, Registers, emit_operations
 from armblocks.compiler.opcodes import ELEMENTARY
 from armblocks.compiler.tape import Tape
+from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 
 LONGEST = 2600
 """Weight of a function that is left in one piece."""

@@ -254,6 +254,10 @@ class Block(ABC):
         """SI units of outputs that follow from the inputs' units; a port's own unit is the default."""
         return {}
 
+    def input_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        """SI units of inputs that follow from those of the other inputs, as of the terms of a sum."""
+        return {}
+
     def views(self) -> tuple[View, ...]:
         """The pictures that this block asks for: sinks have one or more."""
         return ()

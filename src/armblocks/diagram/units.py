@@ -24,12 +24,15 @@ def infer_units(diagram: Diagram) -> Mapping[PortRef, str]:
     while queue:
         name = queue.popleft()
         block = diagram.blocks[name]
-        given = {port.name: units[drivers[PortRef(name, port.name)]] for port in block.input_ports()}
-        for port, unit in block.output_units(given).items():
+        sources = {port.name: drivers[PortRef(name, port.name)] for port in block.input_ports()}
+        given = {port: units[source] for port, source in sources.items()}
+        found = [(PortRef(name, port), unit) for port, unit in block.output_units(given).items()]
+        found += [(sources[port], unit) for port, unit in block.input_units(given).items()]
+        for port, unit in found:
             # A unit once known stays, so this ends.
-            if unit and not units[PortRef(name, port)]:
-                units[PortRef(name, port)] = unit
-                queue.extend(consumers[name])
+            if unit and not units[port]:
+                units[port] = unit
+                queue.extend(consumers[port.block])
     return units
 
 
