@@ -30,7 +30,7 @@ def show(
     import armblocks as ab
     from armblocks.cli.show_diagram import print_flat, print_hierarchy
     from armblocks.formats import DocumentKind, kind_of_document
-    from armblocks.robot import warn_of_inertias
+    from armblocks.robot import warn_of_doubts, warn_of_inertias
 
     console = results_console()
     match kind_of_document(model):
@@ -46,6 +46,7 @@ def show(
     described = ab.load_robot(model, name=name).robot
     # Loading a shipped robot is silent about what is known of it; here it belongs to what is shown.
     warn_of_inertias(described)
+    warn_of_doubts(described)
     print_robot(described, console)
 
 

@@ -43,7 +43,14 @@ from armblocks.diagram.port import (
 from armblocks.diagram.sampling import sample_time_parameter
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.shapes import DiagramShapes, infer_shapes
-from armblocks.diagram.structure import DiagramBlock, Inport, Outport, Subsystem, block_count
+from armblocks.diagram.structure import (
+    DiagramBlock,
+    Inport,
+    Outport,
+    Subsystem,
+    block_count,
+    check_block_count,
+)
 from armblocks.diagram.time_table import TimeTable
 from armblocks.diagram.trace import trace_diagram
 from armblocks.diagram.units import infer_units, integral_unit, rate_unit
@@ -108,6 +115,7 @@ __all__ = [
     "block_count",
     "block_equations",
     "broadcast",
+    "check_block_count",
     "check_block_name",
     "check_diagram",
     "content_key",

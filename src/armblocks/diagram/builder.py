@@ -14,7 +14,14 @@ from armblocks.diagram.mask import ParameterFormula, checked_mask, formula, mask
 from armblocks.diagram.names import check_block_name, folded
 from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
-from armblocks.diagram.structure import Inport, Outport, Subsystem
+from armblocks.diagram.structure import (
+    DiagramBlock,
+    Inport,
+    Outport,
+    Subsystem,
+    block_count,
+    check_block_count,
+)
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, UnknownNameError
 
@@ -82,6 +89,7 @@ class DiagramBuilder:
         self.settings = settings or SimulationOptions()
         self._extras = dict(extras or {})
         self._blocks: dict[str, Block] = {}
+        self._count = 0  # of blocks, those inside subsystems included
         self._ports: dict[str, tuple[dict[str, None], dict[str, None]]] = {}  # names of inputs, of outputs
         self._taken: dict[str, str] = {}
         self._wires: dict[PortRef, PortRef] = {}
@@ -133,6 +141,8 @@ class DiagramBuilder:
                 allowed="every name once",
                 fix="rename one of them",
             )
+        self._count += 1 + (block_count(block.diagram) if isinstance(block, DiagramBlock) else 0)
+        check_block_count(self._count, where)
         block = block_in_scope(name, block, self._mask_values)
         ports = block.input_ports()
         if len(inputs) > len(ports):

@@ -24,6 +24,10 @@ from armblocks.diagram.port import Port, PortRef
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
 
+MOST_BLOCKS = 100_000
+"""Blocks of a diagram, those inside subsystems included; to trace that many takes minutes."""
+
+
 ANY = -1.0
 """The dimensions of a port that takes whatever is connected."""
 
@@ -226,6 +230,17 @@ def block_count(diagram: Diagram) -> int:
             for block in diagram.blocks.values()
         ),
     )
+
+
+def check_block_count(count: int, where: str) -> None:
+    """Raise ``DiagramError`` for more blocks, those inside subsystems included, than a diagram may have."""
+    if count > MOST_BLOCKS:
+        raise DiagramError(
+            f"the diagram has {count} blocks, those inside subsystems included",
+            where=where,
+            allowed=f"at most {MOST_BLOCKS}",
+            fix="give blocks vectors: one Gain of 1000 elements does what 1000 blocks do",
+        )
 
 
 def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:

@@ -56,6 +56,7 @@ from armblocks.diagram import (
     PortRef,
     TimeTable,
     UserFunction,
+    check_block_count,
     formula,
 )
 from armblocks.equations import SimulationOptions
@@ -324,6 +325,8 @@ class _Reader:
         members = _split(node, known, extras, "")
         settings = _settings(members["settings"], extras) if "settings" in members else SimulationOptions()
         block_nodes = members["blocks"].members() if "blocks" in members else {}
+        with _located(node):
+            check_block_count(len(block_nodes), "")  # before time is spent on reading them
         blocks = {key: self._block(key, entry, extras) for key, entry in block_nodes.items()}
         layout = _Layout()
         for key, entry in (members["layout"].members() if "layout" in members else {}).items():

@@ -13,7 +13,7 @@ from armblocks.files import read_bounded
 from armblocks.formats.matlab_script import MATLAB_SCRIPT
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.robot_json import ROBOT_JSON
-from armblocks.robot import FrictionModel, Robot, warn_of_inertias
+from armblocks.robot import FrictionModel, Robot, warn_of_doubts, warn_of_inertias
 
 ROBOT_FORMATS: tuple[RobotFormat, ...] = (ROBOT_JSON, MATLAB_SCRIPT)
 """Every format of robot files. A new one is one file with a ``RobotFormat``, and its name here."""
@@ -39,14 +39,15 @@ def load_robot(
 
     Raises ``UnknownNameError`` for a name that is not shipped and for a ``name`` that the file does not hold,
     ``FormatError`` for a file that is missing, of no known format or not understood. Warns
-    (``InertiaWarning``) of inertias in a user's file that no body can have; the shipped robots' are told by
-    ``armblocks show``.
+    (``InertiaWarning``) of inertias in a user's file that no body can have, and of numbers that look like
+    another unit or sign; those of the shipped robots are told by ``armblocks show``.
     """
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or is_path(text):
         robot = _pick(_read_file(Path(text)), text, name)
         robot = replace(robot, source=text)
         warn_of_inertias(robot)
+        warn_of_doubts(robot)
     else:
         robot = shipped_robot(text)
         if name is not None:

@@ -20,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from armblocks.diagram import Diagram, block_count
+from armblocks.diagram import Diagram
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.files import read_bounded
 from armblocks.formats.json_document import Node, read_document
@@ -33,8 +33,6 @@ DEEPEST = 320
 """Objects and arrays inside each other, as in diagrams."""
 DEEPEST_CHAIN = 40
 """Library blocks inside library blocks."""
-MOST_BLOCKS = 250_000
-"""Blocks that a library block may bring, those inside it included."""
 
 ReadFile = Callable[[Path], bytes]
 """From the resolved path of a library file to its bytes; raises ``FormatError`` for a forbidden one."""
@@ -167,13 +165,6 @@ class Libraries:
         finally:
             self._chain.pop()
         made = replace(made, link=f"{_named(path)}#{name}")
-        if block_count(made) > MOST_BLOCKS:
-            raise FormatError(
-                f"the library block '{name}' brings {block_count(made)} blocks",
-                where=str(path),
-                allowed=f"at most {MOST_BLOCKS}",
-                fix="use fewer library blocks inside it",
-            )
         self._made[key] = made
         return made
 

@@ -5,6 +5,7 @@ from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import JOINT_TYPES, Fixed, Joint, JointLimits, Prismatic, Revolute
 from armblocks.robot.link import Link, Motor, inertia_matrix
 from armblocks.robot.physicality import InertiaFinding, inertia_findings, warn_of_inertias
+from armblocks.robot.plausibility import doubts, warn_of_doubts
 from armblocks.robot.robot import Robot
 
 __all__ = [
@@ -21,11 +22,13 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "Robot",
+    "doubts",
     "inertia_findings",
     "inertia_matrix",
     "link_from_dh",
     "modified_dh",
     "serial_chain",
     "standard_dh",
+    "warn_of_doubts",
     "warn_of_inertias",
 ]

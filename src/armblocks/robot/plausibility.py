@@ -1,0 +1,79 @@
+"""Numbers of a robot that are legal but look like another unit or another sign, told as questions."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+
+from armblocks.errors import ArmblocksWarning
+from armblocks.robot.link import Link
+from armblocks.robot.robot import Robot
+
+LONGEST_REACH = 20.0
+"""m; the largest arms of industry reach 5 m."""
+LARGEST_GYRATION = 3.0
+"""Radius of gyration of a link over the robot's reach; that of a body is less than its size."""
+
+
+def doubts(robot: Robot) -> tuple[str, ...]:
+    """What is probably in another unit, or has the wrong sign; nothing of it makes a robot illegal.
+
+    Limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias that are far
+    too great for the robot's size (millimetres?), gravity that points up.
+    """
+    return tuple(f"robot '{robot.name}'{text}" for text in _doubts(robot))
+
+
+def warn_of_doubts(robot: Robot) -> None:
+    """Warn (ArmblocksWarning) once for every doubt: what loading a robot does."""
+    for text in doubts(robot):
+        warnings.warn(text, ArmblocksWarning, stacklevel=3)
+
+
+def _doubts(robot: Robot) -> Iterator[str]:
+    for link in robot.links:
+        limits = link.joint.limits.position or (0.0, 0.0)
+        if link.joint.turn and not link.joint.slide and max(map(abs, limits)) > 2 * math.pi * (1 + 1e-6):
+            yield (
+                f", link '{link.name}': the joint turns from {limits[0]:g} to {limits[1]:g} rad, more than a "
+                "whole turn. Is this in degrees? It is used as given."
+            )
+    reach = max(_reaches(robot).values())
+    if reach > LONGEST_REACH:
+        yield f": it reaches {reach:g} m. Are its lengths in millimetres? They are used as given."
+    for link in robot.links:
+        moment = float(np.abs(np.linalg.eigvalsh(link.I)).max())
+        if link.mass > 0 and reach > 0 and moment > link.mass * (LARGEST_GYRATION * reach) ** 2:
+            yield (
+                f", link '{link.name}': its inertia of {moment:g} kg m2 is that of {link.mass:g} kg at a "
+                f"distance of {math.sqrt(moment / link.mass):g} m, while the robot reaches {reach:g} m. "
+                "Is it in kg mm2 or kg cm2? It is used as given."
+            )
+    if robot.gravity[2] > 0:
+        yield (
+            f": gravity is {list(robot.gravity)} m/s2, so that bodies fall upwards. Is its sign that of the "
+            "toolbox? Here it is the acceleration of a falling body, [0, 0, -9.81]."
+        )
+
+
+def _reaches(robot: Robot) -> dict[str | None, float]:
+    """How far from the base each link may end, m: the lengths of the links before it, one after the other."""
+    found: dict[str | None, float] = {None: 0.0}
+    waiting = list(robot.links)
+    while waiting:
+        later: list[Link] = []
+        for link in waiting:
+            if link.parent in found:
+                found[link.name] = found[link.parent] + _length(link)
+            else:
+                later.append(link)
+        waiting = later
+    return found
+
+
+def _length(link: Link) -> float:
+    travel = max(map(abs, link.joint.limits.position or (0.0,))) if link.joint.slide else 0.0
+    return math.hypot(*link.before.translation) + math.hypot(*link.after.translation) + travel

@@ -1,0 +1,272 @@
+"""What a diagram or a robot may not be, or is asked about: one message for each case.
+
+The settings of a run and sample times have a table of their own, ``test_run_input``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+import unicodedata
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks import blocks as bl
+from armblocks.diagram import PortRef
+from armblocks.diagram.structure import MOST_BLOCKS
+from armblocks.errors import AlgebraicLoopError, ArmblocksError, ArmblocksWarning, RobotError
+from armblocks.formats import list_robots, load_robot, write_robot
+from armblocks.robot import JointLimits, Link, Motor, Prismatic, Revolute, Robot, doubts
+from armblocks.spatial import transl
+
+MOST_CHARACTERS = 400
+
+
+def message(error: ArmblocksError) -> str:
+    """The text of an error: it says where and what to do, and is short."""
+    assert error.where
+    assert error.fix
+    text = str(error)
+    assert len(text) < MOST_CHARACTERS
+    assert text.isprintable()
+    return text
+
+
+# -- diagrams ------------------------------------------------------------------------------------------------
+
+
+def open_input(builder: ab.DiagramBuilder) -> None:
+    builder.add("x", bl.Integrator())
+
+
+def two_drivers(builder: ab.DiagramBuilder) -> None:
+    x = builder.add("x", bl.Integrator(), builder.add("a", bl.Constant()))
+    builder.connect(builder.add("b", bl.Constant()), x["u"])
+
+
+def dangling_line(builder: ab.DiagramBuilder) -> None:
+    x = builder.add("x", bl.Gain(gain=2.0))
+    builder.connect(PortRef("nowhere", "y"), x["u"])
+
+
+def widths(builder: ab.DiagramBuilder) -> None:
+    two = builder.add("two", bl.Constant(value=[1.0, 2.0]))
+    three = builder.add("three", bl.Constant(value=[1.0, 2.0, 3.0]))
+    builder.add("sum", bl.Sum(signs="++"), two, three)
+
+
+def loop_without_state(builder: ab.DiagramBuilder) -> None:
+    first = builder.add("first", bl.Gain(gain=2.0))
+    second = builder.add("second", bl.Gain(gain=0.5), first)
+    builder.connect(second, first["u"])
+
+
+def named(*names: str) -> Callable[[ab.DiagramBuilder], None]:
+    def build(builder: ab.DiagramBuilder) -> None:
+        for name in names:
+            builder.add(name, bl.Constant())
+
+    return build
+
+
+def code(builder: ab.DiagramBuilder) -> None:
+    builder.add("f", bl.Expression(formula="__import__('os').system('true')"), builder.add("c", bl.Clock()))
+
+
+def deep(builder: ab.DiagramBuilder) -> None:
+    inner = ab.DiagramBuilder("deepest")
+    inner.add("c", bl.Constant())
+    diagram = inner.build()
+    for _ in range(101):
+        outer = ab.DiagramBuilder("level")
+        outer.add("s", bl.Subsystem(diagram=diagram))
+        diagram = outer.draft()
+    builder.add("s", bl.Subsystem(diagram=diagram))
+
+
+def doubled_forever(builder: ab.DiagramBuilder) -> None:
+    """2^60 blocks in 60 subsystems: what holds them is small."""
+    inner = ab.DiagramBuilder("leaf")
+    inner.add("c", bl.Constant())
+    diagram = inner.draft()
+    for _ in range(60):
+        outer = ab.DiagramBuilder("level")
+        outer.add("a", bl.Subsystem(diagram=diagram))
+        outer.add("b", bl.Subsystem(diagram=diagram))
+        diagram = outer.draft()
+    builder.add("s", bl.Subsystem(diagram=diagram))
+
+
+DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
+    ("an unconnected input", open_input, "1 unconnected input: x/u"),
+    ("two drivers", two_drivers, "input 'x/u' has two drivers, 'a/y' and 'b/y'"),
+    ("a dangling line", dangling_line, "there is no block named 'nowhere'"),
+    ("widths that differ", widths, "'u1' has shape (2,) and 'u2' has shape (3,)"),
+    ("a loop without state", loop_without_state, "first/y -> second/y -> first/y"),
+    ("a name that differs by case", named("Motor", "motor"), "'motor': a block is named 'Motor'"),
+    (
+        "a name that differs by accents",
+        named("Gr\u00f6\u00dfe", unicodedata.normalize("NFD", "Gr\u00f6\u00dfe")),
+        "differs only by case or by how accents are encoded",
+    ),
+    ("a name with a slash", named("a/b"), "the block name 'a/b' contains '/'"),
+    ("a name with a line break", named("a\nb"), r"the block name 'a\nb' contains '\n'"),
+    ("a name with a right-to-left mark", named("a\u202eb"), r"contains '\u202e'"),
+    ("a name of 10 000 characters", named("a" * 10_000), "has 10000 characters"),
+    ("an empty name", named(" "), "a block has an empty name"),
+    ("a formula that is code", code, "is no formula"),
+    ("subsystems without end", deep, "subsystems are more than 100 deep"),
+    ("more blocks than there are", doubled_forever, f"Allowed: at most {MOST_BLOCKS}"),
+]
+
+
+@pytest.mark.parametrize(("build", "words"), [case[1:] for case in DIAGRAMS], ids=[c[0] for c in DIAGRAMS])
+def test_a_diagram_that_cannot_be_is_refused_by_one_message(
+    build: Callable[[ab.DiagramBuilder], None], words: str
+) -> None:
+    builder = ab.DiagramBuilder("case")
+    with pytest.raises(ArmblocksError) as refused:
+        build(builder)
+        ab.simulate(builder.build(), stop_time=1.0)
+    assert words in message(refused.value)
+
+
+def test_a_loop_lists_its_chain() -> None:
+    builder = ab.DiagramBuilder("case")
+    loop_without_state(builder)
+    with pytest.raises(AlgebraicLoopError) as refused:
+        ab.simulate(builder.build(), stop_time=1.0)
+    assert sorted(refused.value.loop) == ["first/y", "second/y"]
+
+
+@pytest.mark.parametrize("name", ['"quoted"', "<script>alert(1)", "it's", "\u0645\u062d\u0631\u0643", "a b"])
+def test_other_names_are_names_and_go_to_a_file_and_back(name: str, tmp_path: Path) -> None:
+    builder = ab.DiagramBuilder("case")
+    builder.add("x", bl.Integrator(), builder.add(name, bl.Constant(value=2.0)))
+    path = tmp_path / "case.json"
+    ab.save_diagram(builder.build(), path)
+    assert ab.simulate(ab.load_diagram(path), stop_time=1.0)[name] == pytest.approx(2.0)
+
+
+def test_a_million_blocks_are_refused_while_they_are_built() -> None:
+    builder = ab.DiagramBuilder("case")
+    block = bl.Constant()
+    began = time.perf_counter()
+    with pytest.raises(ArmblocksError) as refused:
+        for k in range(1_000_000):
+            builder.add(f"c{k}", block)
+    assert time.perf_counter() - began < 60.0
+    text = message(refused.value)
+    assert f"case': the diagram has {MOST_BLOCKS + 1} blocks" in text
+    assert "give blocks vectors" in text
+
+
+def test_a_file_of_very_many_blocks_is_refused(tmp_path: Path) -> None:
+    blocks: dict[str, Any] = {f"c{k}": {"type": "Ground"} for k in range(MOST_BLOCKS + 1)}
+    path = tmp_path / "case.json"
+    path.write_text(json.dumps({"format": 1, "name": "case", "blocks": blocks}), encoding="utf-8")
+    with pytest.raises(ArmblocksError) as refused:
+        ab.load_diagram(path)
+    assert f"at most {MOST_BLOCKS}" in message(refused.value)
+
+
+def test_a_library_that_leads_to_itself_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    linked = {"s": {"type": "Subsystem", "library": "circle.json#a"}}
+    (tmp_path / "circle.json").write_text(
+        json.dumps({"format": 1, "library": {"a": {"blocks": linked}}}), encoding="utf-8"
+    )
+    (tmp_path / "case.json").write_text(
+        json.dumps({"format": 1, "name": "case", "blocks": linked}), encoding="utf-8"
+    )
+    with pytest.raises(ArmblocksError) as refused:
+        ab.load_diagram("case.json")
+    assert "library blocks that do not hold themselves" in message(refused.value)
+
+
+# -- robots --------------------------------------------------------------------------------------------------
+
+
+def arm(*, joint: Any = None, length: float = 1.0, motor: Motor | None = None, **fields: Any) -> Robot:
+    """A bar of 1 kg on one joint."""
+    inertia = fields.pop("inertia", (0.0, 0.1, 0.1))
+    link = Link(
+        name="bar",
+        joint=joint or Revolute(),
+        after=transl(length, 0, 0),
+        mass=1.0,
+        inertia=inertia,
+        motor=motor,
+    )
+    return Robot(name="arm", links=(link,), **fields)
+
+
+def limited(low: float, high: float, kind: Any = Revolute) -> Any:
+    return kind(limits=JointLimits(position=(low, high)))
+
+
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"motor": Motor(gear_ratio=0.0)}, "the gear ratio is 0, so the motor cannot move the joint"),
+    ({"joint": limited(1.0, -1.0)}, "the position limits are reversed: from 1 to -1 rad"),
+    ({"gravity": (0.0, 0.0, math.nan)}, "gravity is nan"),
+]
+
+
+@pytest.mark.parametrize(("fields", "words"), REFUSED, ids=["gear 0", "qlim reversed", "gravity nan"])
+def test_a_robot_that_cannot_be_is_refused_by_one_message(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(RobotError) as refused:
+        arm(**fields)
+    assert words in message(refused.value)
+
+
+def test_a_motor_without_a_gear_has_the_ratio_1() -> None:
+    assert Motor(inertia=0.5).gear_ratio == 1.0
+    assert arm().gear_ratios.tolist() == [1.0]
+
+
+def test_negative_viscous_friction_is_warned_of_as_a_source_of_energy() -> None:
+    with pytest.warns(ArmblocksWarning, match="friction drives the joint instead of holding it"):
+        arm(motor=Motor(viscous_friction=-0.1))
+
+
+DOUBTFUL: list[tuple[dict[str, Any], str]] = [
+    ({"joint": limited(-180.0, 180.0)}, "link 'bar': the joint turns from -180 to 180 rad"),
+    ({"length": 450.0}, "it reaches 450 m. Are its lengths in millimetres?"),
+    ({"joint": limited(0.0, 800.0, Prismatic)}, "Are its lengths in millimetres?"),
+    ({"inertia": (0.0, 1e5, 1e5)}, "that of 1 kg at a distance of 316.228 m, while the robot reaches 1 m"),
+    ({"gravity": (0.0, 0.0, 9.81)}, "so that bodies fall upwards. Is its sign that of the toolbox?"),
+]
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    DOUBTFUL,
+    ids=["degrees", "millimetres", "millimetres of travel", "kg mm2", "gravity up"],
+)
+def test_what_looks_like_another_unit_or_sign_is_asked_about(
+    fields: dict[str, Any], words: str, tmp_path: Path
+) -> None:
+    (text,) = doubts(arm(**fields))
+    assert words in text
+    assert len(text) < MOST_CHARACTERS
+    (tmp_path / "arm.json").write_bytes(write_robot(arm(**fields)))
+    with pytest.warns(ArmblocksWarning) as caught:
+        load_robot(str(tmp_path / "arm.json"))
+    assert text in [str(one.message) for one in caught]
+
+
+def test_sound_robots_raise_no_doubts() -> None:
+    assert doubts(arm(joint=limited(-2 * math.pi, 2 * math.pi))) == ()
+    assert doubts(arm(length=5.0, gravity=(0.0, 0.0, -1.62))) == ()
+    assert doubts(arm(gravity=np.zeros(3))) == ()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name in list_robots():
+            assert doubts(load_robot(name)) == ()
