@@ -25,6 +25,19 @@ def test_a_long_run_tells_how_long_the_rest_takes(
     assert f"t = 1 s, 3 x real time, {told}" in text.getvalue()
 
 
+@pytest.mark.parametrize(("factor", "told"), [(0.00612, "0.00612"), (3.0, "3"), (123456.0, "123,456")])
+def test_a_run_slower_than_real_time_says_how_slow(
+    factor: float, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    text = io.StringIO()
+    with RunProgress("model", Console(file=text, width=200)) as progress:
+        now[0] += 60.0
+        progress(1.0, 0.5, factor)
+    assert f"t = 1 s, {told} x real time" in text.getvalue()
+
+
 def test_a_run_that_is_nearly_done_tells_no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])

@@ -48,7 +48,7 @@ class RunProgress:
 
     def __call__(self, simulated: float, fraction: float, real_time_factor: float) -> None:
         reached = f"{simulated:,.0f}" if simulated >= 1000 else f"{simulated:.4g}"
-        where = f"t = {reached} s, {real_time_factor:,.0f} x real time"
+        where = f"t = {reached} s, {factor_text(real_time_factor)} x real time"
         now = time.perf_counter()
         left = (now - self._began) * (1.0 / fraction - 1.0) if fraction > 0.0 else 0.0
         if left >= _WORTH_TELLING:
@@ -65,3 +65,8 @@ def _duration(seconds: float) -> str:
     if seconds < 100.0:
         return f"about {seconds:.0f} s"
     return f"about {seconds / 60.0:.0f} min" if seconds < 6000.0 else f"about {seconds / 3600.0:.1f} h"
+
+
+def factor_text(factor: float) -> str:
+    """A real-time factor with three digits and no exponent."""
+    return f"{factor:,.0f}" if factor >= 100 else f"{factor:.3g}"

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from armblocks.cli.progress import factor_text
 from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind, diagram_views
 from armblocks.report.analysis import JointSummary, LimitKind, people_unit, summarise
@@ -40,11 +41,6 @@ def print_run(result: SimulationResult, console: Console) -> None:
         console.print(Text.assemble(("incomplete: ", WARNING), run.message))
     elif run.message:
         console.print(Text.assemble(("note: ", WARNING), run.message))
-
-
-def factor_text(factor: float) -> str:
-    """A real-time factor with three digits and no exponent."""
-    return f"{factor:,.0f}" if factor >= 100 else f"{factor:.3g}"
 
 
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:

@@ -43,10 +43,13 @@ def _received(pipe: Connection) -> bytes:
     except EOFError:
         said = b""
     if not said:
-        fix = "shorten the run, or use 'armblocks run'"
-        raise SimulationError("the report could not be made in the time and memory it may have", fix=fix)
+        raise SimulationError(
+            "the report could not be made in the time and memory it may have",
+            where="report",
+            fix="shorten the run, or use 'armblocks run'",
+        )
     if said[:1] == b"E":
-        raise SimulationError(said[1:].decode(), where="report")
+        raise SimulationError(said[1:].decode(), where="report", fix="mend that, and run the model again")
     return said[1:]
 
 
