@@ -49,7 +49,9 @@ def _received(pipe: Connection) -> bytes:
             fix="shorten the run, or use 'armblocks run'",
         )
     if said[:1] == b"E":
-        raise SimulationError(said[1:].decode(), where="report", fix="mend that, and run the model again")
+        raise SimulationError(
+            said[1:].decode(), where="report", fix="shorten the run, or use 'armblocks run'"
+        )
     return said[1:]
 
 
