@@ -1,0 +1,26 @@
+"""What the studio says where the process that writes a report has failed."""
+
+from __future__ import annotations
+
+from multiprocessing import Pipe
+
+import pytest
+
+from armblocks.errors import SimulationError
+from armblocks.studio import run_report
+
+WAY_OUT = "shorten the run, or use 'armblocks run'"
+
+
+@pytest.mark.parametrize(
+    ("sent", "what"),
+    [(b"", "the report could not be made in the time and memory it may have"), (b"Eno room", "no room")],
+)
+def test_a_report_that_failed_says_why_and_what_to_do(sent: bytes, what: str) -> None:
+    ours, theirs = Pipe(duplex=False)
+    if sent:
+        theirs.send_bytes(sent)
+    theirs.close()
+    with pytest.raises(SimulationError) as failed:
+        run_report._received(ours)
+    assert (failed.value.what, failed.value.where, failed.value.fix) == (what, "report", WAY_OUT)
