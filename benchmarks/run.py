@@ -1,6 +1,7 @@
 """Run every measure beside the peers and write RESULTS.md.
 
-    python benchmarks/run.py [--quick] [--only dynamics,diagram,simulations,multirate,growth,stiff,startup]
+    python benchmarks/run.py [--quick]
+        [--only dynamics,diagram,simulations,multirate,growth,stiff,startup,studio]
 
 Needs the ``test`` and ``benchmark`` extras (Pinocchio, Drake, bdsim, PathSim; the latter two in an
 environment of their own if you like, see `python_peers.py`). Peers and armblocks run in turn, in one run.
@@ -22,6 +23,7 @@ import stiff
 from measure import machine_lines, reachable_peak
 
 import dynamics
+import studio
 
 HERE = Path(__file__).parent
 KERNELS = ("fkine", "jacob0", "rne", "inertia", "gravload", "coriolis", "accel")
@@ -184,6 +186,7 @@ PARTS = {
     "growth": growth_part,
     "stiff": stiff.stiff_part,
     "startup": startup_part,
+    "studio": studio.studio_part,
 }
 
 

@@ -15,7 +15,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
   const stride = useRuns((s) => s.runs.at(-1)?.stride ?? 1)
   const handle = useRef<PlotHandle>(null)
-  const names = shortened(traces.map(({ label }) => label))
+  const { stem, names } = shortened(traces.map(({ label }) => label))
   const figure = () => handle.current?.figure()
   const toggle = (key: string) =>
     setHidden((now) => {
@@ -28,9 +28,10 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
       <figcaption>
         <b>{title}</b>
         <span className="legend">
+          {!path && stem && <span className="stem">{stem}</span>}
           {!path &&
             traces.map(({ key, label, tone, dash }, k) => (
-              <button key={key} type="button" aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
+              <button key={key} type="button" aria-label={label} aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
                 <svg width="16" height="4" aria-hidden>
                   <line x1="0" x2="16" y1="2" y2="2" stroke={`var(--${tone})`} strokeWidth="2.5" strokeDasharray={dash.join(' ')} />
                 </svg>
@@ -59,9 +60,9 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
   )
 }
 
-/** The elements of one signal by their numbers alone, the first with the name of the signal. */
-function shortened(labels: string[]): string[] {
+/** The elements of one signal by their numbers alone, after the name of the signal. */
+function shortened(labels: string[]): { stem: string; names: string[] } {
   const stem = labels[0]?.match(/^(.*) 1$/)?.[1]
-  if (!stem || labels.length < 2 || !labels.every((label, k) => label === `${stem} ${k + 1}`)) return labels
-  return labels.map((label, k) => (k ? String(k + 1) : label))
+  if (!stem || labels.length < 2 || !labels.every((label, k) => label === `${stem} ${k + 1}`)) return { stem: '', names: labels }
+  return { stem, names: labels.map((_, k) => String(k + 1)) }
 }

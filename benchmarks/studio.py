@@ -1,0 +1,417 @@
+"""The studio as its user meets it: a real server, and a real browser without a screen.
+
+What is measured: from the command to a page with its model; from Ctrl+Enter to the first samples on the
+screen and to all of them; loading and editing 1000 blocks; typing while 16 channels arrive at 10
+kHz; what the first page weighs; and 20 sessions on one server. Instants inside the page are taken by the page
+itself.
+
+Chromium draws here with its software renderer, on the same cores that simulate.
+"""
+
+# pyright: basic
+from __future__ import annotations
+
+import asyncio
+import gzip
+import json
+import os
+import re
+import shutil
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import websockets
+from playwright.sync_api import Browser, Page, sync_playwright
+
+import armblocks as ab
+from armblocks import blocks as kinds
+
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+SESSIONS = 20
+CHANNELS, RATE, SECONDS = 16, 10_000, 5.0
+BLOCKS = 1000
+HEAR = """
+window.heard = []
+const hear = (event) => {
+    const binary = event.data instanceof ArrayBuffer
+    const length = binary ? new DataView(event.data).getUint32(0, true) : 0
+    const text = binary ? new TextDecoder().decode(new Uint8Array(event.data, 4, length)) : event.data
+    const { kind = 'samples', state, count } = JSON.parse(text)
+    heard.push({ at: performance.now(), kind, state, count })
+}
+window.WebSocket = class extends WebSocket {
+    constructor(...given) { super(...given); this.addEventListener('message', hear) }
+    send(data) { heard.push({ at: performance.now(), kind: 'sent' }); super.send(data) }
+}
+"""
+DRAWN = """() => new Promise((done) =>
+    requestAnimationFrame(() => requestAnimationFrame(() => done(performance.now()))))"""
+FIRST_AND_LAST = """() => new Promise((done) => {
+    const from = performance.now()
+    heard.length = 0
+    let first = 0
+    const look = () => {
+        if (!first && heard.some((one) => one.kind === 'samples')) first = performance.now()
+        const ended = heard.some(({ state }) => state === 'done' || state === 'failed')
+        if (first && ended) requestAnimationFrame(() => done([first - from, performance.now() - from]))
+        else requestAnimationFrame(look)
+    }
+    requestAnimationFrame(look)
+    dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter', ctrlKey: true }))
+})"""
+
+
+@contextmanager
+def served(folder: str, model: str) -> Iterator[tuple[str, float]]:
+    """The login link of a studio, and the seconds until it was printed."""
+    begin = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "armblocks", "studio", model, "--no-browser", "--folder", folder],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "COLUMNS": "300"},
+    )
+    assert process.stdout is not None
+    try:
+        for line in process.stdout:
+            if found := re.search(r"http://\S+", line):
+                yield found.group(), time.perf_counter() - begin
+                return
+        raise SystemExit("the studio did not start")
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+
+
+@contextmanager
+def page_of(browser: Browser) -> Iterator[Page]:
+    context = browser.new_context(viewport={"width": 1440, "height": 860})
+    page = context.new_page()
+    page.set_default_timeout(120_000)
+    page.add_init_script(HEAR)
+    yield page
+    context.close()
+
+
+@contextmanager
+def opened(browser: Browser, model: str, hear: Callable | None = None) -> Iterator[Page]:
+    """The page of a studio of its own that shows a shipped model; ``hear`` gets every answer."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        served(folder, model) as (link, _),
+        page_of(browser) as page,
+    ):
+        if hear:
+            page.on("response", hear)
+        page.goto(link)
+        page.locator(".react-flow__node").first.wait_for()
+        yield page
+
+
+def start(browser: Browser) -> float:
+    """Seconds from the command to the page that shows its model, with a browser that is open already."""
+    with tempfile.TemporaryDirectory() as folder, page_of(browser) as page:
+        begin = time.perf_counter()
+        with served(folder, "kr180model") as (link, _):
+            page.goto(link, wait_until="commit")
+            page.locator(".react-flow__node").first.wait_for()
+            page.evaluate(DRAWN)
+            return time.perf_counter() - begin
+
+
+def run_times(browser: Browser, repeats: int) -> list[tuple[float, float]]:
+    """Seconds to the first samples on the screen and to all of them, run after run of one page."""
+    with opened(browser, "kr180model") as page:
+        page.locator(".robot canvas").wait_for()
+        found = []
+        for _ in range(repeats + 1):
+            page.wait_for_timeout(1500)  # the next worker gets ready, as between two runs of a user
+            first, last = page.evaluate(FIRST_AND_LAST)
+            found.append((first / 1e3, last / 1e3))
+        return found[1:]
+
+
+def many_blocks(folder: str) -> str:
+    """A model of 1000 blocks in chains of 25, arranged by itself."""
+    builder = ab.DiagramBuilder("thousand")
+    for row in range(BLOCKS // 25):
+        signal_ = builder.add(f"source {row}", kinds.SineWave())
+        for column in range(1, 24):
+            kind = (kinds.Gain, kinds.FirstOrderLag, kinds.Saturation)[column % 3]
+            signal_ = builder.add(f"b {row} {column}", kind(), signal_)
+        builder.add(f"scope {row}", kinds.Terminator(), signal_)
+    ab.save_diagram(builder.build(), Path(folder) / "thousand.json")
+    return "thousand.json"
+
+
+def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[float]]:
+    """Seconds to load 1000 blocks; to an edit's answer; to its picture."""
+    with tempfile.TemporaryDirectory() as folder:
+        model = many_blocks(folder)
+        with served(folder, model) as (link, _), page_of(browser) as page:
+            begin = time.perf_counter()
+            page.goto(link, wait_until="commit")
+            page.wait_for_function(f"document.querySelectorAll('.react-flow__node').length >= {BLOCKS}")
+            page.evaluate(DRAWN)
+            load = time.perf_counter() - begin
+            page.wait_for_timeout(3000)
+            page.locator('.react-flow__node[data-id="b 20 12"]').click()
+            answers, pictures = [], []
+            for k in range(2 * repeats):
+                # A nudge and its undo: one block moves, and the wires at it.
+                key = ["ArrowRight", "Control+z"][k % 2]
+                page.evaluate("heard.length = 0; window.pressed = 0")
+                page.evaluate(
+                    "addEventListener('keydown', (event) => { window.pressed = event.timeStamp }, "
+                    "{ capture: true, once: true })"
+                )
+                page.keyboard.press(key)
+                page.wait_for_function("heard.some(({ kind }) => kind === 'changed')")
+                drawn = page.evaluate(DRAWN)
+                sent, came = page.evaluate(
+                    "['sent', 'changed'].map((wanted) => heard.find(({ kind }) => kind === wanted).at)"
+                )
+                answers.append((came - sent) / 1e3)
+                pictures.append((drawn - page.evaluate("window.pressed")) / 1e3)
+                page.wait_for_timeout(300)
+            return load, answers, pictures
+
+
+def live(browser: Browser) -> tuple[int, int, list[float]]:
+    """Samples that came, samples expected, and seconds from keys to the next picture while they came."""
+    builder = ab.DiagramBuilder(
+        "live", settings=ab.SimulationOptions(stop_time=SECONDS, solver="rk4", sample_time=1 / RATE)
+    )
+    sines = [
+        builder.add(f"sine {k}", kinds.SineWave(frequency=2.0 + k, phase=0.2 * k)) for k in range(CHANNELS)
+    ]
+    builder.add("scope", kinds.Scope(inputs=CHANNELS), *sines)
+    with tempfile.TemporaryDirectory() as folder:
+        ab.save_diagram(builder.build(), Path(folder) / "live.json")
+        with served(folder, "live.json") as (link, _), page_of(browser) as page:
+            page.goto(link)
+            page.locator(".react-flow__node").first.wait_for()
+            page.wait_for_timeout(1500)
+            page.evaluate(
+                "window.latency = []; new PerformanceObserver((list) => latency.push(...list.getEntries()))"
+                ".observe({ type: 'event', durationThreshold: 16 })"
+            )
+            page.get_by_role("combobox", name="Speed").click()
+            page.get_by_role("option", name="1 × real time", exact=True).click()
+            page.evaluate("heard.length = 0")
+            page.keyboard.press("Control+Enter")
+            page.wait_for_function("heard.some(({ kind }) => kind === 'samples')")
+            page.evaluate("latency.length = 0")
+            field = page.get_by_role("textbox", name="Search the library")
+            field.click()
+            typed = 0
+            while not page.evaluate("heard.some(({ state }) => state === 'done' || state === 'failed')"):
+                page.keyboard.type("abcdefgh"[typed % 8])
+                typed += 1
+                page.wait_for_timeout(150)
+            came = page.evaluate("heard.reduce((sum, { count = 0 }) => sum + count, 0)")
+            # A key's event is listed from 16 ms on: what is not listed was quicker.
+            keys = "latency.filter(({ name }) => name === 'keydown').map(({ duration }) => duration)"
+            slow = page.evaluate(keys)
+            found = [duration / 1e3 for duration in slow]
+            return came, round(SECONDS * RATE) + 1, found + [0.016] * (typed - len(found))
+
+
+def download(browser: Browser) -> tuple[float, float, float, dict[str, float]]:
+    """kB, compressed: what the first page needs, its fonts, what comes later for 3-D; the largest."""
+    weights: dict[str, float] = {}
+
+    def weigh(answer) -> None:
+        if answer.status == 200:
+            name = urlsplit(answer.url).path.rsplit("/", 1)[1] or "index.html"
+            weights[name] = len(gzip.compress(answer.body(), 9)) / 1000
+
+    with opened(browser, "kr180model", weigh) as page:
+        page.locator(".robot canvas").wait_for()
+        page.wait_for_timeout(1000)
+    html = (Path(ab.__file__).parent / "studio" / "web" / "index.html").read_text(encoding="utf-8")
+    fonts = sum(size for name, size in weights.items() if name.endswith("woff2"))
+    first = sum(size for name, size in weights.items() if name in html or name == "index.html")
+    later = sum(weights.values()) - first - fonts
+    return first, fonts, later, dict(sorted(weights.items(), key=lambda one: -one[1])[:6])
+
+
+async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: list[float]) -> None:
+    """One user: opens a model of its own, runs it at real time, and edits all the while."""
+    async with websockets.connect(
+        uri, additional_headers={"Cookie": cookie}, origin=origin, max_size=None
+    ) as socket:
+        numbers = iter(range(1, 10**6))
+        asked: dict[int, tuple[float, asyncio.Future]] = {}
+        document: dict[str, object] = {}
+        over = asyncio.Event()
+
+        async def listen() -> None:
+            async for message in socket:
+                if isinstance(message, bytes):
+                    continue
+                said = json.loads(message)
+                if said["kind"] == "reply":
+                    begin, answer = asked.pop(said["number"])
+                    if said.get("fault"):
+                        answer.set_exception(RuntimeError(said["fault"]["what"]))
+                    else:
+                        answer.set_result(time.perf_counter() - begin)
+                elif said["kind"] in ("opened", "changed"):
+                    document.update(said["state"])
+                elif said["kind"] == "run_progress" and said["state"] in ("done", "failed", "stopped"):
+                    ended.append(said["state"])
+                    over.set()
+
+        async def ask(request: dict[str, object]) -> float:
+            number = next(numbers)
+            asked[number] = (time.perf_counter(), asyncio.get_running_loop().create_future())
+            await socket.send(json.dumps({"number": number, "request": request}))
+            return await asked[number][1]
+
+        listening = asyncio.create_task(listen())
+        await ask({"kind": "open", "example": "van_der_pol_pid"})
+        await ask({"kind": "run", "document": document["document"], "speed": 5.0})
+        k = 0
+        block = document.get("title")
+        while not over.is_set():
+            k += 1
+            edit = {"kind": "describe", "text": f"{block} {k}"}
+            change = {
+                "kind": "change",
+                "document": document["document"],
+                "base": document["version"],
+                "key": f"{id(socket)}-{k}",
+                "author": f"{id(socket)}",
+                "edit": edit,
+            }
+            waits.append(await ask(change))
+            await asyncio.sleep(0.5)
+        listening.cancel()
+
+
+def sessions() -> tuple[list[str], list[float]]:
+    """How the runs of 20 sessions ended, and seconds of each answer to an edit."""
+    ended: list[str] = []
+    waits: list[float] = []
+
+    async def all_of(uri: str, cookie: str, origin: str) -> None:
+        await asyncio.wait_for(
+            asyncio.gather(*(session(uri, cookie, origin, ended, waits) for _ in range(SESSIONS))), 400
+        )
+
+    with tempfile.TemporaryDirectory() as folder, served(folder, "kr180model") as (link, _):
+        answer = httpx.get(link.partition("#")[0], follow_redirects=False)
+        cookie = answer.headers["set-cookie"].split(";")[0]
+        origin = link.split("/login")[0]
+        asyncio.run(all_of(origin.replace("http", "ws", 1) + "/ws", cookie, origin))
+    return ended, waits
+
+
+def verdict(value: float, target: float) -> str:
+    return "met" if value <= target else "missed"
+
+
+def median_row(what: str, found: list[float], target: float) -> list[str]:
+    middle = statistics.median(found)
+    return [what, f"{middle:.3f} s", f"{min(found):.3f} s", f"{target:g} s", verdict(middle, target)]
+
+
+def studio_part(repeats: int) -> list[str]:
+    path = shutil.which("chromium") or shutil.which("google-chrome")
+    rows: list[list[str]] = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+        few = max(3, repeats // 3)
+        measures: list[Callable[[], list[list[str]]]] = [
+            lambda: [median_row("`armblocks studio` → page usable", [start(browser) for _ in range(few)], 2)],
+            lambda: run_rows(browser, few),
+            lambda: thousand_rows(browser, few),
+            lambda: live_rows(browser),
+            lambda: download_rows(browser),
+        ]
+        for measure in measures:
+            rows += measure()
+            print(*rows[-1], flush=True)
+        browser.close()
+    ended, waits = sessions()
+    good = ended.count("done")
+    rows.append(
+        [
+            f"{SESSIONS} sessions on one server, each running: runs that ended well",
+            f"{good}",
+            "",
+            f"{SESSIONS}",
+            verdict(SESSIONS, good),
+        ]
+    )
+    late = sorted(waits)[int(0.95 * len(waits))]
+    rows.append(
+        [
+            f"the same: an edit answered, 95th percentile of {len(waits)} (largest {max(waits):.3f} s)",
+            f"{late:.3f} s",
+            f"{min(waits):.3f} s",
+            "0.2 s",
+            verdict(late, 0.2),
+        ]
+    )
+    head = ["what", "median", "best", "target", ""]
+    table = ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)]
+    return ["## The studio", "", *table, "", *(__doc__ or "").strip().splitlines()[2:]]
+
+
+def run_rows(browser: Browser, repeats: int) -> list[list[str]]:
+    times = run_times(browser, 2 * repeats)
+    return [
+        median_row("Run on `kr180model`, cached → first samples drawn", [first for first, _ in times], 0.3),
+        median_row("the same → whole 10 s run streamed and drawn", [last for _, last in times], 1.5),
+    ]
+
+
+def thousand_rows(browser: Browser, repeats: int) -> list[list[str]]:
+    load, answers, pictures = thousand(browser, repeats)
+    return [
+        median_row(f"load of a model with {BLOCKS} blocks", [load], 2),
+        median_row(f"an edit with {BLOCKS} blocks answered", answers, 0.05),
+        median_row("the same, from the key to the drawn page", pictures, 0.05),
+    ]
+
+
+def live_rows(browser: Browser) -> list[list[str]]:
+    came, expected, waits = live(browser)
+    what = f"{CHANNELS} channels at {RATE // 1000} kHz live, {SECONDS:g} s"
+    lost = f"{what}: samples lost of {expected:,}"
+    return [
+        [lost, f"{expected - came:,}", "", "0", verdict(expected - came, 0)],
+        median_row(f"the same: key → next picture (largest {max(waits):.3f} s)", waits, 0.1),
+    ]
+
+
+def download_rows(browser: Browser) -> list[list[str]]:
+    first, fonts, later, largest = download(browser)
+    told = ", ".join(f"{re.sub(r'-[^-]{8}(?=[.])', '', name)} {size:.0f}" for name, size in largest.items())
+    whole = first + fonts
+    return [
+        [
+            f"first download: code and styles {first:.0f} kB, fonts {fonts:.0f} kB",
+            f"{whole:.0f} kB",
+            "",
+            "400 kB",
+            verdict(whole, 400),
+        ],
+        [f"later, for 3-D ({told})", f"{later:.0f} kB", "", "", ""],
+    ]
+
+
+if __name__ == "__main__":
+    print("\n".join(studio_part(6)))
