@@ -30,6 +30,7 @@ SOURCES = (
     "package-lock.json",
     "tsconfig.json",
     "vite.config.ts",
+    "vite.notebook.config.ts",
 )
 
 

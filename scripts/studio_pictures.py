@@ -19,12 +19,14 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Locator, Page, sync_playwright
 
+import armblocks as ab
+
 ROOT = Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "docs" / "pictures"
 SCRIPT = ROOT / "tests" / "formats" / "kr180_as_printed.m"
 """The paper's script, as it is printed."""
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-PATIENCE_MS = 60_000
+PATIENCE_MS = 180_000
 MOMENTS = (0, 2.5, 5, 10)
 """Instants of the motion, s, at which the arm is pictured."""
 DROP = """([name, content]) => {
@@ -35,6 +37,15 @@ DROP = """([name, content]) => {
         document.body.dispatchEvent(
             new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: brought })
         )
+}"""
+
+SHOW_WIDGET = """async ([script, state, samples]) => {
+    const file = URL.createObjectURL(new Blob([script], { type: 'text/javascript' }))
+    const { default: widget } = await import(file)
+    const bytes = Uint8Array.from(atob(samples), (letter) => letter.charCodeAt(0))
+    const values = { ...state, _frame: new DataView(bytes.buffer) }
+    const model = { get: (name) => values[name], set: () => {}, on: () => {}, save_changes: () => {} }
+    widget.render({ model, el: document.body.appendChild(document.createElement('div')) })
 }"""
 
 
@@ -69,6 +80,7 @@ def shown(browser: Browser, theme: str, size: tuple[int, int], model: str = "kr1
             reduced_motion="reduce",
         )
         page.set_default_timeout(PATIENCE_MS)
+        page.add_init_script("localStorage.setItem('armblocks-tour-seen', 'yes')")
         page.goto(link)
         page.locator(".react-flow__node").first.wait_for()
         page.locator(".robot canvas").wait_for()
@@ -137,11 +149,18 @@ def script(browser: Browser) -> None:
 
 
 def robot_editor(browser: Browser, theme: str) -> None:
-    """The robot of the model, in its editor, with the view from a corner."""
+    """The robot editor with the Puma, its dynamics, and joints that were moved."""
     with shown(browser, theme, (1440, 860)) as page:
-        page.get_by_role("button", name="Edit this robot").click()
-        page.locator(".robot-editor canvas").wait_for()
-        page.wait_for_timeout(2000)
+        page.get_by_role("button", name="Menu").click()
+        page.get_by_role("menuitem", name="puma560", exact=True).click()
+        editor = page.locator(".robot-editor")
+        editor.get_by_text("Dynamics", exact=True).click()
+        for joint, value in (("link2", "40"), ("link3", "-150"), ("link5", "50")):
+            editor.get_by_role("textbox", name=f"q of {joint} as a number").fill(value)
+        editor.get_by_role("region", name="Jacobian").wait_for()
+        editor.get_by_role("button", name="Show all of the arm").click()
+        page.mouse.move(5, 850)
+        page.wait_for_timeout(3000)
         keep(page, f"robot-editor-{theme}")
 
 
@@ -196,6 +215,25 @@ def scopes(browser: Browser) -> None:
         keep(page.locator(".scopes-panel"), "paper-11-scopes")
 
 
+def notebook(browser: Browser) -> None:
+    """The widget of a run, where a notebook would put it."""
+    diagram = ab.load_diagram("kr180model")
+    widget = ab.run_widget(diagram, ab.simulate(diagram), height=520)
+    state = widget.get_state(("title", "height", "_page", "_shown"))
+    samples = base64.b64encode(widget.get_state("_frame")["_frame"]).decode()
+    with tempfile.TemporaryDirectory() as folder:
+        # A page on disk: the widgets need no server.
+        (Path(folder) / "notebook.html").write_text("<!doctype html><body></body>", encoding="utf-8")
+        page = browser.new_page(viewport={"width": 1160, "height": 560}, device_scale_factor=1.5)
+        page.set_default_timeout(PATIENCE_MS)
+        page.goto((Path(folder) / "notebook.html").as_uri())
+        page.evaluate(SHOW_WIDGET, [str(widget._esm), {**state, "time": 4.5}, samples])
+        page.frame_locator("iframe").locator(".robot canvas").wait_for()
+        page.wait_for_timeout(3000)
+        keep(page, "notebook")
+        page.close()
+
+
 SHOTS: dict[str, Callable[[Browser], None]] = {
     "light": lambda browser: whole(browser, "light"),
     "dark": lambda browser: whole(browser, "dark"),
@@ -207,6 +245,7 @@ SHOTS: dict[str, Callable[[Browser], None]] = {
     "model": model,
     "moments": moments,
     "scopes": scopes,
+    "notebook": notebook,
 }
 
 

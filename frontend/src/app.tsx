@@ -90,7 +90,7 @@ export function App() {
             onReady={arrange}
           />
         </main>
-        <Timeline />
+        <Timeline wires />
       </div>
       <BlockDialog />
       <Configuration />

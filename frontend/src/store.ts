@@ -1,6 +1,7 @@
 import { create } from 'zustand'
 import { Connection, Refusal, type EventOf, type Line, type Request, type ServerEvent } from './connection'
 import { lastShown, remember } from './documents/last_shown'
+import { newKey } from './keys'
 import type {
   BlockType,
   Channel,
@@ -296,11 +297,11 @@ export async function ask<T = unknown>(request: Request): Promise<T | undefined>
 }
 
 /** By what the server tells the edits of this page from those of others. */
-const author = crypto.randomUUID()
+const author = newKey()
 
 /** What goes with everything that changes a drawing: which, what of it this page saw, and a key to do it once. */
 function alteration(document: OpenDocument) {
-  return { document: document.state.document, key: crypto.randomUUID(), base: document.state.version, author }
+  return { document: document.state.document, key: newKey(), base: document.state.version, author }
 }
 
 /** Carry out an edit of the document on the screen; where it is refused the sheet is shown as it is. */

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     )
     from armblocks.simulation import SimulationResult
     from armblocks.spatial import Transform
+    from armblocks.studio.notebook import robot_widget, run_widget
 else:
     __getattr__ = lazy_exports(
         __name__,
@@ -98,6 +99,8 @@ else:
             "load_robot": "armblocks.face.robots",
             "load_table": "armblocks.formats",
             "modified_dh": "armblocks.robot",
+            "robot_widget": "armblocks.studio.notebook",
+            "run_widget": "armblocks.studio.notebook",
             "save_diagram": "armblocks.face.diagrams",
             "save_library": "armblocks.face.diagrams",
             "save_robot": "armblocks.face.robots",
@@ -154,6 +157,8 @@ __all__ = [
     "load_robot",
     "load_table",
     "modified_dh",
+    "robot_widget",
+    "run_widget",
     "save_diagram",
     "save_library",
     "save_robot",

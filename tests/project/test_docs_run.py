@@ -1,7 +1,8 @@
-"""Every Python block of the README and of the pages in docs runs, in order, as a reader would type it."""
+"""Every Python block of the README, and of the pages and notebooks in docs, runs in order, as typed."""
 
 import contextlib
 import io
+import json
 import os
 import re
 import warnings
@@ -12,13 +13,16 @@ import pytest
 from armblocks.errors import InertiaWarning
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("*.ipynb"))]
 BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def python_blocks(page: Path) -> list[tuple[int, str]]:
-    """Line and text of each fenced Python block."""
+    """Line and text of each fenced Python block; place and text of each cell of a notebook."""
     text = page.read_text(encoding="utf-8")
+    if page.suffix == ".ipynb":
+        cells = enumerate(json.loads(text)["cells"], start=1)
+        return [(k, "".join(cell["source"])) for k, cell in cells if cell["cell_type"] == "code"]
     return [(text[: match.start(1)].count("\n") + 1, match.group(1)) for match in BLOCK.finditer(text)]
 
 

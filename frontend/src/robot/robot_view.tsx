@@ -1,11 +1,8 @@
 import { IconEdit } from '@tabler/icons-react'
 import { useCallback, useEffect, useMemo, useState } from 'react'
-import { play, shownTime, useCursor } from '../run/cursor'
-import { samples } from '../samples'
 import { ask, useStudio } from '../store'
+import { RunArm } from './run_arm'
 import { listed, type Poses, type RobotScene } from './scene'
-import { Stage, type Ghosts } from './stage'
-import type { Way } from './tool_path'
 import { Button } from './view_tools'
 
 /** The arm of the first robot block: as the run moves it, or at rest before the first run. */
@@ -51,82 +48,15 @@ interface RunStageProps {
   q: number[]
 }
 
-/** The arm as the samples of the run say it at the time cursor. */
+/** The arm of a block as the run moves it. */
 function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
-  const path = [...inside, block].join('/')
-  const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
-  const has = useStudio((s) => Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)))
-  const poses = useCallback(() => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest, [path, scene.rows, rest])
-  const state = useCallback(() => `${samples.run} ${samples.version} ${shownTime()}`, [])
-  const way = useCallback((): Way | undefined => {
-    const found = poseSignal(path, scene.rows)
-    const last = samples.indexAt(shownTime())
-    if (!found || last < 0) return undefined
-    const tool = 16 * (scene.rows - 1)
-    return {
-      key: `${samples.run} ${samples.version} ${last}`,
-      last,
-      point: (k) => [found[tool + 3]![k]!, found[tool + 7]![k]!, found[tool + 11]![k]!],
-    }
-  }, [path, scene.rows])
-  const ghosts = useMemo<Ghosts>(
-    () => ({
-      // Where the arm itself stands there is no ghost.
-      start: () => (samples.indexAt(shownTime()) > 0 ? posesAt(path, scene.rows, 0) : undefined),
-      goal: () =>
-        useStudio.getState().run?.state === 'done' && samples.indexAt(shownTime()) < samples.count - 1 ? posesAt(path, scene.rows, samples.count - 1) : undefined,
-    }),
-    [path, scene.rows],
-  )
-  const extent = useCallback(() => extentOf(path, scene.rows), [path, scene.rows])
   const drawing = useCallback(
     () => ask<string>({ kind: 'robot_picture', document, inside, block, q, theme: globalThis.document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light' }),
     [document, inside, block, q],
   )
   return (
-    <Stage scene={scene} poses={poses} state={state} way={way} ghosts={ghosts} extent={extent} whole={whole} drawing={drawing} {...(has ? { film: playOnce } : {})}>
+    <RunArm path={[...inside, block].join('/')} scene={scene} rest={rest} drawing={drawing}>
       <Button label="Edit this robot" icon={IconEdit} onClick={() => void ask({ kind: 'robot_of_block', document, inside, block })} />
-    </Stage>
+    </RunArm>
   )
-}
-
-/** The columns of the poses that a run records for a block. */
-function poseSignal(path: string, rows: number): Float64Array[] | undefined {
-  const { run } = useStudio.getState()
-  const view = run?.views.find((one) => one.kind === 'robot' && one.block === path)
-  const found = view && samples.signal(`${path}/${view.signals[0]}`)
-  return found && found.columns.length === 16 * rows ? found.columns : undefined
-}
-
-function posesAt(path: string, rows: number, index: number): Poses | undefined {
-  const found = index < 0 ? undefined : poseSignal(path, rows)
-  return found && index < (found[0]?.length ?? 0) ? (row, k) => found[16 * row + k]![index]! : undefined
-}
-
-const EXTENT_SAMPLES = 60
-
-/** Where the links go in all of the run, at instants spread over it. */
-function extentOf(path: string, rows: number): [number, number, number][] {
-  const found = poseSignal(path, rows)
-  if (!found || !samples.count) return []
-  const points: [number, number, number][] = []
-  const last = samples.count - 1
-  for (let k = 0; k <= EXTENT_SAMPLES; k++) {
-    const index = Math.round((last * k) / EXTENT_SAMPLES)
-    for (let row = 0; row < rows; row++) points.push([3, 7, 11].map((place) => found[16 * row + place]![index]!) as [number, number, number])
-  }
-  return points
-}
-
-/** Play the run from its start; done when it has come to its end, or is held. */
-function playOnce(): Promise<void> {
-  useCursor.setState({ time: samples.time[0] ?? 0, playing: false, loop: false })
-  play()
-  return new Promise((resolve) => {
-    const stop = useCursor.subscribe(({ playing }) => {
-      if (playing) return
-      stop()
-      resolve()
-    })
-  })
 }

@@ -7,8 +7,8 @@ import { hold, play, shownTime, stepCursor, useCursor } from './cursor'
 const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} ×` }))
 const LONG_STEP = 10
 
-/** The time cursor of all views: drag it through the run, or play the run again. */
-export function Timeline() {
+/** The time cursor of all views: drag it through the run, or play the run again; `wires` where there are any. */
+export function Timeline({ wires = false }: { wires?: boolean }) {
   const run = useStudio((s) => s.run)
   const { time, playing, loop, rate } = useCursor()
   const all = useValues((s) => s.all)
@@ -60,11 +60,13 @@ export function Timeline() {
           </Button>
         </Tooltip>
       )}
-      <Tooltip label="Values on all wires" openDelay={400}>
-        <ActionIcon variant={all ? 'light' : 'subtle'} color={all ? 'accent' : 'gray'} aria-label="Values on all wires" aria-pressed={all} onClick={() => useValues.setState({ all: !all })}>
-          <IconTag size={15} />
-        </ActionIcon>
-      </Tooltip>
+      {wires && (
+        <Tooltip label="Values on all wires" openDelay={400}>
+          <ActionIcon variant={all ? 'light' : 'subtle'} color={all ? 'accent' : 'gray'} aria-label="Values on all wires" aria-pressed={all} onClick={() => useValues.setState({ all: !all })}>
+            <IconTag size={15} />
+          </ActionIcon>
+        </Tooltip>
+      )}
       <Text size="sm" className="numbers instant">
         {(run ? shownTime() : 0).toFixed(3)} s
       </Text>

@@ -3,6 +3,7 @@ import { IconArrowBackUp, IconPin, IconPinFilled } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
 import { create } from 'zustand'
 import { valueText } from '../inspector/value_text'
+import { newKey } from '../keys'
 import type { Tunable } from '../protocol'
 import { ask, useStudio } from '../store'
 import { useRuns } from './runs'
@@ -105,7 +106,7 @@ async function keep(): Promise<void> {
   const { tried } = useRuns.getState()
   if (!document) return
   const edit = { kind: 'keep_tuned' as const, values: tried }
-  const done = await ask({ kind: 'change', document: document.state.document, key: crypto.randomUUID(), inside: [], edit })
+  const done = await ask({ kind: 'change', document: document.state.document, key: newKey(), inside: [], edit })
   if (done !== undefined) useRuns.setState({ tried: {} })
 }
 

@@ -10,7 +10,7 @@ import { digits, reading, useUnits, type Reading } from './quantity'
 import { extremes, within, type Drawn, type Extremes, type Trace } from './trace'
 import { pan, shownWindow, useWindow, zoomBy, zoomTo } from './window'
 
-const FONT = '11px Inter Variable'
+const FONT = '11px "Inter Variable", system-ui, sans-serif'
 const GRIP_PX = 6
 const CLICK_PX = 3
 /** From so many samples in a pixel on only the least and the greatest are drawn. */
@@ -265,7 +265,7 @@ function drawLines(plot: uPlot): void {
     ctx.lineTo(x, top + height)
     ctx.stroke()
     if (!label) return
-    ctx.font = `${11 * devicePixelRatio}px Inter Variable`
+    ctx.font = `${11 * devicePixelRatio}px "Inter Variable", system-ui, sans-serif`
     ctx.fillStyle = colour(tone)
     ctx.textAlign = 'left'
     ctx.fillText(label, x + 3 * devicePixelRatio, top + 10 * devicePixelRatio)

@@ -1,5 +1,6 @@
 import { create } from 'zustand'
 import { Refusal, type EventOf } from '../../connection'
+import { newKey } from '../../keys'
 import type { CellColumn, Opening, Readings, RobotTables } from '../../protocol'
 import { ask, line } from '../../store'
 
@@ -96,7 +97,7 @@ export async function edit(change: RobotEdit, gesture = ''): Promise<Refusal | u
   const { current } = useDesk.getState()
   if (!current) return undefined
   try {
-    await line.ask({ kind: 'robot_change', robot: current, key: crypto.randomUUID(), gesture, edit: change })
+    await line.ask({ kind: 'robot_change', robot: current, key: newKey(), gesture, edit: change })
     return undefined
   } catch (error) {
     if (error instanceof Refusal) return error

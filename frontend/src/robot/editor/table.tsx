@@ -1,6 +1,7 @@
 import { Menu, Tooltip } from '@mantine/core'
 import { IconAlertTriangle, IconDotsVertical } from '@tabler/icons-react'
 import { memo, useRef, useState } from 'react'
+import { newKey } from '../../keys'
 import type { CellColumn, LinkRow, RobotFinding } from '../../protocol'
 import { cellText, edit, isAngle, unitOf, useDesk, type Angles, type RobotShown } from './desk'
 
@@ -214,7 +215,7 @@ function TextCell({ label, text, doc, send, marked, wide, onlyAtTheEnd }: TextCe
         autoComplete="off"
         value={typed ?? text}
         onFocus={(event) => {
-          gesture.current = crypto.randomUUID()
+          gesture.current = newKey()
           before.current = text
           setFocused(true)
           event.currentTarget.select()

@@ -1,0 +1,66 @@
+import '../mantine.css'
+import '../tones.css'
+import '../studio.css'
+import '../robot/robot.css'
+import './frame.css'
+import { MantineProvider } from '@mantine/core'
+import { StrictMode } from 'react'
+import { createRoot } from 'react-dom/client'
+import type { Channel, ViewOf } from '../protocol'
+import { RunArm } from '../robot/run_arm'
+import { listed, type RobotScene } from '../robot/scene'
+import { Timeline } from '../run/timeline'
+import { RunSamples, showSamples } from '../samples'
+import { Scopes } from '../scopes/scopes'
+import { useStudio } from '../store'
+import { theme } from '../theme'
+import { shareCursor } from './shared_cursor'
+
+/** What the notebook tells this page: see `studio/notebook.py`. */
+interface Shown {
+  kind: 'show'
+  dark: boolean
+  /** Shared by the views of one result: they have one time cursor. */
+  key: string
+  run: { stopTime: number; channels: Channel[]; views: ViewOf[]; aliases: Record<string, string> } | null
+  frame: ArrayBuffer
+  scopes: boolean
+  arm: { path: string; scene: RobotScene; rest: number[][][]; drawing: string } | null
+}
+
+function show({ dark, key, run, frame, scopes, arm }: Shown): void {
+  if (run) {
+    const made = new RunSamples(key, run.channels, run.aliases)
+    made.receive(frame)
+    made.close()
+    showSamples(made)
+    useStudio.setState({
+      run: { ...run, run: key, state: 'done', time: run.stopTime, realTimeFactor: 0, message: '', fault: null, solver: '', reason: '', tunables: [] },
+    })
+  }
+  root.render(
+    <StrictMode>
+      <MantineProvider theme={theme} forceColorScheme={dark ? 'dark' : 'light'}>
+        <main className="notebook-views">
+          <div className="beside">
+            {run && scopes && <Scopes />}
+            {arm && <RunArm path={arm.path} scene={arm.scene} rest={listed(arm.rest)} drawing={() => Promise.resolve(arm.drawing)} />}
+          </div>
+          {run && <Timeline />}
+        </main>
+      </MantineProvider>
+    </StrictMode>,
+  )
+}
+
+const root = createRoot(document.getElementById('root')!)
+const cursor = shareCursor((time) => parent.postMessage({ kind: 'time', time }, '*'))
+addEventListener('message', ({ source, data }: MessageEvent<Shown | { kind: 'time'; time: number }>) => {
+  if (source !== parent) return
+  if (data.kind === 'time') cursor.show(data.time)
+  else {
+    cursor.join(data.key)
+    show(data)
+  }
+})
+parent.postMessage({ kind: 'ready' }, '*')

@@ -1,0 +1,31 @@
+import { useCursor } from '../run/cursor'
+
+const REST_MS = 150
+
+/**
+ * One time cursor for all views of a result, wherever in the notebook they stand: they tell each other, without a
+ * kernel. `onRest` gets the instant when the cursor has come to rest.
+ */
+export function shareCursor(onRest: (time: number) => void) {
+  let channel: BroadcastChannel | null = null
+  let heard: number | null = null
+  let timer: ReturnType<typeof setTimeout> | undefined
+  useCursor.subscribe(({ time }, before) => {
+    if (time === null || time === before.time || time === heard) return
+    channel?.postMessage(time)
+    clearTimeout(timer)
+    timer = setTimeout(() => onRest(time), REST_MS)
+  })
+  const show = (time: number) => {
+    heard = time
+    useCursor.setState({ time, playing: false })
+  }
+  return {
+    show,
+    join: (key: string) => {
+      channel?.close()
+      channel = new BroadcastChannel(`armblocks ${key}`)
+      channel.onmessage = ({ data }: MessageEvent<number>) => show(data)
+    },
+  }
+}

@@ -1,0 +1,94 @@
+import { useCallback, useMemo } from 'react'
+import { play, shownTime, useCursor } from '../run/cursor'
+import { samples } from '../samples'
+import { useStudio } from '../store'
+import type { Poses, RobotScene } from './scene'
+import { Stage, type Ghosts } from './stage'
+import type { Way } from './tool_path'
+
+interface RunArmProps {
+  /** The block whose recorded poses move the arm. */
+  path: string
+  scene: RobotScene
+  /** Where the arm stands as long as nothing is recorded. */
+  rest: Poses
+  /** The drawing that stands in where there is no WebGL. */
+  drawing: () => Promise<string | undefined>
+  /** Buttons of its own that stand before the others. */
+  children?: React.ReactNode
+}
+
+/** The arm as the samples of the run say it at the time cursor. */
+export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
+  const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
+  const has = useStudio((s) => Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)))
+  const poses = useCallback(() => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest, [path, scene.rows, rest])
+  const state = useCallback(() => `${samples.run} ${samples.version} ${shownTime()}`, [])
+  const way = useCallback((): Way | undefined => {
+    const found = poseSignal(path, scene.rows)
+    const last = samples.indexAt(shownTime())
+    if (!found || last < 0) return undefined
+    const tool = 16 * (scene.rows - 1)
+    return {
+      key: `${samples.run} ${samples.version} ${last}`,
+      last,
+      point: (k) => [found[tool + 3]![k]!, found[tool + 7]![k]!, found[tool + 11]![k]!],
+    }
+  }, [path, scene.rows])
+  const ghosts = useMemo<Ghosts>(
+    () => ({
+      // Where the arm itself stands there is no ghost.
+      start: () => (samples.indexAt(shownTime()) > 0 ? posesAt(path, scene.rows, 0) : undefined),
+      goal: () =>
+        useStudio.getState().run?.state === 'done' && samples.indexAt(shownTime()) < samples.count - 1 ? posesAt(path, scene.rows, samples.count - 1) : undefined,
+    }),
+    [path, scene.rows],
+  )
+  const extent = useCallback(() => extentOf(path, scene.rows), [path, scene.rows])
+  return (
+    <Stage scene={scene} poses={poses} state={state} way={way} ghosts={ghosts} extent={extent} whole={whole} drawing={drawing} {...(has ? { film: playOnce } : {})}>
+      {children}
+    </Stage>
+  )
+}
+
+/** The columns of the poses that a run records for a block. */
+function poseSignal(path: string, rows: number): Float64Array[] | undefined {
+  const { run } = useStudio.getState()
+  const view = run?.views.find((one) => one.kind === 'robot' && one.block === path)
+  const found = view && samples.signal(`${path}/${view.signals[0]}`)
+  return found && found.columns.length === 16 * rows ? found.columns : undefined
+}
+
+function posesAt(path: string, rows: number, index: number): Poses | undefined {
+  const found = index < 0 ? undefined : poseSignal(path, rows)
+  return found && index < (found[0]?.length ?? 0) ? (row, k) => found[16 * row + k]![index]! : undefined
+}
+
+const EXTENT_SAMPLES = 60
+
+/** Where the links go in all of the run, at instants spread over it. */
+function extentOf(path: string, rows: number): [number, number, number][] {
+  const found = poseSignal(path, rows)
+  if (!found || !samples.count) return []
+  const points: [number, number, number][] = []
+  const last = samples.count - 1
+  for (let k = 0; k <= EXTENT_SAMPLES; k++) {
+    const index = Math.round((last * k) / EXTENT_SAMPLES)
+    for (let row = 0; row < rows; row++) points.push([3, 7, 11].map((place) => found[16 * row + place]![index]!) as [number, number, number])
+  }
+  return points
+}
+
+/** Play the run from its start; done when it has come to its end, or is held. */
+function playOnce(): Promise<void> {
+  useCursor.setState({ time: samples.time[0] ?? 0, playing: false, loop: false })
+  play()
+  return new Promise((resolve) => {
+    const stop = useCursor.subscribe(({ playing }) => {
+      if (playing) return
+      stop()
+      resolve()
+    })
+  })
+}

@@ -1,0 +1,16 @@
+import react from '@vitejs/plugin-react'
+import { defineConfig } from 'vite'
+
+/** The views that a notebook shows, as one script and one style sheet: `studio/notebook.py` puts them into a frame. */
+export default defineConfig({
+  plugins: [react()],
+  define: { 'process.env.NODE_ENV': '"production"' },
+  publicDir: false,
+  build: {
+    outDir: `${process.env['ARMBLOCKS_OUT'] ?? '../src/armblocks/studio/web'}/notebook`,
+    emptyOutDir: true,
+    cssCodeSplit: false,
+    lib: { entry: 'src/notebook/frame.tsx', formats: ['iife'], name: 'armblocksFrame', fileName: () => 'frame.js', cssFileName: 'frame' },
+    chunkSizeWarningLimit: 2500,
+  },
+})

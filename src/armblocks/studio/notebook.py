@@ -1,0 +1,156 @@
+"""The studio's views in a notebook: the scopes of a run, and the arm, with one time cursor.
+
+The widgets follow the protocol of anywidget, so Jupyter, VS Code, Colab and marimo show them. Everything that
+they draw with comes along with them; nothing is fetched.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import Diagram, View, ViewKind, diagram_views
+from armblocks.errors import InputError
+from armblocks.face.arm import Arm
+from armblocks.report.arm_picture import arm_picture_svg
+from armblocks.robot import Robot
+from armblocks.simulation import SimulationResult
+from armblocks.studio.frames import sample_frame
+from armblocks.studio.robot_scene import link_frames_of, scene_of
+
+if TYPE_CHECKING:
+    from anywidget import AnyWidget
+
+HEIGHT = 460
+SHOWN = ("scopes", "robot")
+SHOWN_KINDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.ROBOT)
+SCRIPT = Path(__file__).parent / "notebook_widget.js"
+DRAWING_SIZE = (480, 360)
+
+
+def run_widget(
+    diagram: Diagram, result: SimulationResult, *, show: str | None = None, height: int = HEIGHT
+) -> AnyWidget:
+    """What a run of ``diagram`` recorded, as the studio shows it: scopes, the arm, a time cursor.
+
+    ``show`` ``"scopes"`` or ``"robot"`` for one of both; ``height`` in pixels. Widgets of one result share
+    their time cursor; ``widget.time`` (s) reads and moves it. Raises ``InputError`` where there is nothing to
+    show, or anywidget is missing.
+    """
+    if show not in (None, *SHOWN):
+        raise InputError(
+            f"show is {show!r}", where="run_widget", allowed="'scopes', 'robot', or None for both"
+        )
+    views = [(name, view) for name, view in diagram_views(diagram) if view.kind in SHOWN_KINDS]
+    robots = [(name, view.subject) for name, view in views if isinstance(view.subject, Robot)]
+    arm = _arm(*robots[0]) if robots and show != "scopes" else None
+    scopes = show != "robot" and any(view.kind is not ViewKind.ROBOT for _, view in views)
+    if arm is None and not scopes:
+        raise InputError(
+            f"diagram '{diagram.name}' has nothing to show here",
+            where="run_widget",
+            fix="add a Scope, an XY Graph or a Robot Plot",
+        )
+    key, run, frame = _record(views, result)
+    shown = {"key": key, "run": run, "scopes": scopes, "arm": arm}
+    return _widget(f"Run of {diagram.name}", height, shown, frame)
+
+
+def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int = HEIGHT) -> AnyWidget:
+    """An arm at the joint coordinates ``q`` (n,), rad or m (zero where they are not given), to turn around.
+
+    Raises ``InputError`` for a wrong count of coordinates, or where anywidget is missing.
+    """
+    described = robot.robot if isinstance(robot, Arm) else robot
+    shown = {"key": described.name, "run": None, "scopes": False, "arm": _arm("", described, q)}
+    return _widget(f"Robot {described.name}", height, shown, b"")
+
+
+def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
+    at = [0.0] * len(robot.moving_links) if q is None else np.asarray(q, dtype=np.float64).tolist()
+    return {
+        "path": path,
+        "scene": scene_of(robot),
+        "rest": link_frames_of(robot, at),
+        "drawing": arm_picture_svg(robot, at, DRAWING_SIZE),
+    }
+
+
+def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tuple[str, dict[str, Any], bytes]:
+    """Key, description and samples of what the views show, as the page takes them of a run."""
+    wanted = [f"{name}/{signal}" for name, view in views for signal in view.signals]
+    aliases = {name: result.resolve(name) for name in wanted}
+    names = list(dict.fromkeys(aliases.values()))
+    values = [np.asarray(result[name], dtype=np.float64) for name in names]
+    signals = np.concatenate([value.reshape(result.time.size, -1).T for value in values])
+    run = {
+        "stopTime": float(result.time[-1]),
+        "channels": [
+            {"name": name, "shape": list(value.shape[1:]), "unit": result.units.get(name, "")}
+            for name, value in zip(names, values, strict=True)
+        ],
+        "views": [
+            {
+                "block": name,
+                "kind": view.kind.value,
+                "signals": list(view.signals),
+                "labels": list(view.labels),
+                "title": view.title,
+            }
+            for name, view in views
+        ],
+        "aliases": aliases,
+    }
+    # The content says which result it is: the same for all of its widgets, and for no other.
+    key = hashlib.sha256(result.name.encode() + result.time.tobytes() + signals.tobytes()).hexdigest()[:16]
+    return key, run, sample_frame(key, 0, result.time, signals)
+
+
+def _widget(title: str, height: int, shown: dict[str, Any], frame: bytes) -> AnyWidget:
+    return _widget_class()(title=title, height=height, _shown=shown, _frame=frame, _page=_page())
+
+
+@cache
+def _page() -> str:
+    """The frame's page: one document with its script and its styles inside."""
+    from armblocks.studio.server import built_page  # the server's libraries are slow to import
+
+    folder = built_page() / "notebook"
+    script = (folder / "frame.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
+    styles = (folder / "frame.css").read_text(encoding="utf-8").replace("</style", "<\\/style")
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><style>{styles}</style>'
+        f'<body><div id="root"></div><script>{script}</script>'
+    )
+
+
+@cache
+def _widget_class() -> type[AnyWidget]:
+    try:
+        import anywidget
+        import traitlets
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"widgets need the package '{error.name}', which is not installed",
+            where="notebook",
+            fix="pip install 'armblocks[notebook]'",
+        ) from None
+
+    class StudioWidget(anywidget.AnyWidget):
+        """One frame with views of the studio."""
+
+        _esm = SCRIPT
+        _page = traitlets.Unicode().tag(sync=True)
+        _shown = traitlets.Dict().tag(sync=True)
+        _frame = traitlets.Bytes().tag(sync=True)
+        title = traitlets.Unicode().tag(sync=True)
+        height = traitlets.Int().tag(sync=True)
+        time = traitlets.Float(None, allow_none=True).tag(sync=True)
+
+    return StudioWidget

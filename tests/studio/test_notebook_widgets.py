@@ -1,0 +1,137 @@
+"""Widgets of a notebook, shown by the protocol of anywidget in a real browser, without a network."""
+
+from __future__ import annotations
+
+import base64
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, FrameLocator, Page, Route, expect
+
+import armblocks as ab
+from armblocks.errors import InputError
+
+ORIGIN = "http://notebook.test/"
+SHOW = """async ([esm, states]) => {
+    const file = URL.createObjectURL(new Blob([esm], { type: 'text/javascript' }))
+    const { default: widget } = await import(file)
+    window.models = states.map((state) => {
+        const listeners = {}
+        const bytes = Uint8Array.from(atob(state._frame), (letter) => letter.charCodeAt(0))
+        const values = { ...state, _frame: new DataView(bytes.buffer) }
+        const model = {
+            get: (name) => values[name],
+            set: (name, value) => {
+                values[name] = value
+                listeners['change:' + name]?.forEach((listener) => listener())
+            },
+            save_changes: () => { model.saved = values.time },
+            on: (name, listener) => (listeners[name] ??= []).push(listener),
+            off: (name, listener) => { listeners[name] = listeners[name].filter((one) => one !== listener) },
+        }
+        const el = document.body.appendChild(document.createElement('div'))
+        model.close = widget.render({ model, el })
+        return model
+    })
+}"""
+SYNCED = ("title", "height", "time", "_page", "_shown", "_frame")
+
+
+@pytest.fixture(scope="module")
+def notebook(browser: Browser) -> Iterator[Page]:
+    """An empty page whose every request but the first fails, and that must say no error."""
+    page = browser.new_page(viewport={"width": 1280, "height": 1100}, color_scheme="light")
+    page.set_default_timeout(60_000)
+    faults: list[str] = []
+
+    def answer(route: Route) -> None:
+        if route.request.url == ORIGIN:
+            route.fulfill(body="<!doctype html><body></body>", content_type="text/html")
+        else:
+            faults.append(f"asked for {route.request.url}")
+            route.abort()
+
+    def hear(message: ConsoleMessage) -> None:
+        if message.type == "error":
+            faults.append(message.text)
+
+    page.route("http*://**", answer)
+    page.on("console", hear)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    yield page
+    page.close()
+    assert not faults
+
+
+def show(page: Page, *widgets: object) -> list[FrameLocator]:
+    """Render widgets as a notebook does, each in its place under the one before."""
+    states = []
+    for widget in widgets:
+        state = widget.get_state(SYNCED)  # type: ignore[attr-defined]
+        state["_frame"] = base64.b64encode(state["_frame"]).decode()
+        states.append(state)
+    page.goto(ORIGIN)
+    page.evaluate(SHOW, [str(widgets[0]._esm), states])  # type: ignore[attr-defined]
+    return [page.frame_locator("iframe").nth(k) for k in range(len(widgets))]
+
+
+def said(point: np.ndarray) -> str:
+    return "   ".join(f"{axis} {value:.3f}" for axis, value in zip("xyz", point, strict=True)) + " m"
+
+
+def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None:
+    diagram = ab.load_diagram("kr180model")
+    result = ab.simulate(diagram)
+    tool = result["plot/poses"][:, -1, :3, 3]
+    scopes, arm = show(
+        notebook, ab.run_widget(diagram, result, show="scopes"), ab.run_widget(diagram, result, show="robot")
+    )
+    expect(scopes.locator(".chart")).to_have_count(7)
+    expect(scopes.locator(".robot")).to_have_count(0)
+    expect(arm.locator(".chart")).to_have_count(0)
+    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[-1]))
+    slider = scopes.get_by_role("slider", name="Time")
+    slider.focus()
+    slider.press("Home")
+    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[0]))
+    slider.press("ArrowRight")
+    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[1]))
+    notebook.wait_for_function("models[0].saved === 0.01")  # Python reads it, when the cursor rests
+    notebook.evaluate("models[1].set('time', 5)")  # as when Python sets it
+    expect(arm.get_by_label("Position of the tool")).to_have_text(said(tool[500]))
+    inked = """(canvas) => {
+        const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height)
+        return new Set(new Uint32Array(data.buffer)).size
+    }"""
+    assert scopes.locator(".chart canvas").first.evaluate(inked) > 8
+
+
+def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
+    puma = ab.load_robot("puma560")
+    q = [0.1, 0.4, -2.0, 0.3, 0.5, 0.0]
+    (arm,) = show(notebook, ab.robot_widget(puma, q))
+    expect(arm.get_by_label("Position of the tool")).to_have_text(said(puma.fkine(q)[:3, 3]))
+    expect(arm.get_by_role("slider", name="Time")).to_have_count(0)
+    expect(arm.locator(".robot canvas")).to_be_visible()
+
+
+def test_what_cannot_be_shown_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    builder = ab.DiagramBuilder("bare")
+    builder.add("sink", ab.blocks.Terminator(), builder.add("one", ab.blocks.Constant()))
+    bare = builder.build()
+    result = ab.simulate(bare, stop_time=1.0)
+    with pytest.raises(InputError, match=r"diagram 'bare' has nothing to show here"):
+        ab.run_widget(bare, result)
+    with pytest.raises(InputError, match=r"show is 'arms'.*'scopes', 'robot', or None"):
+        ab.run_widget(bare, result, show="arms")
+    with pytest.raises(InputError, match="5 joint coordinates were given"):
+        ab.robot_widget(ab.load_robot("puma560"), [0.0] * 5)
+    from armblocks.studio import notebook
+
+    monkeypatch.setitem(sys.modules, "anywidget", None)
+    notebook._widget_class.cache_clear()
+    with pytest.raises(InputError, match=r"widgets need the package 'anywidget'.*armblocks\[notebook\]"):
+        ab.robot_widget(ab.load_robot("puma560"))
+    notebook._widget_class.cache_clear()
