@@ -98,7 +98,9 @@ def page_of(browser: Browser) -> Iterator[Page]:
     context = browser.new_context(viewport={"width": 1440, "height": 860})
     page = context.new_page()
     page.set_default_timeout(120_000)
-    page.add_init_script(HEAR + "localStorage.setItem('armblocks-tour-seen', 'yes')")
+    page.add_init_script(
+        HEAR + "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
+    )
     yield page
     context.close()
 

@@ -80,7 +80,9 @@ def shown(browser: Browser, theme: str, size: tuple[int, int], model: str = "kr1
             reduced_motion="reduce",
         )
         page.set_default_timeout(PATIENCE_MS)
-        page.add_init_script("localStorage.setItem('armblocks-tour-seen', 'yes')")
+        page.add_init_script(
+            "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
+        )
         page.goto(link)
         page.locator(".react-flow__node").first.wait_for()
         page.locator(".robot canvas").wait_for()

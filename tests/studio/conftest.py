@@ -27,6 +27,8 @@ FLAGS = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
+TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
+"""Nobody is shown around; pages that are no page of the studio (about:blank) have nothing to keep that in."""
 PATIENCE_MS = 60_000
 """A busy machine may take long; nothing here waits when it need not."""
 expect.set_options(timeout=PATIENCE_MS)
@@ -109,7 +111,7 @@ def watched(browser: Browser, link: str) -> Generator[Page]:
     """A page, logged in, that must say no error on its console; it shows the first example."""
     context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
     context.grant_permissions(["clipboard-read", "clipboard-write"])
-    context.add_init_script("localStorage.setItem('armblocks-tour-seen', 'yes')")
+    context.add_init_script(TOUR_SEEN)
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
     faults: list[str] = []
