@@ -23,7 +23,7 @@ def sheet(shared: Page) -> Iterator[Page]:
     """The page of the studio that this file shares, showing a fresh copy of an example."""
     page = shared
     page.keyboard.press("Escape")
-    menu(page, re.compile("^van_der_pol_pid"))
+    menu(page, re.compile("^van_der_pol_pid a van der Pol"))
     expect(page.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(page, "PID")).to_be_visible()
     yield page

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from armblocks.blocks import BLOCKS, Gain
-from armblocks.diagram import Diagram, diagram_views, formula, mask_parameter
+from armblocks.diagram import Diagram, DiagramBlock, diagram_views, formula, mask_parameter
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
 from armblocks.studio.document import Document
@@ -36,7 +36,10 @@ from armblocks.studio.edits import (
     applied,
     summary,
 )
-from armblocks.studio.sheet import placed
+from armblocks.studio.nesting import inside
+from armblocks.studio.outline import find, outline
+from armblocks.studio.placing import placed
+from armblocks.studio.sheet import sheet
 
 NAMES = ["sine", "gain", "scope", "Gain 2", "ä"]
 TYPES = ["SineWave", "Gain", "Scope", "Sum", "JTraj", "Integrator"]
@@ -114,6 +117,9 @@ def test_every_block_of_the_library_can_be_dropped_and_saved() -> None:
         document.edit(AddBlocks(blocks=[NewBlock(name=kind, type=kind, place=Place(x=0, y=0))]))
     assert len(document.diagram.blocks) == len(BLOCKS)
     assert content(document)
+    for name, block in document.diagram.blocks.items():
+        if isinstance(block, DiagramBlock):
+            assert set(sheet(inside(document.diagram, [name])).blocks) == set(block.diagram.blocks)
 
 
 def test_wires_to_ports_that_vanish_go_with_the_edit_and_return_with_undo() -> None:
@@ -298,3 +304,20 @@ def test_a_logged_signal_follows_its_block_and_goes_with_it() -> None:
     wrong = before.replace(b'"connections":', b'"logged": ["PID"], "connections":')
     with pytest.raises(FormatError, match="'PID' is no output"):
         diagram_from_bytes(wrong, "wrong", BLOCKS, load_robot)
+
+
+def test_blocks_are_found_on_all_sheets_by_name_type_and_value() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    document.edit(GroupBlocks(blocks=["PID", "damping"], name="inner"))
+    diagram = document.diagram
+    first, *_ = find(diagram, "pid")
+    assert (first.inside, first.name) == (["inner"], "PID")
+    assert {found.name for found in find(diagram, "integrator")} == {"x1", "x2"}
+    assert ("damping", "gain = 0.5") in {(found.name, found.match) for found in find(diagram, "gain 0.5")}
+    assert find(diagram, "no such thing") == find(diagram, " ") == []
+    tree = outline(diagram)
+    assert [(sub.name, sub.blocks) for sub in tree.subsystems] == [("inner", len(diagram_inside(diagram)))]
+
+
+def diagram_inside(diagram: Diagram) -> list[str]:
+    return list(inside(diagram, ["inner"]).blocks)

@@ -15,8 +15,9 @@ from armblocks.errors import ArmblocksError, DiagramError, FormatError, InputErr
 from armblocks.formats import load_diagram, load_robot
 from armblocks.studio.document import Document
 from armblocks.studio.edits import BreakLink, SetParameters
+from armblocks.studio.placing import placed
 from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.sheet import placed, sheet
+from armblocks.studio.sheet import sheet
 
 
 @pytest.fixture

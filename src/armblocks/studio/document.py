@@ -15,7 +15,7 @@ from armblocks.studio.edits import Edit, applied, summary
 from armblocks.studio.history import History
 from armblocks.studio.nesting import check_own, inside, with_inside
 from armblocks.studio.parameter_values import ResolveRobot
-from armblocks.studio.sheet import arranged
+from armblocks.studio.placing import arranged
 
 MOST_VERSIONS = 1000
 """Versions that are remembered to find out what an edit of an older one runs into."""

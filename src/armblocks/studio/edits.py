@@ -21,6 +21,7 @@ from armblocks.diagram import (
     Block,
     Connection,
     Diagram,
+    DiagramBlock,
     Note,
     ParameterKind,
     Placement,
@@ -34,6 +35,7 @@ from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.report.diagram_layout import standing_box
 from armblocks.studio.nesting import grouped, unlinked, with_block
 from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
+from armblocks.studio.placing import placed
 from armblocks.studio.typed_settings import with_settings
 
 DEFAULT_ROBOT = "puma560"
@@ -351,7 +353,9 @@ def _made(new: NewBlock, scope: Scope, resolve_robot: ResolveRobot) -> Block:
         if rule.required and name not in values:
             default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
             values[name] = parameter_value(rule, default, f"block '{new.name}'", resolve_robot)
-    return kind(**values)
+    made = kind(**values)
+    # What is inside of a new subsystem can be looked at as well.
+    return dataclasses.replace(made, diagram=placed(made.diagram)) if isinstance(made, DiagramBlock) else made
 
 
 def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:

@@ -110,7 +110,7 @@ def with_robot(diagram: Diagram, robot: Robot) -> Diagram:
     """
     changed: dict[str, Block] = {}
     for name, block in diagram.blocks.items():
-        if isinstance(block, Subsystem):
+        if isinstance(block, DiagramBlock):
             inner = with_robot(block.diagram, robot)
             if inner is not block.diagram:
                 changed[name] = dataclasses.replace(block, diagram=inner)

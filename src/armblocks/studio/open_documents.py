@@ -31,8 +31,8 @@ from armblocks.studio.document_journal import (
 )
 from armblocks.studio.journal import SYNC_SECONDS, in_use
 from armblocks.studio.parameter_values import ResolveRobot
+from armblocks.studio.placing import placed
 from armblocks.studio.project_folder import Disk, Fingerprint, ProjectFolder
-from armblocks.studio.sheet import placed
 from armblocks.studio.state_folder import StateFolder
 
 MOST_DOCUMENTS = 100

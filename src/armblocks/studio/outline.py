@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from armblocks.diagram import Block, Diagram, ParameterKind, Subsystem
+from armblocks.diagram import Block, Diagram, DiagramBlock, ParameterKind
 from armblocks.studio.messages import Found, Outline
 from armblocks.studio.parameter_values import parameter_json
 
@@ -15,7 +15,7 @@ MOST_TEXT = 60
 
 def outline(diagram: Diagram) -> Outline:
     """The sheets of a diagram as a tree."""
-    inner = {name: block for name, block in diagram.blocks.items() if isinstance(block, Subsystem)}
+    inner = {name: block for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)}
     return Outline(
         name=diagram.name,
         blocks=len(diagram.blocks),
@@ -77,5 +77,5 @@ def _text(value: object) -> str:
 def _blocks(diagram: Diagram, path: Sequence[str]) -> Iterator[tuple[Sequence[str], str, Block]]:
     for name, block in diagram.blocks.items():
         yield path, name, block
-        if isinstance(block, Subsystem):
+        if isinstance(block, DiagramBlock):
             yield from _blocks(block.diagram, (*path, name))

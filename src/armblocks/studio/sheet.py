@@ -13,28 +13,12 @@ from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.report.block_faces import FaceShape, face_size, port_labels
 from armblocks.report.diagram_drawing import block_marks
-from armblocks.report.diagram_layout import Box, boxes, drawn_blocks, standing_box
+from armblocks.report.diagram_layout import Box, drawn_blocks, standing_box
 from armblocks.report.picture import Picture
 from armblocks.report.svg import svg_marks
 from armblocks.studio.edits import DEFAULT_ROBOT, Place, SheetNote, Wire
 from armblocks.studio.messages import BlockType, ParameterRule, PortSpot, Sheet, SheetBlock, SheetChange
 from armblocks.studio.parameter_values import parameter_json
-
-
-def placed(diagram: Diagram) -> Diagram:
-    """The diagram with a place for every block: its own where all have one, else laid out; subsystems too."""
-    for name, block in diagram.blocks.items():
-        if isinstance(block, DiagramBlock) and (inner := placed(block.diagram)) is not block.diagram:
-            changed = dataclasses.replace(block, diagram=inner)
-            diagram = dataclasses.replace(diagram, blocks={**diagram.blocks, name: changed})
-    return diagram if set(diagram.blocks) <= set(diagram.layout) else arranged(diagram)
-
-
-def arranged(diagram: Diagram) -> Diagram:
-    """The diagram laid out anew, from left to right."""
-    found = boxes(dataclasses.replace(diagram, layout={}))
-    layout = {name: Placement(x=round(box.x), y=round(box.y)) for name, box in found.items()}
-    return dataclasses.replace(diagram, layout=layout, bends={})
 
 
 def sheet(diagram: Diagram) -> Sheet:

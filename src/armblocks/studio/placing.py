@@ -1,0 +1,24 @@
+"""Every block of a drawing in progress has a place: its own, or one that the report would give it."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from armblocks.diagram import Diagram, DiagramBlock, Placement
+from armblocks.report.diagram_layout import boxes
+
+
+def placed(diagram: Diagram) -> Diagram:
+    """The diagram with a place for every block: its own where all have one, else laid out; subsystems too."""
+    for name, block in diagram.blocks.items():
+        if isinstance(block, DiagramBlock) and (inner := placed(block.diagram)) is not block.diagram:
+            changed = dataclasses.replace(block, diagram=inner)
+            diagram = dataclasses.replace(diagram, blocks={**diagram.blocks, name: changed})
+    return diagram if set(diagram.blocks) <= set(diagram.layout) else arranged(diagram)
+
+
+def arranged(diagram: Diagram) -> Diagram:
+    """The diagram laid out anew, from left to right."""
+    found = boxes(dataclasses.replace(diagram, layout={}))
+    layout = {name: Placement(x=round(box.x), y=round(box.y)) for name, box in found.items()}
+    return dataclasses.replace(diagram, layout=layout, bends={})
