@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager, suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -83,10 +85,13 @@ def run(
         stop_time=stop_time, solver=solver, step=step, sample_time=sample_time, rtol=rtol, atol=atol
     )
     sink_files(diagram, REPORT_DATA)  # refused before the run rather than after it
-    folder = _writable_folder(out or Path(f"{diagram.name}-report"))
+    folder = out or Path(f"{diagram.name}-report")
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    _check_writable(folder)
     signals = [name.strip() for name in log_signals.split(",")] if log_signals else []
     settings.update(parameters=parameters, initial_state=from_state, log=log, log_signals=signals)
-    result, failure = _simulate(diagram, settings)
+    with _given_back(made):
+        result, failure = _simulate(diagram, settings)
     files = _report(folder, diagram, result, figures, formats or [])
     if save_state is not None and result.final_state is not None:
         result.final_state.save(save_state)
@@ -140,8 +145,8 @@ def _report(
         )
 
 
-def _writable_folder(folder: Path) -> Path:
-    """The folder, made if absent; refused before the run rather than after it."""
+def _check_writable(folder: Path) -> None:
+    """Make the folder if absent; what cannot be written is refused before the run rather than after it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".armblocks-probe"
@@ -153,4 +158,15 @@ def _writable_folder(folder: Path) -> Path:
             where=str(folder),
             fix="give another folder with --out",
         ) from error
-    return folder
+
+
+@contextmanager
+def _given_back(made: Sequence[Path]) -> Generator[None]:
+    """Where the run is refused, folders that were made for it are taken away again, if they are empty."""
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):
+            for folder in made:
+                folder.rmdir()
+        raise

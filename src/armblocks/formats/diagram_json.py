@@ -305,6 +305,8 @@ def _located(node: Node) -> Generator[None]:
 
 
 def _joined(node: Node, error: ArmblocksError) -> str:
+    if error.where.startswith(node.where):  # said by a node inside
+        return error.where
     return f"{node.where}: {error.where}" if error.where else node.where
 
 
