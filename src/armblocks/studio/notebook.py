@@ -45,7 +45,10 @@ def run_widget(
     """
     if show not in (None, *SHOWN):
         raise InputError(
-            f"show is {show!r}", where="run_widget", allowed="'scopes', 'robot', or None for both"
+            f"show is {show!r}",
+            where="run_widget",
+            allowed="'scopes', 'robot', or None for both",
+            fix="leave it out for both",
         )
     views = [(name, view) for name, view in diagram_views(diagram) if view.kind in SHOWN_KINDS]
     robots = [(name, view.subject) for name, view in views if isinstance(view.subject, Robot)]
