@@ -25,6 +25,11 @@ from armblocks.errors import InputError
         ("[1, -2,  pi]", [1.0, -2.0, math.pi]),
         ("1,2,3", [1.0, 2.0, 3.0]),
         ("[7]", [7.0]),
+        ("45*deg", math.pi / 4),
+        ("1+1", 2.0),
+        ("max(1, 3)", 3.0),
+        ("[pi/2 -1]", [math.pi / 2, -1.0]),
+        ("1/4,-2", [0.25, -2.0]),
         ("[1 2; 3 4]", [[1.0, 2.0], [3.0, 4.0]]),
         ("puma560", "puma560"),
         ("squared-gear", "squared-gear"),
@@ -65,24 +70,26 @@ def test_not_a_number_reaches_the_check_of_the_parameter() -> None:
     assert math.isnan(value)
 
 
-@pytest.mark.parametrize("text", ["1+1", "__import__('os')", "1_000", "٣", "2pi", "", "{}", "a b"])
+@pytest.mark.parametrize("text", ["__import__('os')", "٣", "2pi", "", "{}", "a b", "2*k", "u.v*2"])
 def test_what_the_grammar_does_not_know_is_no_value(text: str) -> None:
-    with pytest.raises(InputError, match=r"--set: '.*' is no value\. Allowed: a number, a vector"):
+    with pytest.raises(
+        InputError, match=r"--set: .*'.*Allowed: a number, a vector.*correct it, or put quotes around a text"
+    ):
         parse_value(text)
 
 
 def test_a_vector_says_which_entry_is_no_number() -> None:
-    with pytest.raises(InputError, match=r"'x' in '1 x 3' is no number"):
+    with pytest.raises(InputError, match="there is no name named 'x'"):
         parse_value("[1 x 3]")
 
 
 def test_a_vector_says_that_a_number_is_missing() -> None:
-    with pytest.raises(InputError, match=r"a number is missing in '1,,3'"):
+    with pytest.raises(InputError, match="a number is missing before a comma"):
         parse_value("1,,3")
 
 
 def test_rows_of_a_matrix_have_one_length() -> None:
-    with pytest.raises(InputError, match=r"the rows of \[1 2; 3\] have 2, 1 numbers"):
+    with pytest.raises(InputError, match="the rows of an array have 2, 1 numbers"):
         parse_value("[1 2; 3]")
 
 

@@ -1,31 +1,24 @@
-"""The grammar of ``--set block.parameter=value``: read by rule, nothing is evaluated.
+"""What ``--set block.parameter=value`` says: read by rule, nothing is evaluated.
 
-::
-
-    assignment = block "." parameter "=" value          the parameter follows the last dot before "="
-    value      = scalar | vector | matrix | "true" | "false" | text
-    vector     = "[" scalar (" " | ",") scalar … "]"    or, without brackets, 1,2,3
-    matrix     = "[" row ";" row … "]"
-    scalar     = number | [sign] [number "*"] "pi" ["/" number]
-    text       = "…" | '…' | a bare word of letters, digits, "_", "-" and "."
+The parameter follows the last dot before ``=``. A value is a formula of numbers as everywhere
+(:mod:`armblocks.diagram.expression_language`), ``2``, ``3*pi/4`` or ``[1 2; 3 4]``; a row without brackets,
+``1,2,3``; ``true`` or ``false``; or a text, in quotes or a bare word.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
+from typing import Any
 
-from armblocks.errors import InputError
+from armblocks.errors import ArmblocksError, InputError
 
-Value = float | bool | str | list[float] | list[list[float]]
+Value = float | bool | str | list[Any]
 
-_ALLOWED = "a number, a vector [1 2 3] or 1,2,3, a matrix [1 2; 3 4], or text in quotes"
-_NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
+_ALLOWED = "a number, a vector [1 2 3] or 1,2,3, a matrix [1 2; 3 4], formulas of numbers, or text in quotes"
 _WHOLE = re.compile(r"[+-]?\d{1,15}", re.ASCII)
-_PLAIN = re.compile(rf"[+-]?(?:{_NUMBER}|nan|inf)", re.ASCII | re.IGNORECASE)
-_OF_PI = re.compile(rf"([+-]?)(?:({_NUMBER})\*)?pi(?:/({_NUMBER}))?", re.ASCII)
-_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*", re.ASCII)
+_PLAIN = re.compile(r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?|nan|inf)", re.ASCII | re.IGNORECASE)
+_WORD = re.compile(r"(?!pi$)[A-Za-z_][A-Za-z0-9_.-]*", re.ASCII)
 
 
 def parse_assignments(texts: Sequence[str]) -> dict[str, Value]:
@@ -56,60 +49,25 @@ def parse_value(text: str, where: str = "--set") -> Value:
     """The value that one text says; raises ``InputError`` where it says none."""
     if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'":
         return text[1:-1]
-    if text.startswith("[") and text.endswith("]"):
-        rows = [_row(row, where) for row in text[1:-1].split(";")]
-        if len(rows) == 1:
-            return rows[0]
-        if len({len(row) for row in rows}) > 1:
-            lengths = ", ".join(str(len(row)) for row in rows)
-            raise InputError(
-                f"the rows of {text} have {lengths} numbers",
-                where=where,
-                allowed="rows of one length",
-                fix="give every row as many numbers",
-            )
-        return rows
-    if "," in text:
-        return _row(text, where)
     if _WHOLE.fullmatch(text):
         return int(text)
-    number = _scalar(text)
-    if number is not None:
-        return number
+    if _PLAIN.fullmatch(text):  # NaN too: the parameter's own check says what it may be
+        return float(text)
     if text in ("true", "false"):
         return text == "true"
     if _WORD.fullmatch(text):
         return text
-    raise InputError(
-        f"'{text}' is no value",
-        where=where,
-        allowed=_ALLOWED,
-        fix="put quotes around a text that is none of these",
-    )
+    from armblocks.diagram.mask import formula_number  # brings CasADi, which plain values do not need
 
-
-def _row(text: str, where: str) -> list[float]:
-    parts = [part.strip() for part in text.split(",")] if "," in text else text.split()
-    numbers: list[float] = []
-    for part in parts:
-        number = _scalar(part)
-        if number is None:
-            found = (
-                f"'{part}' in '{text.strip()}' is no number" if part else f"a number is missing in '{text}'"
-            )
-            raise InputError(found, where=where, allowed=_ALLOWED, fix="correct that number")
-        numbers.append(number)
-    return numbers
-
-
-def _scalar(text: str) -> float | None:
-    if _PLAIN.fullmatch(text):
-        return float(text)
-    match = _OF_PI.fullmatch(text)
-    if match is None:
-        return None
-    sign, factor, divisor = match.groups()
-    value = math.pi * float(factor or 1.0)
-    if divisor:
-        value = value / float(divisor) if float(divisor) else math.nan
-    return -value if sign == "-" else value
+    row = "," in text and not any(mark in text for mark in "[(")
+    try:
+        value = formula_number(f"[{text}]" if row else text, where)
+    except ArmblocksError as error:
+        raise InputError(
+            error.what,
+            where=where,
+            allowed=_ALLOWED,
+            fix="correct it, or put quotes around a text",
+        ) from error
+    is_row = row or (text.startswith("[") and text.endswith("]"))
+    return [value] if is_row and not isinstance(value, list) else value

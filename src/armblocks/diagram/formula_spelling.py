@@ -91,6 +91,8 @@ class _Brackets:
                 self._place += 1
                 rows.append([""])
             elif mark == ",":
+                if not rows[-1][-1].strip():
+                    raise self._error("a number is missing before a comma", "one comma between two elements")
                 self._place += 1
                 rows[-1].append("")
             elif mark.isspace():
