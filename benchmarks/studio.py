@@ -153,7 +153,7 @@ def many_blocks(folder: str) -> str:
             signal_ = builder.add(f"b {row} {column}", kind(), signal_)
         builder.add(f"scope {row}", kinds.Terminator(), signal_)
     ab.save_diagram(builder.build(), Path(folder) / "thousand.json")
-    return "thousand.json"
+    return str(Path(folder) / "thousand.json")
 
 
 def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[float]]:
@@ -200,7 +200,7 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
     builder.add("scope", kinds.Scope(inputs=CHANNELS), *sines)
     with tempfile.TemporaryDirectory() as folder:
         ab.save_diagram(builder.build(), Path(folder) / "live.json")
-        with served(folder, "live.json") as (link, _), page_of(browser) as page:
+        with served(folder, str(Path(folder) / "live.json")) as (link, _), page_of(browser) as page:
             page.goto(link)
             page.locator(".react-flow__node").first.wait_for()
             page.wait_for_timeout(1500)
@@ -373,7 +373,7 @@ def studio_part(repeats: int) -> list[str]:
 
 
 def run_rows(browser: Browser, repeats: int) -> list[list[str]]:
-    times = run_times(browser, 2 * repeats)
+    times = run_times(browser, repeats)
     return [
         median_row("Run on `kr180model`, cached → first samples drawn", [first for first, _ in times], 0.3),
         median_row("the same → whole 10 s run streamed and drawn", [last for _, last in times], 1.5),

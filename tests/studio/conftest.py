@@ -13,6 +13,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
+from firefox_bidi import firefox_path
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 FLAGS = [
@@ -147,3 +148,9 @@ def open_studio(browser: Browser) -> Iterator[Callable[[Path], Page]]:
             return stack.enter_context(watched(browser, started.link))
 
         yield opened
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Firefox is not asked for; but that nothing was tried in it is not passed over."""
+    if firefox_path() is None:
+        terminalreporter.write_line("Firefox is not installed: the studio was not tried in it.", yellow=True)

@@ -1,0 +1,113 @@
+"""Firefox, driven by WebDriver BiDi over its own websocket: no driver program stands between.
+
+Playwright's own Firefox is a patched one; stock Firefox lacks a command that Playwright sends to every page.
+The protocol: https://w3c.github.io/webdriver-bidi/.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+from contextlib import ExitStack
+from itertools import count
+from typing import Any
+
+from websockets.sync.client import connect
+
+NAMES = ("firefox-esr", "firefox")
+KEYS = {"Control": "\ue009", "Enter": "\ue007", "Delete": "\ue017"}
+PATIENCE_SECONDS = 60.0
+
+
+def firefox_path() -> str | None:
+    """Where Firefox is, if it is installed."""
+    return next((found for name in NAMES if (found := shutil.which(name))), None)
+
+
+class Firefox:
+    """One window of a Firefox without a screen, with a profile of its own."""
+
+    def __init__(self, path: str) -> None:
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self._process = subprocess.Popen(
+            [
+                path,
+                "--headless",
+                "--profile",
+                self._profile.name,
+                "--remote-debugging-port",
+                "0",
+                "--no-remote",
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            if found := re.search(r"WebDriver BiDi listening on (ws://\S+)", line):
+                break
+        else:
+            raise AssertionError("Firefox ended without a word of where it listens")
+        self._stack = ExitStack()
+        self._socket = self._stack.enter_context(connect(f"{found.group(1)}/session", max_size=None))
+        self._numbers = count(1)
+        self.errors: list[str] = []
+        """What pages said on their console as errors, or did not catch."""
+        self._ask("session.new", capabilities={})
+        self._ask("session.subscribe", events=["log.entryAdded"])
+        self._page = self._ask("browsingContext.create", type="tab")["context"]
+        self._ask("browsingContext.setViewport", context=self._page, viewport={"width": 1280, "height": 720})
+
+    def _ask(self, method: str, **params: Any) -> Any:
+        number = next(self._numbers)
+        self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
+        while True:
+            said = json.loads(self._socket.recv(timeout=PATIENCE_SECONDS))
+            if said.get("method") == "log.entryAdded" and said["params"]["level"] == "error":
+                self.errors.append(said["params"]["text"])
+            if said.get("id") == number:
+                assert said["type"] == "success", said
+                return said["result"]
+
+    def open(self, url: str) -> None:
+        self._ask("browsingContext.navigate", context=self._page, url=url, wait="complete")
+
+    def value(self, expression: str) -> Any:
+        """What a JavaScript expression gives: a text, a number, a truth value."""
+        found = self._ask(
+            "script.evaluate", expression=expression, target={"context": self._page}, awaitPromise=True
+        )
+        assert found["type"] == "success", found
+        return found["result"].get("value")
+
+    def wait(self, expression: str) -> None:
+        """Until a JavaScript expression is true."""
+        end = time.monotonic() + PATIENCE_SECONDS
+        while not self.value(f"Boolean({expression})"):
+            assert time.monotonic() < end, f"it did not come: {expression}; errors: {self.errors}"
+            time.sleep(0.1)
+
+    def press(self, *keys: str) -> None:
+        """Press keys together, as one hand does: the last first up."""
+        codes = [KEYS.get(key, key) for key in keys]
+        strokes = [{"type": "keyDown", "value": code} for code in codes]
+        strokes += [{"type": "keyUp", "value": code} for code in reversed(codes)]
+        self._ask(
+            "input.performActions",
+            context=self._page,
+            actions=[{"type": "key", "id": "k", "actions": strokes}],
+        )
+
+    def close(self) -> None:
+        self._stack.close()
+        self._process.kill()
+        self._process.wait()
+        assert self._process.stderr is not None
+        self._process.stderr.close()
+        self._profile.cleanup()

@@ -1,0 +1,32 @@
+"""The main way through the studio, in Firefox; where there is none, the summary of the tests says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from firefox_bidi import Firefox, firefox_path
+
+from conftest import Studio
+
+
+@pytest.mark.skipif(firefox_path() is None, reason="Firefox is not installed (apt-get install firefox-esr)")
+def test_the_paper_s_model_is_run_and_edited_in_firefox(tmp_path: Path) -> None:
+    studio = Studio(tmp_path)
+    firefox = Firefox(firefox_path() or "")
+    try:
+        firefox.open(studio.link)
+        firefox.wait("document.querySelectorAll('.react-flow__node').length === 15")
+        firefox.wait("document.querySelector('.robot')")
+        firefox.press("Control", "Enter")
+        firefox.wait("/done/i.test(document.querySelector('.run-state')?.textContent)")
+        firefox.wait("document.querySelectorAll('.chart canvas').length === 7")
+        firefox.value("document.querySelector('.react-flow__node').focus()")
+        firefox.press("Delete")
+        firefox.wait("document.querySelectorAll('.react-flow__node').length === 14")
+        firefox.press("Control", "z")
+        firefox.wait("document.querySelectorAll('.react-flow__node').length === 15")
+        assert not firefox.errors
+    finally:
+        firefox.close()
+        studio.stop()
