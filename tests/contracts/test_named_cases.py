@@ -253,7 +253,7 @@ DOUBTFUL: list[tuple[dict[str, Any], str]] = [
 def test_what_looks_like_another_unit_or_sign_is_asked_about(
     fields: dict[str, Any], words: str, tmp_path: Path
 ) -> None:
-    (text,) = doubts(arm(**fields))
+    (text,) = map(str, doubts(arm(**fields)))
     assert words in text
     assert len(text) < MOST_CHARACTERS
     (tmp_path / "arm.json").write_bytes(write_robot(arm(**fields)))

@@ -86,6 +86,15 @@ def test_a_run_has_to_end_after_the_state_that_it_goes_on_from() -> None:
         assert "the run goes on from 1 s" in message(refused.value)
 
 
+def test_a_state_of_another_length_is_refused() -> None:
+    builder = ab.DiagramBuilder("three")
+    builder.add("x", bl.Integrator(), builder.add("one", bl.Constant(value=[1.0, 2.0, 3.0])))
+    state = ab.simulate(builder.build(), stop_time=0.5).final_state
+    with pytest.raises(ArmblocksError) as refused:
+        ab.simulate(ramp(), stop_time=1.0, initial_state=state)
+    assert "ramp: the state of 'three' at 0.5 s does not fit" in message(refused.value)
+
+
 SAMPLE_TIMES: list[tuple[Any, str]] = [
     (0, "the sample time is [0.0]"),
     (-1, "but 't' changes all the time"),

@@ -287,3 +287,10 @@ def test_letters_of_one_gesture_are_one_step() -> None:
     history.replace("typing", 7, "a")  # after a redo another gesture begins, whatever it is called
     history.undo()
     assert history.value == 3
+
+
+def test_the_tables_ask_about_units() -> None:
+    upward = replace(load_robot("planar3r"), gravity=(0.0, 0.0, 9.81))
+    (found,) = robot_shown("key", History(upward), None, "", []).findings
+    assert found.link == upward.name
+    assert "bodies fall upwards" in found.what

@@ -25,7 +25,7 @@ from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
 
 MOST_BLOCKS = 100_000
-"""Blocks of a diagram, those inside subsystems included; to trace that many takes minutes."""
+"""Blocks of a diagram, those inside subsystems included: more than is drawn, less than fills a memory."""
 
 
 ANY = -1.0

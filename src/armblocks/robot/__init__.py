@@ -5,13 +5,14 @@ from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import JOINT_TYPES, Fixed, Joint, JointLimits, Prismatic, Revolute
 from armblocks.robot.link import Link, Motor, inertia_matrix
 from armblocks.robot.physicality import InertiaFinding, inertia_findings, warn_of_inertias
-from armblocks.robot.plausibility import doubts, warn_of_doubts
+from armblocks.robot.plausibility import Doubt, doubts, warn_of_doubts
 from armblocks.robot.robot import Robot
 
 __all__ = [
     "JOINT_TYPES",
     "DhConvention",
     "DhRow",
+    "Doubt",
     "Fixed",
     "FrictionModel",
     "InertiaFinding",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,50 +13,76 @@ from armblocks.errors import ArmblocksWarning
 from armblocks.robot.link import Link
 from armblocks.robot.robot import Robot
 
+WHOLE_TURN = 2 * math.pi * (1 + 1e-6)
+"""rad, and a little for limits written with six digits."""
 LONGEST_REACH = 20.0
 """m; the largest arms of industry reach 5 m."""
 LARGEST_GYRATION = 3.0
 """Radius of gyration of a link over the robot's reach; that of a body is less than its size."""
 
 
-def doubts(robot: Robot) -> tuple[str, ...]:
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """One question: ``what`` was found at a ``link`` (``""`` for the whole robot), and what it may mean."""
+
+    robot: str
+    link: str = ""
+    what: str
+    question: str
+
+    def __str__(self) -> str:
+        place = f", link '{self.link}'" if self.link else ""
+        return f"robot '{self.robot}'{place}: {self.what}. {self.question}"
+
+
+def doubts(robot: Robot) -> tuple[Doubt, ...]:
     """What is probably in another unit, or has the wrong sign; nothing of it makes a robot illegal.
 
     Limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias that are far
     too great for the robot's size (millimetres?), gravity that points up.
     """
-    return tuple(f"robot '{robot.name}'{text}" for text in _doubts(robot))
+    return tuple(_doubts(robot))
 
 
 def warn_of_doubts(robot: Robot) -> None:
     """Warn (ArmblocksWarning) once for every doubt: what loading a robot does."""
-    for text in doubts(robot):
-        warnings.warn(text, ArmblocksWarning, stacklevel=3)
+    for doubt in doubts(robot):
+        warnings.warn(str(doubt), ArmblocksWarning, stacklevel=3)
 
 
-def _doubts(robot: Robot) -> Iterator[str]:
+def _doubts(robot: Robot) -> Iterator[Doubt]:
     for link in robot.links:
-        limits = link.joint.limits.position or (0.0, 0.0)
-        if link.joint.turn and not link.joint.slide and max(map(abs, limits)) > 2 * math.pi * (1 + 1e-6):
-            yield (
-                f", link '{link.name}': the joint turns from {limits[0]:g} to {limits[1]:g} rad, more than a "
-                "whole turn. Is this in degrees? It is used as given."
+        low, high = link.joint.limits.position or (0.0, 0.0)
+        if link.joint.turn and not link.joint.slide and max(abs(low), abs(high)) > WHOLE_TURN:
+            yield Doubt(
+                robot=robot.name,
+                link=link.name,
+                what=f"the joint turns from {low:g} to {high:g} rad, more than a whole turn",
+                question="Is this in degrees? It is used as given.",
             )
     reach = max(_reaches(robot).values())
     if reach > LONGEST_REACH:
-        yield f": it reaches {reach:g} m. Are its lengths in millimetres? They are used as given."
+        yield Doubt(
+            robot=robot.name,
+            what=f"it reaches {reach:g} m",
+            question="Are its lengths in millimetres? They are used as given.",
+        )
     for link in robot.links:
         moment = float(np.abs(np.linalg.eigvalsh(link.I)).max())
         if link.mass > 0 and reach > 0 and moment > link.mass * (LARGEST_GYRATION * reach) ** 2:
-            yield (
-                f", link '{link.name}': its inertia of {moment:g} kg m2 is that of {link.mass:g} kg at a "
-                f"distance of {math.sqrt(moment / link.mass):g} m, while the robot reaches {reach:g} m. "
-                "Is it in kg mm2 or kg cm2? It is used as given."
+            yield Doubt(
+                robot=robot.name,
+                link=link.name,
+                what=f"its inertia of {moment:g} kg m2 is that of {link.mass:g} kg at a distance of "
+                f"{math.sqrt(moment / link.mass):g} m, while the robot reaches {reach:g} m",
+                question="Is it in kg mm2 or kg cm2? It is used as given.",
             )
     if robot.gravity[2] > 0:
-        yield (
-            f": gravity is {list(robot.gravity)} m/s2, so that bodies fall upwards. Is its sign that of the "
-            "toolbox? Here it is the acceleration of a falling body, [0, 0, -9.81]."
+        yield Doubt(
+            robot=robot.name,
+            what=f"gravity is {list(robot.gravity)} m/s2, so that bodies fall upwards",
+            question="Is its sign that of the toolbox? Here it is the acceleration of a falling body, "
+            "[0, 0, -9.81].",
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from armblocks.robot import DhConvention, Link, Robot, inertia_findings, serial_chain
+from armblocks.robot import DhConvention, Link, Robot, doubts, inertia_findings, serial_chain
 from armblocks.studio import robot_messages as say
 from armblocks.studio.history import History
 from armblocks.studio.robot_columns import ROBOT, ROBOT_COLUMNS, Column, Owner
@@ -45,7 +45,12 @@ def robot_shown(
         chain=robot.links == serial_chain(robot.links),
         links=[_row(link) for link in robot.links],
         fields={name: column.read(robot) for name, column in ROBOT_COLUMNS.items()},
-        findings=[*_inertia_findings(robot), *_friction_findings(robot), *_weightless(robot)],
+        findings=[
+            *_inertia_findings(robot),
+            *_friction_findings(robot),
+            *_weightless(robot),
+            *_doubts(robot),
+        ],
         notes=list(notes),
     )
 
@@ -93,6 +98,13 @@ def _inertia_findings(robot: Robot) -> list[say.RobotFinding]:
             fix="It is used as given. Give moments of which none exceeds the sum of the other two.",
         )
         for finding in inertia_findings(robot)
+    ]
+
+
+def _doubts(robot: Robot) -> list[say.RobotFinding]:
+    return [
+        say.RobotFinding(link=doubt.link or robot.name, columns=[], what=f"{doubt.what}.", fix=doubt.question)
+        for doubt in doubts(robot)
     ]
 
 
