@@ -26,18 +26,29 @@ from armblocks.diagram import (
 )
 
 
-def _moving_ports() -> tuple[Port, ...]:
-    return (Port("upper", "the upper limit"), Port("u", "the signal"), Port("lower", "the lower limit"))
+@dataclass(frozen=True, kw_only=True)
+class MovingLimits(Block):
+    """What blocks with two limits that are signals have in common."""
 
+    zero_crossing: bool = zero_crossing_parameter()
 
-def _beyond(block: Block, inputs: Shapes) -> tuple[Condition, ...]:
-    shape = broadcast(inputs)
-    above = Condition("above", shape, "1 above the upper limit", closed=False)
-    return located(block, above, Condition("below", shape, "1 below the lower limit", closed=False))
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("upper", "the upper limit"), Port("u", "the signal"), Port("lower", "the lower limit"))
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = broadcast(inputs)
+        above = Condition("above", shape, "1 above the upper limit", closed=False)
+        return located(self, above, Condition("below", shape, "1 below the lower limit", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - u["upper"], "below": u["lower"] - u["u"]}
 
 
 @dataclass(frozen=True, kw_only=True)
-class SaturationDynamic(Block):
+class SaturationDynamic(MovingLimits):
     """The input held between two signals: y = min(max(u, lower), upper)."""
 
     family: ClassVar[str] = "discontinuities"
@@ -51,29 +62,15 @@ class SaturationDynamic(Block):
         },
     )
 
-    zero_crossing: bool = zero_crossing_parameter()
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return _moving_ports()
-
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
-
-    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        return {"y": inputs["u"]}
-
-    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
-        return _beyond(self, inputs)
-
-    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"above": u["u"] - u["upper"], "below": u["lower"] - u["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": if_else(x["above"], u["upper"], if_else(x["below"], u["lower"], u["u"]))}
 
 
 @dataclass(frozen=True, kw_only=True)
-class DeadZoneDynamic(Block):
+class DeadZoneDynamic(MovingLimits):
     """Nothing between two signals, what exceeds them outside: y = u - upper, 0 or u - lower."""
 
     family: ClassVar[str] = "discontinuities"
@@ -87,22 +84,8 @@ class DeadZoneDynamic(Block):
         },
     )
 
-    zero_crossing: bool = zero_crossing_parameter()
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return _moving_ports()
-
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "what exceeds the zone"),)
-
-    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        return {"y": inputs["u"]}
-
-    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
-        return _beyond(self, inputs)
-
-    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"above": u["u"] - u["upper"], "below": u["lower"] - u["u"]}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": if_else(x["above"], u["u"] - u["upper"], if_else(x["below"], u["u"] - u["lower"], 0.0))}

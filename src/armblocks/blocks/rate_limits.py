@@ -6,6 +6,7 @@ u meet again.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -33,33 +34,14 @@ SMALLEST_JUMP = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class RateLimiterContinuous(Block):
-    """The input, no faster than allowed: y = u while falling <= u' <= rising, else y' is that limit.
+class RateLimiting(Block):
+    """What the continuous rate limiters have in common: all but where their limits come from."""
 
-    Then y goes on at the limit until it meets u again. Where u jumps, y does not. (The Rate Limiter is the
-    sampled one; Simulink has both in one block, and takes the rate between two steps, not the exact one.)
-    """
-
-    family: ClassVar[str] = "discontinuities"
-    title: ClassVar[str] = "Rate Limiter (continuous)"
-    spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
-    example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine of which the rise is limited to 0.5 a second and the fall to 0.8.",
-        parameters={"rising": 0.5, "falling": -0.8},
-        inputs={"u": made("SineWave")},
-    )
 
-    rising: ArrayLike = parameter(
-        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the fastest rise", unit="1/s"
-    )
-    falling: ArrayLike = parameter(
-        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="the fastest fall, not positive", unit="1/s"
-    )
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the signal"),)
+    @abstractmethod
+    def limits(self, u: Signals, p: Signals) -> Signals:
+        """What has the entries ``rising`` and ``falling``."""
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
@@ -80,23 +62,55 @@ class RateLimiterContinuous(Block):
         return {"y": if_else(x["mode"] == 0.0, u["u"], x["y"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _rate(x, u, p)}
+        return {"y": _rate(x, u, self.limits(u, p))}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"y": p["initial"]}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return _guard_values(x, u, p)
+        return _guard_values(x, u, self.limits(u, p))
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": _mode_value(x, u, p)}
+        return {"mode": _mode_value(x, u, self.limits(u, p))}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return _after(x, u, p, e)
+        return _after(x, u, self.limits(u, p), e)
 
 
 @dataclass(frozen=True, kw_only=True)
-class RateLimiterDynamic(Block):
+class RateLimiterContinuous(RateLimiting):
+    """The input, no faster than allowed: y = u while falling <= u' <= rising, else y' is that limit.
+
+    Then y goes on at the limit until it meets u again. Where u jumps, y does not. (The Rate Limiter is the
+    sampled one; Simulink has both in one block, and takes the rate between two steps, not the exact one.)
+    """
+
+    family: ClassVar[str] = "discontinuities"
+    title: ClassVar[str] = "Rate Limiter (continuous)"
+    spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine of which the rise is limited to 0.5 a second and the fall to 0.8.",
+        parameters={"rising": 0.5, "falling": -0.8},
+        inputs={"u": made("SineWave")},
+    )
+
+    rising: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the fastest rise", unit="1/s"
+    )
+    falling: ArrayLike = parameter(
+        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="the fastest fall, not positive", unit="1/s"
+    )
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def limits(self, u: Signals, p: Signals) -> Signals:
+        return p
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateLimiterDynamic(RateLimiting):
     """The input, no faster than two signals allow: y = u while falling <= u' <= rising, else at that limit.
 
     As the Rate Limiter (continuous), with limits that may change at any time. Where ``falling`` exceeds
@@ -106,7 +120,6 @@ class RateLimiterDynamic(Block):
     family: ClassVar[str] = "discontinuities"
     title: ClassVar[str] = "Rate Limiter Dynamic"
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
-    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine that may rise faster and faster, and fall by 0.8 a second.",
         inputs={
@@ -126,41 +139,8 @@ class RateLimiterDynamic(Block):
             Port("falling", "the fastest fall, not positive"),
         )
 
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the limited signal"),)
-
-    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        return {"y": inputs["u"]}
-
-    def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("y", self.output_shapes(inputs)["y"], "the output"),)
-
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (_mode(self.output_shapes(inputs)["y"]),)
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return _guards(self.output_shapes(inputs)["y"])
-
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": if_else(x["mode"] == 0.0, u["u"], x["y"])}
-
-    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _rate(x, u, u)}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"y": p["initial"]}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return _guard_values(x, u, u)
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": _mode_value(x, u, u)}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return _after(x, u, u, e)
-
-
-# ``limits`` has the entries rising and falling: parameters of the one block, inputs of the other.
+    def limits(self, u: Signals, p: Signals) -> Signals:
+        return u
 
 
 def _mode(shape: Shape) -> State:

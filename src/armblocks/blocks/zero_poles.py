@@ -39,7 +39,37 @@ _KINDS = ("low_pass", "high_pass", "band_pass", "band_stop")
 
 
 @dataclass(frozen=True, kw_only=True)
-class ZeroPole(Block):
+class SectionsByRoots(Block):
+    """A chain of sections by zeros and poles, with a factor; continuous or sampled."""
+
+    zeros: ArrayLike = parameter((1.0,), dimensions=(1, 2), tunable=False, roots=True, doc="z1 … zm, or none")
+    poles: ArrayLike = parameter((0.0, -1.0), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
+    gain: float = parameter(1.0, doc="the factor")
+
+    def check(self) -> None:
+        check_proper(*_roots(self), where=self.type_name())
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["gain"] * _output(self.system, x["x"], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    def system(self) -> LinearSystem:
+        """The sections, without the factor."""
+        zeros, poles = _roots(self)
+        return realised(ZeroPoleGain(zeros=zeros, poles=poles, gain=1.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZeroPole(SectionsByRoots):
     """A transfer function by its roots: y = gain (s - z1) … (s - zm) / ((s - p1) … (s - pn)) u, m <= n.
 
     Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
@@ -54,39 +84,15 @@ class ZeroPole(Block):
         inputs={"u": made("Step")},
     )
 
-    zeros: ArrayLike = parameter((1.0,), dimensions=(1, 2), tunable=False, roots=True, doc="z1 … zm, or none")
-    poles: ArrayLike = parameter((0.0, -1.0), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
-    gain: float = parameter(1.0, doc="the factor")
-
-    def check(self) -> None:
-        check_proper(*_roots(self), where="ZeroPole")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the input", shape=()),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the output", shape=()),)
-
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", (shape_of(self.poles)[0],), "the states of the sections"),)
 
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": p["gain"] * _output(self._system, x["x"], u["u"])}
-
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"x": _change(self._system, x["x"], u["u"])}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"x": SX(0.0)}
-
-    @property
-    def _system(self) -> LinearSystem:
-        zeros, poles = _roots(self)
-        return realised(ZeroPoleGain(zeros=zeros, poles=poles, gain=1.0))
+        return {"x": _change(self.system, x["x"], u["u"])}
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiscreteZeroPole(Block):
+class DiscreteZeroPole(SectionsByRoots):
     """A sampled system by its roots: y = gain (z - z1) … (z - zm) / ((z - p1) … (z - pn)) u, m <= n.
 
     Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
@@ -107,36 +113,14 @@ class DiscreteZeroPole(Block):
         inputs={"u": made("Step")},
     )
 
-    zeros: ArrayLike = parameter((1.0,), dimensions=(1, 2), tunable=False, roots=True, doc="z1 … zm, or none")
     poles: ArrayLike = parameter((0.0, 0.5), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
-    gain: float = parameter(1.0, doc="the factor")
     sample_time: ArrayLike = sample_time_parameter()
-
-    def check(self) -> None:
-        check_proper(*_roots(self), where="DiscreteZeroPole")
-
-    def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the input", shape=()),)
-
-    def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the output", shape=()),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", (shape_of(self.poles)[0],), "the states of the sections"),)
 
-    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": p["gain"] * _output(self._system, x["x"], u["u"])}
-
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"x": _change(self._system, x["x"], u["u"])}
-
-    def initial_states(self, p: Signals) -> Signals:
-        return {"x": SX(0.0)}
-
-    @property
-    def _system(self) -> LinearSystem:
-        zeros, poles = _roots(self)
-        return realised(ZeroPoleGain(zeros=zeros, poles=poles, gain=1.0))
+        return {"x": _change(self.system, x["x"], u["u"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,7 +236,7 @@ class DigitalFilter(Block):
         return realised(sampled(shifted(base, self.filter_type, warped(self.edge), warped(self.upper_edge))))
 
 
-def _roots(block: ZeroPole | DiscreteZeroPole) -> tuple[Any, Any]:
+def _roots(block: SectionsByRoots) -> tuple[Any, Any]:
     where = block.type_name()
     return complex_roots(block.zeros, where, "zeros"), complex_roots(block.poles, where, "poles")
 
