@@ -174,3 +174,25 @@ def test_the_end_values_are_those_published(
     found = ab.simulate(diagram, stop_time=stop, rtol=rtol, atol=atol, solver=solver)
     error = np.abs(found["y"][-1] - np.array(end)) / (atol / rtol + np.abs(end))
     assert error.max() < 10 * rtol
+
+
+E5 = (
+    "-7.89e-10*u[1] - 1.1e7*u[1]*u[3]",
+    "7.89e-10*u[1] - 1.13e9*u[2]*u[3]",
+    "7.89e-10*u[1] - 1.1e7*u[1]*u[3] + 1.13e3*u[4] - 1.13e9*u[2]*u[3]",
+    "1.1e7*u[1]*u[3] - 1.13e3*u[4]",
+)
+"""Enright, Hull, Lindberg 1975, with the end of Hairer and Wanner, *Solving ODEs II*, section IV.10."""
+E5_AT_10 = (1.7599259497677897e-3, 1.3846281519376516e-11, 7.6370038530073912e-13, 1.3082581134075777e-11)
+
+
+def test_e5_is_followed_until_nothing_but_rounding_is_left() -> None:
+    diagram = equations(E5, (1.76e-3, 0.0, 0.0, 0.0))
+    settings = {"rtol": 1e-9, "atol": 1e-24, "solver": "rodas5p"}
+    early = ab.simulate(diagram, stop_time=10.0, **settings)["y"][-1]
+    assert early == pytest.approx(E5_AT_10, rel=1e-8)
+    # y2 = y3 + y4 holds exactly, but rates of 1e-7 /s, rounded to 1e-23 /s, are taken over steps of hundreds
+    # of seconds: some 1e-21 of y2 stays behind when all else has decayed, with Radau and BDF of SciPy as well.
+    late = ab.simulate(diagram, stop_time=1e13, **settings)["y"][-1]
+    assert np.abs(late).max() < 1e-19
+    assert abs(late[1] - late[2] - late[3]) < 1e-19
