@@ -192,7 +192,7 @@ def test_e5_is_followed_until_nothing_but_rounding_is_left() -> None:
     early = ab.simulate(diagram, stop_time=10.0, **settings)["y"][-1]
     assert early == pytest.approx(E5_AT_10, rel=1e-8)
     # y2 = y3 + y4 holds exactly, but rates of 1e-7 /s, rounded to 1e-23 /s, are taken over steps of hundreds
-    # of seconds: some 1e-21 of y2 stays behind when all else has decayed, with Radau and BDF of SciPy as well.
+    # of seconds: some 1e-21 of y2 stays behind when all else has decayed, with SciPy's Radau and BDF too.
     late = ab.simulate(diagram, stop_time=1e13, **settings)["y"][-1]
     assert np.abs(late).max() < 1e-19
     assert abs(late[1] - late[2] - late[3]) < 1e-19
