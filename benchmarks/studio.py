@@ -163,7 +163,7 @@ def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[f
         with served(folder, model) as (link, _), page_of(browser) as page:
             begin = time.perf_counter()
             page.goto(link, wait_until="commit")
-            page.wait_for_function(f"document.querySelectorAll('.react-flow__node').length >= {BLOCKS}")
+            page.wait_for_function(f"() => document.querySelectorAll('.react-flow__node').length >= {BLOCKS}")
             page.evaluate(DRAWN)
             load = time.perf_counter() - begin
             page.wait_for_timeout(3000)
@@ -178,7 +178,7 @@ def thousand(browser: Browser, repeats: int) -> tuple[float, list[float], list[f
                     "{ capture: true, once: true })"
                 )
                 page.keyboard.press(key)
-                page.wait_for_function("heard.some(({ kind }) => kind === 'changed')")
+                page.wait_for_function("() => heard.some(({ kind }) => kind === 'changed')")
                 drawn = page.evaluate(DRAWN)
                 sent, came = page.evaluate(
                     "['sent', 'changed'].map((wanted) => heard.find(({ kind }) => kind === wanted).at)"
@@ -212,7 +212,7 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
             page.get_by_role("option", name="1 × real time", exact=True).click()
             page.evaluate("heard.length = 0")
             page.keyboard.press("Control+Enter")
-            page.wait_for_function("heard.some(({ kind }) => kind === 'samples')")
+            page.wait_for_function("() => heard.some(({ kind }) => kind === 'samples')")
             page.evaluate("latency.length = 0")
             field = page.get_by_role("textbox", name="Search the library")
             field.click()

@@ -103,7 +103,7 @@ function Sheet() {
   const [{ graph, routes }] = useState(() => ({ graph: new SheetGraph(), routes: new SheetRoutes() }))
 
   // A place that the server has taken over needs no memory of the drag any more.
-  useEffect(() => setDrag({}), [blocks, notes])
+  useEffect(() => setDrag((now) => (Object.keys(now).length ? {} : now)), [blocks, notes])
 
   const shown = useMemo(() => (bending ? wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire)) : wires), [wires, bending])
   const routed = useMemo(() => routes.update(blocks, shown, drag), [routes, blocks, shown, drag])

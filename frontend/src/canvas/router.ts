@@ -95,7 +95,8 @@ export function route(obstacles: Obstacle[], nets: Net[], kept: Map<string, Rout
     .map((net) => ({ net, free: Number(drawnWays(net).size === 0), length: spread(net) }))
     .sort((a, b) => a.free - b.free || a.length - b.length || (a.net.key < b.net.key ? -1 : 1))
   for (const { net } of order) {
-    const routed = new NetRouter(net, obstacles, laid).routed()
+    const plainly = straight(net, obstacles, laid)
+    const routed = plainly ? { paths: new Map([[net.targets[0]!.key, plainly]]), dots: [] } : new NetRouter(net, obstacles, laid).routed()
     for (const path of routed.paths.values()) lay(laid, net.key, path)
     done.set(net.key, routed)
   }
@@ -234,10 +235,12 @@ class NetRouter {
 
   private block(o: Obstacle): void {
     const forbid = (x0: number, y0: number, x1: number, y1: number, price: number) => {
-      for (let r = 0; r < this.ys.length; r++) {
+      // Only the lines that meet the rectangle, and the last one before it, whose steps lead into it.
+      for (let r = Math.max(after(this.ys, y0) - 1, 0); r < this.ys.length; r++) {
         const y = this.ys[r]!
+        if (y >= y1) break
         const nextY = this.ys[r + 1] ?? Infinity
-        for (let c = 0; c < this.columns; c++) {
+        for (let c = Math.max(after(this.xs, x0) - 1, 0); c < this.columns; c++) {
           const x = this.xs[c]!
           if (x >= x1) break
           const nextX = this.xs[c + 1] ?? Infinity
@@ -335,6 +338,40 @@ class NetRouter {
     return this.down[edge]! * (this.ys[r + 1]! - this.ys[r]!) + (this.crossDown[edge] ? CROSSING : 0)
   }
 }
+
+/** Index of the first value that is greater than `limit`, in values that ascend. */
+function after(values: number[], limit: number): number {
+  let [low, high] = [0, values.length]
+  while (low < high) {
+    const half = (low + high) >> 1
+    if (values[half]! > limit) high = half
+    else low = half + 1
+  }
+  return low
+}
+
+/** The way of a net with one end straight ahead, where nothing stands or lies near it: no other way is cheaper. */
+function straight({ source, targets }: Net, obstacles: Obstacle[], laid: Segment[]): Point[] | null {
+  const [only] = targets
+  if (!only || targets.length > 1 || only.bends) return null
+  const { end } = only
+  const along = (end.x - source.x) * source.dx + (end.y - source.y) * source.dy
+  const level = source.dx ? end.y === source.y : end.x === source.x
+  if (!level || along < 2 * STUB || end.dx !== source.dx || end.dy !== source.dy) return null
+  const [left, right] = [Math.min(source.x, end.x), Math.max(source.x, end.x)]
+  const [top, low] = [Math.min(source.y, end.y), Math.max(source.y, end.y)]
+  const meets = (x0: number, y0: number, x1: number, y1: number) => x0 < right && x1 > left && y0 < low + 0.5 && y1 > top - 0.5
+  const blocked = ({ x, y, width, height, label: [lx, ly, lw, lh] }: Obstacle) =>
+    (meets(x - CLEARANCE, y - CLEARANCE, x + width + CLEARANCE, y + height + CLEARANCE) && !touches(x, y, width, height, source) && !touches(x, y, width, height, end)) ||
+    (lw > 0 && meets(lx - 3, ly, lx + lw + 3, ly + lh))
+  if (obstacles.some(blocked)) return null
+  const near = ({ a, b }: Segment) =>
+    meets(Math.min(a[0], b[0]) - NEAR, Math.min(a[1], b[1]) - NEAR, Math.max(a[0], b[0]) + NEAR, Math.max(a[1], b[1]) + NEAR)
+  return laid.some(near) ? null : [[source.x, source.y], [end.x, end.y]]
+}
+
+const touches = (x: number, y: number, width: number, height: number, at: WireEnd) =>
+  at.x >= x - 0.5 && at.x <= x + width + 0.5 && at.y >= y - 0.5 && at.y <= y + height + 0.5
 
 const direction = ({ dx, dy }: WireEnd) => DIRECTIONS.findIndex(([dr, dc]) => dr === dy && dc === dx)
 const bottom = (o: Obstacle) => Math.max(o.y + o.height, o.label[1] + o.label[3])
