@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
 
-from conftest import PATIENCE_MS, Studio
+from conftest import PATIENCE_MS, TOUR_SEEN, Studio
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +25,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Studio]]:
 def context(browser: Browser, server: list[Studio]) -> Iterator[BrowserContext]:
     context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
     context.set_default_timeout(PATIENCE_MS)
+    context.add_init_script(TOUR_SEEN)
     first = context.new_page()
     first.goto(server[0].link)
     first.locator(".react-flow__node").first.wait_for()
@@ -202,6 +203,7 @@ def test_a_run_is_shown_again_after_a_reload(page: Page) -> None:
     page.reload()
     expect(state).to_contain_text("done")
     expect(state).to_contain_text("10.00 s")
+    save_as(page, "run.json")  # nothing that the page after a crash would be offered
 
 
 def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, server: list[Studio]) -> None:
@@ -223,6 +225,7 @@ def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, se
     expect(block(page, "Gain")).to_have_count(0)
     page.keyboard.press("Control+z")
     expect(page.locator(".react-flow__node")).to_have_count(0)
+    save_as(page, "killed.json")
 
 
 def test_a_page_that_comes_after_the_crash_is_offered_what_was_drawn(
