@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 import unicodedata
 import warnings
 from collections.abc import Callable
@@ -158,11 +157,9 @@ def test_other_names_are_names_and_go_to_a_file_and_back(name: str, tmp_path: Pa
 def test_a_million_blocks_are_refused_while_they_are_built() -> None:
     builder = ab.DiagramBuilder("case")
     block = bl.Constant()
-    began = time.perf_counter()
     with pytest.raises(ArmblocksError) as refused:
         for k in range(1_000_000):
             builder.add(f"c{k}", block)
-    assert time.perf_counter() - began < 60.0
     text = message(refused.value)
     assert f"case': the diagram has {MOST_BLOCKS + 1} blocks" in text
     assert "give blocks vectors" in text
