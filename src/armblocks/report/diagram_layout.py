@@ -120,12 +120,17 @@ def standing_box(name: str, block: Block, place: Placement) -> Box:
 
 def _standing(box: Box) -> tuple[float, float]:
     """Width and height of a block turned by a quarter: its drawing stays upright, its ports go round."""
-    if face_size(box.block)[0] is not FaceShape.CARD:
+    shape = face_size(box.block)[0]
+    if shape is FaceShape.TAG:  # as wide as its text
+        return box.width, box.height + 10
+    if shape not in (FaceShape.CARD, FaceShape.BUS):
         return box.height, box.width
     labels = port_labels(box.block)
     pitches = [max((text_width(text, PORT_TEXT) + 6 for text in side), default=0.0) for side in labels]
     ports = (len(box.block.input_ports()), len(box.block.output_ports()))
     wide = max(count * max(20.0, pitch) + 8 for count, pitch in zip(ports, pitches))
+    if shape is FaceShape.BUS:
+        return float(round(max(box.height, wide))), 30.0
     _, width, height = face_size(box.block)
     named = sum(any(side) for side in labels)
     room = CONTROL_ROOM * bool(control_ports(box.block))
