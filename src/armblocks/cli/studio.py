@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from armblocks.cli.terminal import messages_console
-from armblocks.errors import FormatError
+from armblocks.errors import FormatError, InputError
 
 
 def studio(
@@ -43,6 +43,13 @@ def studio(
                 fix="check the name",
             )
         root = folder or path.resolve().parent
+        if not path.resolve().is_relative_to(root.resolve()):
+            raise InputError(
+                f"the model '{path}' does not lie in the folder",
+                where=f"armblocks studio --folder {root}",
+                allowed="a file in this folder or below it: the studio reads and writes no others",
+                fix=f"leave --folder out, or give {path.resolve().parent}",
+            )
         model = path.resolve().relative_to(root.resolve()).as_posix()
     console = messages_console()
 
