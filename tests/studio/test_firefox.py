@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,11 @@ from conftest import Studio
 
 @pytest.mark.skipif(firefox_path() is None, reason="Firefox is not installed (apt-get install firefox-esr)")
 def test_the_paper_s_model_is_run_and_edited_in_firefox(tmp_path: Path) -> None:
-    studio = Studio(tmp_path)
-    firefox = Firefox(firefox_path() or "")
-    try:
+    with ExitStack() as stack:
+        studio = Studio(tmp_path)
+        stack.callback(studio.stop)
+        firefox = Firefox(firefox_path() or "")
+        stack.callback(firefox.close)
         firefox.open(studio.link)
         firefox.wait("document.querySelectorAll('.react-flow__node').length === 15")
         firefox.wait("document.querySelector('.robot')")
@@ -27,6 +30,3 @@ def test_the_paper_s_model_is_run_and_edited_in_firefox(tmp_path: Path) -> None:
         firefox.press("Control", "z")
         firefox.wait("document.querySelectorAll('.react-flow__node').length === 15")
         assert not firefox.errors
-    finally:
-        firefox.close()
-        studio.stop()
