@@ -28,11 +28,11 @@ from armblocks.spatial import transl
 MOST_CHARACTERS = 400
 
 
-def message(error: ArmblocksError) -> str:
-    """The text of an error: it says where and what to do, and is short."""
+def message(error: ArmblocksError, folder: Path | None = None) -> str:
+    """The text of an error: it says where and what to do, and is short but for the folder that it names."""
     assert error.where
     assert error.fix
-    text = str(error)
+    text = str(error) if folder is None else str(error).replace(f"{folder}/", "")
     assert len(text) < MOST_CHARACTERS
     assert text.isprintable()
     return text
@@ -185,7 +185,7 @@ def test_a_library_that_leads_to_itself_is_refused(tmp_path: Path, monkeypatch: 
     )
     with pytest.raises(ArmblocksError) as refused:
         ab.load_diagram("case.json")
-    assert "library blocks that do not hold themselves" in message(refused.value)
+    assert "library blocks that do not hold themselves" in message(refused.value, tmp_path)
 
 
 # -- robots --------------------------------------------------------------------------------------------------
