@@ -134,7 +134,7 @@ def test_wires_to_ports_that_vanish_go_with_the_edit_and_return_with_undo() -> N
 
 def test_bends_go_with_what_they_hang_on() -> None:
     document = chain()
-    wire = Wire(source="sine/y", target="gain/u", bends=[100, 200, 150])
+    wire = Wire(source="sine/y", target="gain/u", bends=(100, 200, 150))
     document.edit(BendWires(wires=[wire]))
     (bends,) = document.diagram.bends.values()
     assert bends == (100, 200, 150)

@@ -87,7 +87,7 @@ class Wire(Message):
 
     source: str
     target: str
-    bends: list[float] = Field(default_factory=list[float])
+    bends: tuple[float, ...] = ()
 
 
 class AddBlocks(Message):

@@ -178,7 +178,7 @@ def _spots(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[PortSpot]
 
 
 def _wire(wire: Connection, diagram: Diagram) -> Wire:
-    bends = list(diagram.bends.get(wire, ()))
+    bends = diagram.bends.get(wire, ())
     return Wire(source=str(wire.source), target=str(wire.target), bends=bends)
 
 
