@@ -46,6 +46,7 @@ def page(context: BrowserContext, server: list[Studio]) -> Iterator[Page]:
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name="New diagram").click()
     expect(page.get_by_text("Type to add a block")).to_be_visible()
+    expect(page.get_by_role("menu")).to_be_hidden()  # it takes keys as long as it closes
     yield page
     page.close()
     assert [said for said in faults if "ERR_CONNECTION_" not in said] == []
