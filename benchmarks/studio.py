@@ -214,8 +214,7 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
                 "window.latency = []; new PerformanceObserver((list) => latency.push(...list.getEntries()))"
                 ".observe({ type: 'event', durationThreshold: 16 })"
             )
-            page.get_by_role("combobox", name="Speed").click()
-            page.get_by_role("option", name="1 × real time", exact=True).click()
+            page.get_by_role("combobox", name="Speed").select_option("1 × real time")
             page.evaluate("heard.length = 0")
             page.keyboard.press("Control+Enter")
             until(page, "heard.some(({ kind }) => kind === 'samples')")

@@ -7,6 +7,7 @@ export const theme = createTheme({
   colors: {
     accent: ['#fff1e6', '#ffe0c7', '#ffc08f', '#ff9a4d', '#f07d24', '#d9650d', '#c25603', '#b04a00', '#8f3c00', '#702f00'],
   },
+  respectReducedMotion: true,
   primaryColor: 'accent',
   primaryShade: { light: 7, dark: 3 },
   autoContrast: true,

@@ -110,7 +110,9 @@ def studio(tmp_path: Path) -> Iterator[Studio]:
 @contextmanager
 def watched(browser: Browser, link: str) -> Generator[Page]:
     """A page, logged in, that must say no error on its console; it shows the first example."""
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
+    )
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     context.add_init_script(TOUR_SEEN)
     page = context.new_page()

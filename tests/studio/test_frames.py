@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import struct
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from run_frames import read_frame
 
 from armblocks.blocks import BLOCKS
 from armblocks.face.model import CompiledDiagram
@@ -18,15 +18,6 @@ from armblocks.studio import run_worker
 from armblocks.studio.frames import sample_frame, thinned
 
 Array = Any
-
-
-def read_frame(data: bytes) -> tuple[dict[str, Any], Array, Array]:
-    """Header, times and columns, read as the page reads them."""
-    length = struct.unpack("<I", data[:4])[0]
-    header = json.loads(data[4 : 4 + length])
-    assert (4 + length) % 8 == 0
-    numbers = np.frombuffer(data, "<f8", offset=4 + length).reshape(-1, header["count"])
-    return header, numbers[0], numbers[1:]
 
 
 def test_a_frame_says_what_went_in() -> None:

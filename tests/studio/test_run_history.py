@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import json
-import struct
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from run_frames import read_frame
 
 from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError
@@ -94,11 +93,9 @@ class Listener:
 
     async def tell(self, event: say.Message | bytes) -> None:
         if isinstance(event, bytes):
-            length = struct.unpack("<I", event[:4])[0]
-            header = json.loads(event[4 : 4 + length])
-            numbers = np.frombuffer(event, "<f8", offset=4 + length)
+            header, time, _ = read_frame(event)
             assert header["first"] == len(self.times), "no sample is lost and none comes twice"
-            self.times += numbers[: header["count"]].tolist()
+            self.times += time.tolist()
         else:
             self.events.append(event)
             if isinstance(event, say.RunRewound):

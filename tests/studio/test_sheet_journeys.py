@@ -32,6 +32,7 @@ def sheet(shared: Page) -> Iterator[Page]:
 def menu(page: Page, entry: str | re.Pattern[str]) -> None:
     page.get_by_role("button", name="Menu").click()
     page.get_by_role("menuitem", name=entry).click()
+    expect(page.get_by_role("menu")).to_be_hidden()
 
 
 def block(page: Page, name: str) -> Locator:

@@ -145,8 +145,7 @@ def test_blocks_are_grouped_entered_and_left(page: Page) -> None:
 
 
 def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
-    page.get_by_role("combobox", name="Speed").click()
-    page.get_by_role("option", name="0.5 × real time").click()
+    page.get_by_role("combobox", name="Speed").select_option("0.5 × real time")
     page.keyboard.press("Control+Enter")
     state = page.locator(".run-state")
     expect(state).to_contain_text("running")

@@ -36,6 +36,8 @@ interface Runs {
   runs: KeptRun[]
   /** Values of tunable parameters that are tried, by `block.parameter`: not in the model until they are kept. */
   tried: Record<string, unknown>
+  /** Simulated seconds for each second of the clock; null: as fast as possible. */
+  speed: number | null
   rename: (key: string, name: string) => void
   remove: (key: string) => void
 }
@@ -44,6 +46,7 @@ interface Runs {
 export const useRuns = create<Runs>((set) => ({
   runs: [],
   tried: {},
+  speed: null,
   rename: (key, name) => set((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, name } : run)) })),
   remove: (key) => set((s) => ({ runs: s.runs.filter((run) => run.key !== key || run.samples === samples) })),
 }))

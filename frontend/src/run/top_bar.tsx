@@ -1,4 +1,4 @@
-import { ActionIcon, Badge, Button, Group, NumberInput, Select, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Badge, Button, Group, NativeSelect, NumberInput, Text, Tooltip } from '@mantine/core'
 import {
   IconArrowBackUp,
   IconArrowForwardUp,
@@ -27,27 +27,26 @@ const SPEEDS = [
   ...['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} × real time` })),
 ]
 
-async function run(speed: string): Promise<void> {
+async function run(): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
   useCursor.setState({ time: null, playing: false })
-  const { tried } = useRuns.getState()
-  await ask({ kind: 'run', document: document.state.document, speed: speed ? Number(speed) : null, tuned: tried })
+  const { tried, speed } = useRuns.getState()
+  await ask({ kind: 'run', document: document.state.document, speed, tuned: tried })
 }
 
 /** Start the model, or let a paused run go on. */
 export function startOrResume(): void {
   const { run: shown } = useStudio.getState()
   if (shown?.state === 'paused') void ask({ kind: 'control', run: shown.run, action: 'resume' })
-  else if (shown?.state !== 'running') void run(speed)
+  else if (shown?.state !== 'running') void run()
 }
-
-let speed = ''
 
 export function TopBar() {
   const document = useStudio((s) => s.document)
   const state = useStudio((s) => s.run?.state)
   const runKey = useStudio((s) => s.run?.run)
+  const speed = useRuns((s) => s.speed)
   const busy = state === 'running' || state === 'paused'
   const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') => runKey && void ask({ kind: 'control', run: runKey, action })
   const goBack = () => {
@@ -105,16 +104,16 @@ export function TopBar() {
             if (document && value > 0 && value !== document.settings['stop_time']) void change({ kind: 'settings', values: { stop_time: value } })
           }}
         />
-        <Select
+        <NativeSelect
           size="xs"
           w={160}
           aria-label="Speed"
           data={SPEEDS}
-          defaultValue=""
-          allowDeselect={false}
-          onChange={(value) => {
-            speed = value ?? ''
-            if (busy && runKey) void ask({ kind: 'speed', run: runKey, speed: speed ? Number(speed) : null })
+          value={speed ?? ''}
+          onChange={({ currentTarget }) => {
+            const chosen = currentTarget.value ? Number(currentTarget.value) : null
+            useRuns.setState({ speed: chosen })
+            if (busy && runKey) void ask({ kind: 'speed', run: runKey, speed: chosen })
           }}
         />
       </Group>

@@ -8,6 +8,7 @@ taken back: they hold from the instant to which the run has returned.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -33,6 +34,11 @@ class Mark:
     state: RunState | None
     diagram: Diagram
     parameters: Mapping[str, Array]
+
+    @property
+    def time(self) -> float:
+        """Time at which the run stood, s."""
+        return -math.inf if self.state is None else self.state.time
 
     @property
     def size(self) -> int:
@@ -101,6 +107,15 @@ class RunHistory:
         if self.recorded > recorded and len(self._marks) > 1:
             self._resume(self._marks[-1])
         self._tune_to(tuned)
+
+    def stand_at(self, time: float) -> None:
+        """Stand exactly at a time (s) beyond which the last step went: it is taken again, up to there."""
+        while len(self._marks) > 1 and self._marks[-1].time > time:
+            self._marks.pop()
+        tuned = self.run.diagram
+        self._resume(self._marks[-1])
+        self._tune_to(tuned)
+        self.run.advance(time, exactly=True)
 
     def _resume(self, mark: Mark) -> None:
         simulation = self.run.simulation

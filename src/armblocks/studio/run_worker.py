@@ -35,6 +35,7 @@ from armblocks.studio.frames import sample_frame, thinned
 from armblocks.studio.parameter_values import tuned_value
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.run_history import RunHistory
+from armblocks.studio.run_pace import Pace
 from armblocks.studio.tunables import tunables
 
 Array = NDArray[np.float64]
@@ -94,18 +95,18 @@ class _Run:
         self.pipe = pipe
         self.key: str = job["run"]
         self.document: str = job["document"]
-        self.speed: float | None = job["speed"]
+        self.pace = Pace(job["speed"])
         self.job = job
         self.tuned: dict[str, Any] = job["tuned"]
         self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
         self.time = 0.0
+        """How far the page is told; the run itself may be further by a step, where the clock is not."""
         self.count = 0
         """How many recorded instants have been told."""
         self.stride = 1
         """Of so many instants a page gets the extremes only."""
         self.times: Array = np.empty(0)
         self.began = perf_counter()
-        self.paced_from = (0.0, self.began)
 
     def run(self) -> None:
         """The whole run, to its end or to the reason why it has none."""
@@ -127,11 +128,11 @@ class _Run:
         self.stride = stride_of(history.run)
         self._tell_start(history.run)
         self.began = perf_counter()
-        self.paced_from = (0.0, self.began)
+        self.pace.count_from(0.0)
         while True:
             self._advance(history)
             self._send_samples(history)
-            if history.run.finished:
+            if history.run.finished and self.count == history.recorded:
                 report = history.run.result().run
                 self._end("done", report.message, report.solver, report.reason)
                 return
@@ -146,13 +147,10 @@ class _Run:
         if self.state == "paused":
             history.step()
             return
-        history.mark()
-        if self.speed is None:
-            run.advance(wall_time=FRAME_SECONDS)
-        else:
-            from_time, from_clock = self.paced_from
-            due = from_time + self.speed * (perf_counter() - from_clock)
-            run.advance(max(due, np.nextafter(run.time, np.inf)), wall_time=FRAME_SECONDS)
+        due = self.pace.due
+        if run.time < due:
+            history.mark()
+            run.advance(None if due == math.inf else due, wall_time=FRAME_SECONDS)
 
     def _listen(self, history: RunHistory) -> bool:
         """Obey what has been said, wait while paused or ahead of the clock; ``False`` to stop."""
@@ -160,7 +158,7 @@ class _Run:
             wait = 0.0
             if self.state == "paused":
                 wait = 0.5
-            elif self.speed is not None:
+            elif self.pace.speed is not None:
                 wait = FRAME_SECONDS
             if not self.pipe.poll(wait):
                 if self.state == "paused":
@@ -171,30 +169,32 @@ class _Run:
                 case "control", "stop":
                     return False
                 case "control", "pause":
+                    self._stand_where_shown(history)
                     self._become("paused")
                 case "control", "resume":
                     self._become("running")
                 case "control", "step":
                     return True
                 case "control", "back":
-                    self._go_back(history, history.recorded - 1)
+                    self._go_back(history, self.count - 1)
                 case "rewind", _:
                     told = int(np.searchsorted(self.times, float(command["time"]), "right"))
                     self._go_back(history, told if self.stride == 1 else told * self.stride // 2)
                 case "speed", _:
-                    self.speed = command["speed"]
-                    self.paced_from = (self.time, perf_counter())
+                    self.pace.speed = command["speed"]
+                    self.pace.count_from(self.time)
                 case _:
                     self._tune(history, command["parameter"], command["value"])
 
     def _become(self, state: Literal["running", "paused"]) -> None:
         self.state = state
-        self.paced_from = (self.time, perf_counter())
+        self.pace.count_from(self.time)
         self._progress()
 
     def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
         """Change a parameter from here on; a refusal is told and the run goes on."""
         try:
+            self._stand_where_shown(history)
             history.tune(parameter, tuned_value(value, parameter))
         except ArmblocksError as error:
             self._progress(error.what, _fault(error))
@@ -210,6 +210,12 @@ class _Run:
         self.times = self.times[:told]
         self._tell(say.RunRewound(run=self.key, time=self.time, count=told))
         self._become("paused")
+
+    def _stand_where_shown(self, history: RunHistory) -> None:
+        """Return to what is shown, where the run is beyond it, and tell all that is recorded until then."""
+        if history.run.time > self.time:
+            history.stand_at(self.time)
+            self._send_samples(history)
 
     # -- what the hub is told --------------------------------------------------------------------------------
 
@@ -244,13 +250,16 @@ class _Run:
         )
 
     def _send_samples(self, history: RunHistory) -> None:
+        """What is recorded and due by the clock; while paused, all."""
         fresh = history.samples(self.count)
-        ready = fresh.time.size
-        if not history.run.finished:
+        due = math.inf if self.state == "paused" else self.pace.due
+        ready = int(np.searchsorted(fresh.time, due, "right"))
+        last = history.run.finished and ready == fresh.time.size
+        if not last:
             ready -= ready % self.stride
         if ready:
-            self._send(fresh.time[:ready], fresh.signals[:, :ready], last=history.run.finished)
-        self.time = history.run.time
+            self._send(fresh.time[:ready], fresh.signals[:, :ready], last=last)
+        self.time = min(due, history.run.time)
 
     def _send(self, time: Array, signals: Array, *, last: bool) -> None:
         self.count += time.size

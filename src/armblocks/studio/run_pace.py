@@ -1,0 +1,27 @@
+"""How fast a run is shown: so many simulated seconds for each second of the clock, or as fast as it gets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from time import perf_counter
+
+
+class Pace:
+    """The simulated time that is due by the clock; ``speed`` is ``None`` where nothing waits for it."""
+
+    def __init__(self, speed: float | None, clock: Callable[[], float] = perf_counter) -> None:
+        self.speed = speed
+        self._clock = clock
+        self.count_from(0.0)
+
+    def count_from(self, time: float) -> None:
+        """Let the simulated ``time`` (s) be what is due now."""
+        self._time, self._since = time, self._clock()
+
+    @property
+    def due(self) -> float:
+        """Simulated time (s) up to which a run is to be shown by now; infinite without a speed."""
+        if self.speed is None:
+            return math.inf
+        return self._time + self.speed * (self._clock() - self._since)
