@@ -6,7 +6,13 @@ from pathlib import Path
 
 import pytest
 
-PACKAGES = ("armblocks", "armblocks.equations", "armblocks.formats")
+PACKAGES = (
+    "armblocks",
+    "armblocks.equations",
+    "armblocks.formats",
+    "armblocks.report",
+    "armblocks.simulation",
+)
 
 
 def homes_for_type_checkers(package: str) -> dict[str, str]:
@@ -32,6 +38,18 @@ def test_every_name_is_found_where_type_checkers_look(package: str) -> None:
             assert found is importlib.import_module(home)
         else:
             assert found is getattr(importlib.import_module(home), name)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_name_is_that_of_a_module_which_holds_it(package: str) -> None:
+    # Importing the module would put it in the place of what it holds.
+    module = importlib.import_module(package)
+    homes = homes_for_type_checkers(package)
+    folder = Path(module.__file__ or "").parent
+    modules = {path.stem for path in folder.iterdir()}
+    assert {name for name, home in homes.items() if name in modules} <= {
+        name for name, home in homes.items() if home == f"{package}.{name}"
+    }
 
 
 @pytest.mark.parametrize("package", PACKAGES)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from armblocks.report.arm_picture import arm_picture, arm_picture_svg, moments_picture
+from armblocks.report.arm_drawing import arm_picture, arm_picture_svg, moments_picture
 from armblocks.report.camera import Camera
 from armblocks.report.picture import Polyline, Raster, text_marks
 from armblocks.report.render import cropped, faded, over, render, shadow

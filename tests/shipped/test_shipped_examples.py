@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import armblocks as ab
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, diagram_views
-from armblocks.formats import list_examples, load_diagram
+from armblocks.formats import example_descriptions, list_examples, load_diagram
 
 PROMISED = {
     "bouncing_ball",
@@ -39,6 +39,10 @@ def test_example_is_named_as_its_file_and_every_block_is_placed(example: Diagram
     assert example.name in list_examples()
     assert set(example.layout) == set(example.blocks)
     assert diagram_views(example), "something is to be seen"
+
+
+def test_what_an_example_shows_is_read_without_building_it(example: Diagram) -> None:
+    assert example_descriptions()[example.name] == example.description
 
 
 def test_blocks_do_not_lie_on_one_another(example: Diagram) -> None:

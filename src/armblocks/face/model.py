@@ -24,7 +24,7 @@ from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
 from armblocks.simulation import LogRequest, RunState, Simulation, SimulationResult
 from armblocks.simulation.plan import changed_parameters
-from armblocks.simulation.simulate import Progress, run_to_the_end
+from armblocks.simulation.whole_run import Progress, run_to_the_end
 
 
 class CompiledDiagram:

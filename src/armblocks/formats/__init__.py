@@ -7,6 +7,7 @@ from armblocks.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
     from armblocks.formats.diagram_files import (
+        example_descriptions,
         list_examples,
         load_diagram,
         load_library,
@@ -36,6 +37,7 @@ else:
             "diagram_from_bytes": "armblocks.formats.diagram_json",
             "diagram_to_bytes": "armblocks.formats.diagram_json",
             "diagram_to_python": "armblocks.formats.diagram_python",
+            "example_descriptions": "armblocks.formats.diagram_files",
             "kind_of_data": "armblocks.formats.document_kinds",
             "kind_of_document": "armblocks.formats.document_kinds",
             "list_examples": "armblocks.formats.diagram_files",
@@ -64,6 +66,7 @@ __all__ = [
     "diagram_from_bytes",
     "diagram_to_bytes",
     "diagram_to_python",
+    "example_descriptions",
     "kind_of_data",
     "kind_of_document",
     "list_examples",

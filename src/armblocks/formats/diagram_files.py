@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from os import PathLike, fspath
 from pathlib import Path
+from types import MappingProxyType
 
 from armblocks.diagram import BlockLibrary, Diagram, check_block_name
 from armblocks.errors import UnknownNameError
 from armblocks.files import read_bounded, write_atomically
 from armblocks.formats.diagram_json import (
+    DEEPEST,
     MOST_BYTES,
     diagram_from_bytes,
     diagram_to_bytes,
     library_to_bytes,
     read_library,
 )
+from armblocks.formats.json_document import read_document
 from armblocks.formats.robot_files import load_robot, shipped_folder
 from armblocks.formats.robot_references import ResolveRobot
 from armblocks.formats.subsystem_libraries import library_path
@@ -26,6 +30,19 @@ SUFFIX = ".json"
 def list_examples() -> tuple[str, ...]:
     """Names of the shipped diagrams, sorted."""
     return tuple(sorted(path.stem for path in shipped_folder("examples").glob(f"*{SUFFIX}")))
+
+
+@cache
+def example_descriptions() -> Mapping[str, str]:
+    """What the shipped diagrams show, by name: read from their files, without building a diagram."""
+    folder = shipped_folder("examples")
+    return MappingProxyType({name: _description(folder / f"{name}{SUFFIX}") for name in list_examples()})
+
+
+def _description(path: Path) -> str:
+    document = read_document(read_bounded(path, MOST_BYTES), str(path), MOST_BYTES, DEEPEST)
+    members = document.members()
+    return members["description"].text() if "description" in members else ""
 
 
 def load_diagram(

@@ -14,7 +14,7 @@ from armblocks.analysis.spectrum import SignalSpectrum, signal_spectrum
 from armblocks.blocks import Mux
 from armblocks.diagram import Diagram, SpectrumSettings, View, ViewKind, diagram_views, flat_diagram
 from armblocks.errors import InputError
-from armblocks.report.arm_picture import moments_picture
+from armblocks.report.arm_drawing import moments_picture
 from armblocks.report.charts import Panel, Trace, fits_beside, time_chart
 from armblocks.report.motion import Motion
 from armblocks.report.numbers import axis_number, si_prefix

@@ -8,7 +8,6 @@ import dataclasses
 import secrets
 import warnings
 from collections.abc import Awaitable, Callable, Sequence
-from functools import lru_cache
 from importlib.metadata import version
 from typing import Any
 
@@ -97,7 +96,7 @@ class Hub:
                 robots=list(formats.list_robots()),
                 solvers=solver_choices(),
                 settings=setting_rules(),
-                examples=_examples(),
+                examples=dict(formats.example_descriptions()),
                 files=self.folder.files(),
                 recent=self._recent(),
                 documents=[document.state() for document in self.documents],
@@ -406,9 +405,3 @@ class Hub:
             run.end()
         if self._spare is not None:
             self._spare.end()
-
-
-@lru_cache(maxsize=1)
-def _examples() -> dict[str, str]:
-    """What the examples show, by name; they are read once, and not for each page that comes."""
-    return {name: formats.load_diagram(name, BLOCKS).description for name in formats.list_examples()}

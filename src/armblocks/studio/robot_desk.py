@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from armblocks import formats
 from armblocks.errors import ArmblocksWarning, FormatError, InputError, UnknownNameError
 from armblocks.face.arm import Arm
-from armblocks.report.arm_picture import arm_picture_svg
+from armblocks.report.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot, standard_dh
 from armblocks.studio import robot_messages as say
 from armblocks.studio.history import History
