@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from accessibility import axe
 from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
 
 from conftest import PATIENCE_MS, TOUR_SEEN, Studio
@@ -212,7 +213,8 @@ def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, se
     add(page, "sine wave")
     expect(block(page, "Sine Wave")).to_be_visible()
     old.kill()
-    expect(page.get_by_text("The studio does not answer")).to_be_visible(timeout=3000)
+    expect(page.get_by_text("The studio does not answer")).to_be_visible()
+    axe(page)
     add(page, "gain")  # waits in the page
     server.append(Studio(old.folder))
     assert server[-1].address == old.address

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from accessibility import axe
 from playwright.sync_api import Locator, Page, expect
 
 from armblocks.blocks import BLOCKS
@@ -237,15 +238,3 @@ def test_every_block_of_the_library_is_added_opened_and_saved(sheet: Page) -> No
     sheet.get_by_role("combobox", name="File").fill("every block.json")
     sheet.get_by_role("button", name="Save", exact=True).click()
     expect(sheet.locator(".title")).to_have_text("every block")
-
-
-def axe(page: Page) -> None:
-    script = Path(__file__).parents[2] / "frontend" / "node_modules" / "axe-core" / "axe.min.js"
-    page.evaluate(script.read_text(encoding="utf-8"))
-    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
-    serious = [
-        (rule["id"], rule["nodes"][0]["html"][:200])
-        for rule in found["violations"]
-        if rule["impact"] in ("serious", "critical")
-    ]
-    assert serious == []
