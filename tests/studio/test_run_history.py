@@ -16,8 +16,9 @@ from armblocks.face.model import CompiledDiagram
 from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
 from armblocks.studio import messages as say
 from armblocks.studio.run_history import RunHistory
-from armblocks.studio.run_process import RunProcess, Worker
+from armblocks.studio.run_process import RunProcess
 from armblocks.studio.tunables import tunables
+from armblocks.studio.workers import Worker
 
 
 @pytest.mark.parametrize(

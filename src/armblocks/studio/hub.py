@@ -30,16 +30,19 @@ from armblocks.studio.parameter_values import parameter_json, parameter_value
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
-from armblocks.studio.run_process import RunProcess, Worker
+from armblocks.studio.run_process import RunProcess
 from armblocks.studio.run_record import RunRecord, Said
 from armblocks.studio.run_report import report_of
 from armblocks.studio.run_settings import setting_rules, solver_choices
 from armblocks.studio.sheet import library, sheet, sheet_change
 from armblocks.studio.state_folder import StateFolder
 from armblocks.studio.typed_settings import setting_faults
+from armblocks.studio.workers import Workers
 
 GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
 """What sending to a page raises that has left."""
+PAGE_SECONDS = 1.5
+"""A page that has its document draws for so long: the process for its first run is made after that."""
 SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]
 
@@ -75,12 +78,11 @@ class Hub:
         self.runs: dict[str, RunProcess] = {}
         self.robots = RobotDesk(folder, self)
         self.records: dict[str, RunRecord] = {}
-        self._spare: Worker | None = None
+        self.workers = Workers()
         self._watching: asyncio.Task[None] | None = None
 
     def prepare(self) -> None:
-        """Have a process ready for the first run, and look after the files from now on."""
-        self._spare = Worker()
+        """Look after the files from now on."""
         self.folder.sweep(self.documents.kept.recent())
         self._watching = asyncio.get_running_loop().create_task(self.documents.watch(self._tell_state))
 
@@ -195,6 +197,7 @@ class Hub:
             await self._tell_run(page, run)
         await self._tell_documents()
         self._check_later(found)
+        self.workers.prepare(after=PAGE_SECONDS)
         return found.key
 
     async def _tell_run(self, page: Page, run: str) -> None:
@@ -370,6 +373,7 @@ class Hub:
             pages = [page for page in self.pages if found.key in page.shows and key not in page.hears]
             await asyncio.gather(*(page.send(said) for page in pages))
 
+        worker = await self.workers.take()
         for other in list(self.runs.values()):
             if other.document == found.key:
                 other.end()
@@ -383,10 +387,9 @@ class Hub:
             "speed": request.speed,
             "tuned": request.tuned,
         }
-        run = RunProcess(key, found.key, self._spare or Worker(), tell)
+        run = RunProcess(key, found.key, worker, tell)
         self.runs[key], self.records[key] = run, record
         run.start(job)
-        self._spare = Worker()
         return run.key
 
     async def report(self, document: str) -> bytes:
@@ -403,5 +406,4 @@ class Hub:
         self.documents.end()
         for run in self.runs.values():
             run.end()
-        if self._spare is not None:
-            self._spare.end()
+        self.workers.end()

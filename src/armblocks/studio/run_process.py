@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import multiprocessing
 from collections.abc import Awaitable, Callable
 from multiprocessing.connection import Connection
 from threading import Thread
@@ -18,29 +17,13 @@ from pydantic import TypeAdapter
 
 from armblocks.errors import InputError
 from armblocks.studio import messages as say
-from armblocks.studio.run_worker import work
+from armblocks.studio.workers import Worker
 
 TellRun = Callable[[say.Message | bytes], Awaitable[None]]
 _EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(say.RunEvent)
 STOP_SECONDS = 1.0
 """A worker that has not stopped by itself after this long is ended."""
 ENDED = ("done", "stopped", "failed")
-
-
-class Worker:
-    """A process that waits for a run, with all that is slow to import already there."""
-
-    def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=work, args=(theirs,), daemon=True)
-        self.process.start()
-        theirs.close()
-
-    def end(self) -> None:
-        """End the process at once."""
-        self.process.kill()
-        self.pipe.close()
 
 
 class RunProcess:
@@ -56,6 +39,8 @@ class RunProcess:
         self._tell = tell
         self._loop = asyncio.get_running_loop()
         self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
+        self._forced = False
+        """Whether it was told to stop and did not."""
         self._passing: asyncio.Task[None] | None = None
 
     def start(self, job: dict[str, Any]) -> None:
@@ -79,6 +64,7 @@ class RunProcess:
 
     def _force(self) -> None:
         if self.state not in ENDED:
+            self._forced = True
             self._worker.process.kill()
 
     def _read(self, pipe: Connection) -> None:
@@ -103,12 +89,11 @@ class RunProcess:
                 self.state, last = event.state, event
             await self._tell(event)
         if self.state not in ENDED:
-            self.state = "stopped" if self._worker.process.exitcode == -9 else "failed"
+            self.state = "stopped" if self._forced else "failed"
             await self._tell(self._lost(last))
 
     def _lost(self, last: say.RunProgress | None) -> say.RunProgress:
         """What is said of a worker that ended without a word."""
-        forced = self.state == "stopped"
         fault = say.Fault(
             what="the process of the run ended without a result",
             where="run",
@@ -117,9 +102,9 @@ class RunProcess:
         )
         return say.RunProgress(
             run=self.key,
-            state="stopped" if forced else "failed",
+            state="stopped" if self._forced else "failed",
             time=last.time if last else 0.0,
             real_time_factor=0.0,
-            message="stopped" if forced else "",
-            fault=None if forced else fault,
+            message="stopped" if self._forced else "",
+            fault=None if self._forced else fault,
         )

@@ -7,7 +7,6 @@ was tuned or stopped on the way is not repeated.
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
 import tempfile
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
@@ -16,6 +15,7 @@ from typing import Any
 
 from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.studio.run_worker import begun, limit_process
+from armblocks.studio.workers import process_context
 
 MOST_SECONDS = 300.0
 
@@ -25,7 +25,7 @@ async def report_of(job: Mapping[str, Any]) -> bytes:
 
     Raises ``SimulationError`` with what the run or the report refused, or where it takes too long.
     """
-    context = multiprocessing.get_context("spawn")
+    context = process_context()
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_write, args=(theirs, dict(job)), daemon=True)
     process.start()

@@ -9,7 +9,6 @@ and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fa
 from __future__ import annotations
 
 import contextlib
-import importlib
 import json
 import math
 import signal
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
+from armblocks.compiler.target import host_target
 from armblocks.diagram import diagram_views
 from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.face.diagram_run import DiagramRun
@@ -48,10 +48,10 @@ MOST_NUMBERS = 16_000_000
 
 
 def work(pipe: Connection) -> None:
-    """Import what a run needs, wait for the job, run it."""
+    """Get ready for any run, wait for the job, run it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server
     limit_process()
-    importlib.import_module("armblocks.compiler.native_integrator")  # slow, and needed by every run
+    host_target()  # starts LLVM, which takes longer than most runs
     with contextlib.suppress(EOFError, OSError):
         job = json.loads(pipe.recv_bytes())
         _Run(pipe, job).run()
