@@ -1,4 +1,5 @@
 import type { Envelope, ServerMessage } from './protocol'
+import { keepUnsent, unsent } from './unsent'
 
 export type Request = Envelope['request']
 export type ServerEvent = ServerMessage['event']
@@ -35,7 +36,8 @@ const DEAD_MS = 10_000
 
 /**
  * The websocket to the server. What was not answered when the line broke, and what is asked while it is down, is sent
- * when it is back and the page has its document again (`resend`): edits carry keys, so the server does each once.
+ * when it is back and the page has its document again (`resend`): edits carry keys, so the server does each once, and
+ * they outlive a reload of the page.
  */
 export class Connection {
   private socket: WebSocket | null = null
@@ -50,7 +52,9 @@ export class Connection {
     private readonly onEvent: (event: ServerEvent) => void,
     private readonly onFrame: (frame: ArrayBuffer) => void,
     private readonly onLine: (line: Line) => void,
+    onRefused: (reason: Refusal) => void,
   ) {
+    for (const request of unsent()) this.waiting.set(++this.number, { request, resolve: () => {}, reject: onRefused })
     setInterval(() => this.listen(), PING_MS)
   }
 
@@ -75,6 +79,7 @@ export class Connection {
       if (this.socket !== socket) return
       this.flowing = false
       this.forget('attach')
+      this.forget('robot_attach')
       void strange().then((stranger) => this.onLine(stranger ? 'stranger' : 'down'))
       setTimeout(() => this.open(), this.delay)
       this.delay = Math.min(2 * this.delay, LONGEST_DELAY_MS)
@@ -108,7 +113,8 @@ export class Connection {
     const number = ++this.number
     return new Promise<T>((resolve, reject) => {
       this.waiting.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
-      if (this.flowing || request.kind === 'attach') this.send(number, request)
+      this.keep()
+      if (this.flowing || request.kind === 'attach' || request.kind === 'robot_attach') this.send(number, request)
     })
   }
 
@@ -116,6 +122,10 @@ export class Connection {
   resend(): void {
     this.flowing = true
     for (const [number, { request }] of this.waiting) this.send(number, request)
+  }
+
+  private keep(): void {
+    keepUnsent([...this.waiting.values()].map(({ request }) => request))
   }
 
   private send(number: number, request: Request): void {
@@ -130,6 +140,7 @@ export class Connection {
     const waiting = this.waiting.get(event.number)
     if (!waiting) return
     this.waiting.delete(event.number)
+    this.keep()
     const { fault } = event
     if (fault) waiting.reject(new Refusal(fault.what, fault.where, fault.allowed, fault.fix))
     else waiting.resolve(event.value)

@@ -42,6 +42,8 @@ export interface Envelope {
     | RobotChange
     | RobotUndo
     | RobotRedo
+    | RobotReload
+    | RobotKeepMine
     | RobotSave
     | RobotForm
     | RobotBodies
@@ -89,10 +91,10 @@ export interface Look {
  * Carry out an edit.
  */
 export interface Change {
-  document: string;
   key?: string;
   base?: number | null;
   author?: string;
+  document: string;
   kind: "change";
   inside?: string[];
   edit:
@@ -282,30 +284,30 @@ export interface Describe {
  * Take the last edit back.
  */
 export interface Undo {
-  document: string;
   key?: string;
   base?: number | null;
   author?: string;
+  document: string;
   kind: "undo";
 }
 /**
  * Do again what was undone.
  */
 export interface Redo {
-  document: string;
   key?: string;
   base?: number | null;
   author?: string;
+  document: string;
   kind: "redo";
 }
 /**
  * Lay the blocks out anew, from left to right.
  */
 export interface ArrangeBlocks {
-  document: string;
   key?: string;
   base?: number | null;
   author?: string;
+  document: string;
   kind: "arrange";
   inside?: string[];
 }
@@ -313,10 +315,10 @@ export interface ArrangeBlocks {
  * Take what the file holds now, as one step that can be undone.
  */
 export interface Reload {
-  document: string;
   key?: string;
   base?: number | null;
   author?: string;
+  document: string;
   kind: "reload";
 }
 /**
@@ -371,7 +373,7 @@ export interface Close {
   discard?: boolean;
 }
 /**
- * Say what becomes of a drawing that a journal gives back.
+ * Say what becomes of a drawing or a robot that a journal gives back.
  *
  * ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
  * from and opens that; ``discard`` deletes the journal.
@@ -486,21 +488,28 @@ export interface RobotOfBlock {
   block: string;
 }
 /**
- * Show a robot that is open already: after a reload, or in a second page.
+ * Show a robot that is open already: after a reload, after the line was down, or in a second page.
+ *
+ * Where the server was started anew and does not know it, it comes from its journal, or else from the file
+ * or the shipped robot of these names, under the same key: edits that wait to be sent again find it.
  */
 export interface RobotAttach {
   kind: "robot_attach";
   robot: string;
+  path?: string | null;
+  shipped?: string;
 }
 /**
- * Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once.
+ * Carry out an edit.
  *
  * Changes in a row of one ``gesture`` (the letters typed into one cell) are one step of undo.
  */
 export interface RobotChange {
-  kind: "robot_change";
+  key?: string;
+  base?: number | null;
+  author?: string;
   robot: string;
-  key: string;
+  kind: "robot_change";
   gesture?: string;
   edit: SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention;
 }
@@ -556,14 +565,37 @@ export interface SetConvention {
  * Take the last edit back.
  */
 export interface RobotUndo {
-  kind: "robot_undo";
+  key?: string;
+  base?: number | null;
+  author?: string;
   robot: string;
+  kind: "robot_undo";
 }
 /**
  * Do again what was undone.
  */
 export interface RobotRedo {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  robot: string;
   kind: "robot_redo";
+}
+/**
+ * Take what the file holds now, as one step that can be undone.
+ */
+export interface RobotReload {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  robot: string;
+  kind: "robot_reload";
+}
+/**
+ * Leave the file that has changed on the disk until the next save, which overwrites it.
+ */
+export interface RobotKeepMine {
+  kind: "robot_keep_mine";
   robot: string;
 }
 /**
@@ -765,20 +797,22 @@ export interface DocumentState {
   journaled?: boolean;
 }
 /**
- * A drawing that was not saved when the studio ended, as its journal gives it back.
+ * A drawing or a robot that was not saved when the studio ended, as its journal gives it back.
  *
  * ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
- * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are.
- * ``disk`` says whether the file is still the one that was edited. ``missing`` says what could not be read.
+ * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
+ * ``parts`` how many blocks or links it has. ``disk`` says whether the file is still the one that was
+ * edited. ``missing`` says what could not be read.
  */
 export interface Recovery {
+  holds: "diagram" | "robot";
   document: string;
   title: string;
   path: string | null;
   began: number;
   last: number;
   edits: number;
-  blocks: number;
+  parts: number;
   disk: "same" | "changed" | "gone";
   missing: string;
 }
@@ -1003,6 +1037,8 @@ export interface RobotShown {
   path: string | null;
   shipped: string;
   dirty: boolean;
+  disk: "same" | "changed" | "gone";
+  journaled: boolean;
   undo: string;
   redo: string;
   name: string;

@@ -146,7 +146,6 @@ function receive(event: ServerEvent): void {
         documents: event.documents,
       })
       void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
-      attachAgain()
       break
     }
     case 'documents':
@@ -245,6 +244,12 @@ function receive(event: ServerEvent): void {
 
 /** Show the document that this page showed before, or else what its address names; then let requests flow. */
 async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
+  const robot = await attachAgain()
+  await showDocumentAgain(welcome)
+  if (robot) robotOpened(robot)
+}
+
+async function showDocumentAgain(welcome: EventOf<'welcome'>): Promise<void> {
   const shown = useStudio.getState().document
   const last = shown ? { ...shown.state, inside: shown.inside } : lastShown()
   if (last) {
@@ -275,6 +280,7 @@ export const line = new Connection(
   receive,
   (frame) => samples.receive(frame),
   (state) => useStudio.setState({ line: state }),
+  (reason) => refuse(reason),
 )
 
 let notices = 0
@@ -297,7 +303,7 @@ export async function ask<T = unknown>(request: Request): Promise<T | undefined>
 }
 
 /** By what the server tells the edits of this page from those of others. */
-const author = newKey()
+export const author = newKey()
 
 /** What goes with everything that changes a drawing: which, what of it this page saw, and a key to do it once. */
 function alteration(document: OpenDocument) {

@@ -231,6 +231,39 @@ def test_edits_survive_a_killed_server_and_go_on_in_the_same_page(page: Page, se
     save_as(page, "killed.json")
 
 
+def test_robot_edits_survive_a_killed_server_and_a_reload(page: Page, server: list[Studio]) -> None:
+    old = server[-1]
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name="New robot").click()
+    editor = page.locator(".robot-editor")
+    length = editor.get_by_role("textbox", name="a of link1", exact=True)
+    length.fill("0.75")
+    length.press("Enter")
+    expect(editor.get_by_label("changed", exact=True)).to_be_visible()
+    old.kill()
+    expect(page.get_by_text("The studio does not answer")).to_be_visible(timeout=3000)
+    other = editor.get_by_role("textbox", name="a of link2", exact=True)
+    other.fill("0.25")  # waits in the page, and outlives it
+    other.press("Enter")
+    server.append(Studio(old.folder))
+    page.reload()
+    expect(length).to_have_value("0.75")
+    expect(other).to_have_value("0.25")
+    page.locator(".robot-editor .title").click()  # no cell has the keys
+    page.keyboard.press("Escape")
+    for value in ("0.5", "0.25"):
+        page.get_by_role("button", name="Undo" if value == "0.5" else "Redo").click()
+        expect(other).to_have_value(value)
+    page.keyboard.press("Control+s")
+    page.get_by_role("textbox", name="File in this folder").fill("arm.json")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(editor.get_by_text("arm.json")).to_be_visible()
+    assert [link["dh"]["a"] for link in json.loads((old.folder / "arm.json").read_text())["links"]] == [
+        0.75,
+        0.25,
+    ]
+
+
 def test_a_page_that_comes_after_the_crash_is_offered_what_was_drawn(
     page: Page, context: BrowserContext, server: list[Studio]
 ) -> None:

@@ -5,50 +5,23 @@ from __future__ import annotations
 import asyncio
 import os
 import random
-import shutil
-from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
 
 import pytest
+from crashed_disk import Disk, going
 
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
 from armblocks.studio import messages as say
 from armblocks.studio.edits import AddBlocks, Edit, MoveBlocks, NewBlock, Place, SetParameters
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.state_folder import StateFolder
-
-
-class Disk:
-    """A project folder and what the studio keeps for it, as a studio that starts finds them."""
-
-    def __init__(self, root: Path) -> None:
-        self.project = ProjectFolder(root / "project")
-        self.kept = StateFolder(self.project.root)
-        self.kept.root = root / "state"
-        self.kept.journals = root / "state" / "journals"
-
-    def documents(self) -> OpenDocuments:
-        return OpenDocuments(self.project, self.kept, load_robot)
-
-    def as_after_a_crash(self, root: Path) -> Disk:
-        """The same disk, seen by a studio that starts after the one that writes now was killed."""
-        for name in ("project", "state"):
-            if (self.project.root.parent / name).exists():
-                shutil.copytree(self.project.root.parent / name, root / name)
-        return Disk(root)
 
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Disk:
     (tmp_path / "first" / "project").mkdir(parents=True)
     return Disk(tmp_path / "first")
-
-
-def going(talking: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    asyncio.run(talking())
 
 
 def change(key: str, edit: Edit, **more: Any) -> say.Change:
@@ -105,7 +78,7 @@ def test_any_edits_come_back_with_their_past_and_future(disk: Disk, tmp_path: Pa
             await documents.save(found, "saved.json", overwrite=False)
         carry_out(documents, found, random_requests(seed + 1000, 150))
         after = disk.as_after_a_crash(tmp_path / "second").documents()
-        back = after.attach(say.Attach(document=found.key))
+        back = after.attach(found.key)
         assert content(back) == content(found)
         assert back.document.version == found.document.version
         assert back.document.dirty == found.document.dirty
@@ -137,7 +110,7 @@ def test_a_long_journal_is_read_from_its_last_snapshot(disk: Disk, tmp_path: Pat
                 break
         for k in range(300):
             documents.perform(found, say.Undo(document="", key=f"u{k}"))
-        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(say.Attach(document=found.key))
+        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
         assert content(back) == content(found)
         assert back.document.diagram.blocks["gain"].parameter_value("gain") == 149.0
 
@@ -152,7 +125,7 @@ def test_a_journal_torn_anywhere_gives_back_what_was_before(disk: Disk, tmp_path
         for k in range(6):
             documents.perform(found, change(str(k), add(f"b{k}")))
             states.append(content(found))
-        journal = disk.kept.journals / f"{found.key}.journal"
+        journal = disk.kept.journals / f"{found.key}.diagram"
         whole = journal.read_bytes()
         ends = [0, *(k + 1 for k, byte in enumerate(whole) if byte == 10)]
         other = disk.as_after_a_crash(tmp_path / "second")
@@ -181,7 +154,7 @@ def test_an_edit_sent_again_after_the_crash_is_done_once(disk: Disk, tmp_path: P
         found = documents.new()
         documents.perform(found, change("one", add("gain")))
         after = disk.as_after_a_crash(tmp_path / "second").documents()
-        back = after.attach(say.Attach(document=found.key))
+        back = after.attach(found.key)
         assert not after.perform(back, change("one", add("gain")))
         assert after.perform(back, change("two", add("gain 2")))
         assert sorted(back.document.diagram.blocks) == ["gain", "gain 2"]
@@ -197,16 +170,16 @@ def test_a_page_finds_its_document_again_after_the_server_was_started_anew(disk:
         first.end()
         documents = disk.documents()
         key = "0123456789abcdef"
-        found = documents.attach(say.Attach(document=key, path="a.json"))
+        found = documents.attach(key, path="a.json")
         assert found.key == key
-        again = documents.attach(say.Attach(document="f" * 16, path="a.json"))
+        again = documents.attach("f" * 16, path="a.json")
         assert again is found
         assert documents["f" * 16] is found
-        example = documents.attach(say.Attach(document="e" * 16, example="van_der_pol_pid"))
+        example = documents.attach("e" * 16, origin="van_der_pol_pid")
         assert example.document.diagram.name == "van_der_pol_pid"
-        assert documents.attach(say.Attach(document="d" * 16)).document.diagram.blocks == {}
+        assert documents.attach("d" * 16).document.diagram.blocks == {}
         with pytest.raises(ArmblocksError, match="there is no such file"):
-            documents.attach(say.Attach(document="c" * 16, path="gone.json"))
+            documents.attach("c" * 16, path="gone.json")
 
     going(talking)
 
@@ -265,7 +238,7 @@ def test_a_recovery_is_discarded_only_when_told_so(disk: Disk, tmp_path: Path) -
         after = second.documents()
         assert len(after.recoveries()) == 1
         assert await after.recover(say.Recover(document=found.key, action="discard")) is None
-        with pytest.raises(ArmblocksError, match="there is no drawing to recover named"):
+        with pytest.raises(ArmblocksError, match="there is no diagram to recover named"):
             await after.recover(say.Recover(document=found.key, action="open"))
         assert second.documents().recoveries() == []
 
@@ -334,7 +307,7 @@ def test_a_disk_that_refuses_the_journal_keeps_nobody_from_drawing(
         documents.perform(found, say.Undo(document="", key="4"))
         documents.perform(found, say.Redo(document="", key="5"))
         assert found.state().journaled
-        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(say.Attach(document=found.key))
+        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
         assert content(back) == content(found)
 
     going(talking)

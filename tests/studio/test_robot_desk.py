@@ -88,7 +88,7 @@ def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_
         assert any("broken as on a printed page" in note for note in opening["notes"])
         key = opening["robots"][0]["robot"]
         shown = talk.shown()
-        assert (shown["path"], shown["dirty"], shown["convention"]) == (None, False, "standard")
+        assert (shown["path"], shown["dirty"], shown["convention"]) == (None, True, "standard")
         assert shown["links"][1]["cells"]["mass"] == 150
         assert {finding["link"] for finding in shown["findings"]} == {"link1", "link3"}
         for number, text in enumerate(("1", "1.", "1.5")):
@@ -113,7 +113,7 @@ def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_
         assert "changed on the disk" in await talk.refused("robot_save", robot=key)
         await talk.ask("robot_save", robot=key, overwrite=True)
         (tmp_path / "other.json").write_text("{}")
-        assert "of this name already" in await talk.refused("robot_save", robot=key, path="other.json")
+        assert "such a file already" in await talk.refused("robot_save", robot=key, path="other.json")
 
     talk(tmp_path, talking)
     (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()

@@ -16,9 +16,10 @@ from pydantic import TypeAdapter
 from armblocks.errors import ArmblocksError, InputError, RobotError
 from armblocks.formats import list_robots, load_robot, write_robot
 from armblocks.robot import FrictionModel, JointLimits, Link, Robot, standard_dh
+from armblocks.studio.file_kind import RobotKind
 from armblocks.studio.history import History
+from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_columns import ROBOT_COLUMNS, Quantity
-from armblocks.studio.robot_desk import new_robot
 from armblocks.studio.robot_edits import RobotEdit, angle_value, robot_applied, robot_summary
 from armblocks.studio.robot_link_columns import LINK_COLUMNS
 from armblocks.studio.robot_tables import robot_shown, robot_tables
@@ -27,6 +28,7 @@ PAPER_COLUMNS = (
     *("alpha", "a", "d", "mass", "rx", "ry", "rz", "Ixx", "Iyy", "Izz"),
     *("Jm", "G", "B", "Tc+", "Tc-", "lowest", "highest", "speed"),
 )
+KIND = RobotKind(ProjectFolder("."))
 EDIT: TypeAdapter[RobotEdit] = TypeAdapter(RobotEdit)
 
 
@@ -59,7 +61,7 @@ def test_angles_are_read_in_degrees_or_as_they_say_themselves(text: str, unit: A
 def test_the_paper_s_tables_can_be_typed_in() -> None:
     """From a new robot to the arm of the paper, cell by cell, with the texts of its script."""
     wanted = load_robot("kr180")
-    robot = new_robot()
+    robot = KIND.new()
     for _ in range(2):
         robot = edited(robot, "add", after=robot.links[-1].name)
     for link, text in zip(
@@ -118,7 +120,7 @@ def test_cells_without_a_value_can_be_emptied() -> None:
     motor = typed(bare, name, "Jm", "2e-4").link(name).motor
     assert motor is not None
     assert (motor.inertia, motor.gear_ratio) == (2e-4, 1.0)
-    alone = typed(new_robot(), "link1", "highest", "90").link("link1")
+    alone = typed(KIND.new(), "link1", "highest", "90").link("link1")
     assert alone.joint.limits.position == (-math.pi / 2, math.pi / 2)
 
 
@@ -185,7 +187,7 @@ def test_a_joint_that_begins_to_slide_forgets_its_angles() -> None:
 
 
 def test_links_that_stand_by_transforms_say_so_in_their_cells() -> None:
-    robot = replace(new_robot(), links=(Link(name="plain"), Link(name="next", parent="plain")))
+    robot = replace(KIND.new(), links=(Link(name="plain"), Link(name="next", parent="plain")))
     shown = robot_shown("key", History(robot), None, "", [])
     assert "not by a D-H row" in shown.links[0].locked["alpha"]
     assert shown.convention == ""
@@ -205,7 +207,7 @@ def test_what_no_body_can_have_is_marked_at_its_cells() -> None:
         bad = typed(robot, "link2", "Tc-", "0.1")
     found = robot_shown("key", History(bad), None, "", []).findings
     assert [(f.link, f.columns) for f in found if "Friction" in f.what] == [("link2", ["Tc-"])]
-    bare = replace(new_robot(), links=(standard_dh("link1", a=1.0),))
+    bare = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
     assert "Nothing resists" in robot_shown("key", History(bare), None, "", []).findings[0].what
 
 

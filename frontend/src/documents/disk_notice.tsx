@@ -3,35 +3,28 @@ import { IconAlertTriangle, IconFileAlert, IconHistory } from '@tabler/icons-rea
 import { ask, useStudio } from '../store'
 import { show } from './dialogs'
 
-/** That somebody else has written the file, or that nothing keeps what is drawn: with what can be done. */
-export function DiskNotice() {
-  const state = useStudio((s) => s.document?.state)
-  const lost = useStudio((s) => (s.returned ? s.recoveries.length : 0))
-  if (!state) return null
-  const { document, path, disk, dirty, journaled } = state
+interface Standing {
+  path?: string | null
+  disk: 'same' | 'changed' | 'gone'
+  dirty: boolean
+  journaled: boolean
+}
+
+/** That somebody else has written the file of a drawing or robot, or that nothing keeps its edits: with what can be done. */
+export function FileNotice({ path, disk, dirty, journaled, actions }: Standing & { actions: { reload: () => void; keepMine: () => void; saveAs: () => void } }) {
   return (
     <>
-      {lost > 0 && (
-        <Alert color="blue" icon={<IconHistory />} title={lost === 1 ? 'Another drawing was not saved' : `${lost} other drawings were not saved`}>
-          The studio ended before; its journal has kept what was drawn.
-          <Group gap="xs" mt="xs">
-            <Button size="compact-sm" variant="default" onClick={() => show('recovery')}>
-              Look at {lost === 1 ? 'it' : 'them'}
-            </Button>
-          </Group>
-        </Alert>
-      )}
       {disk === 'changed' && (
         <Alert color="yellow" icon={<IconFileAlert />} title={`${path} has changed on the disk`}>
           {dirty ? 'Your edits are here and in the journal.' : 'You have no edits that are not saved.'} Reloading can be undone.
           <Group gap="xs" mt="xs">
-            <Button size="compact-sm" onClick={() => void ask({ kind: 'reload', document })}>
+            <Button size="compact-sm" onClick={actions.reload}>
               Reload
             </Button>
-            <Button size="compact-sm" variant="default" onClick={() => void ask({ kind: 'keep_mine', document })}>
+            <Button size="compact-sm" variant="default" onClick={actions.keepMine}>
               Keep mine
             </Button>
-            <Button size="compact-sm" variant="default" onClick={() => show('save_as')}>
+            <Button size="compact-sm" variant="default" onClick={actions.saveAs}>
               Save as …
             </Button>
           </Group>
@@ -39,14 +32,42 @@ export function DiskNotice() {
       )}
       {disk === 'gone' && (
         <Alert color="yellow" icon={<IconFileAlert />} title={`${path} is gone from the disk`}>
-          The drawing is here and in the journal; saving writes the file again.
+          What it held is here and in the journal; saving writes the file again.
         </Alert>
       )}
       {!journaled && (
         <Alert color="red" icon={<IconAlertTriangle />} title="The journal cannot be written">
-          What you draw is only in memory: save it. The disk may be full.
+          What you edit is only in memory: save it. The disk may be full.
         </Alert>
       )}
+    </>
+  )
+}
+
+/** What is to be known of the drawing on the screen, and of what else was not saved. */
+export function DiskNotice() {
+  const state = useStudio((s) => s.document?.state)
+  const lost = useStudio((s) => (s.returned ? s.recoveries.length : 0))
+  if (!state) return null
+  const { document, path, disk = 'same', dirty, journaled = true } = state
+  const actions = {
+    reload: () => void ask({ kind: 'reload', document }),
+    keepMine: () => void ask({ kind: 'keep_mine', document }),
+    saveAs: () => show('save_as'),
+  }
+  return (
+    <>
+      {lost > 0 && (
+        <Alert color="blue" icon={<IconHistory />} title={lost === 1 ? 'Something else was not saved' : `${lost} other things were not saved`}>
+          The studio ended before; its journal has kept what was edited.
+          <Group gap="xs" mt="xs">
+            <Button size="compact-sm" variant="default" onClick={() => show('recovery')}>
+              Look at {lost === 1 ? 'it' : 'them'}
+            </Button>
+          </Group>
+        </Alert>
+      )}
+      <FileNotice {...{ path, disk, dirty, journaled, actions }} />
     </>
   )
 }

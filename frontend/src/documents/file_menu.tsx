@@ -1,6 +1,6 @@
 import { ActionIcon, Badge, Kbd, Menu, Text } from '@mantine/core'
 import { IconDeviceFloppy, IconFilePlus, IconFolderOpen, IconHistory, IconMenu2, IconPencil, IconRobot, IconX } from '@tabler/icons-react'
-import { useDesk } from '../robot/editor/desk'
+import { showRobot, useDesk } from '../robot/editor/desk'
 import { ask, useStudio } from '../store'
 import { save, show } from './dialogs'
 
@@ -73,7 +73,7 @@ export function FileMenu() {
         ))}
         {robots.length > 0 && <Menu.Label>Open robots</Menu.Label>}
         {robots.map(({ robot, name, path }) => (
-          <Menu.Item key={robot} onClick={() => void ask({ kind: 'robot_attach', robot })}>
+          <Menu.Item key={robot} onClick={() => void showRobot(robot)}>
             {name} <span className="unit">{path ?? 'not saved'}</span>
           </Menu.Item>
         ))}

@@ -22,7 +22,7 @@ export function RecoveryDialog() {
     if (!recoveries.length && useDialogs.getState().open === 'recovery') show(null)
   }, [recoveries, offered])
   return (
-    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Drawings that were not saved" size="lg">
+    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Work that was not saved" size="lg">
       <Stack gap="sm">
         <Text size="sm" c="dimmed">
           The studio ended before these were saved; its journal has kept them. No file has been changed. What you leave for later
@@ -38,7 +38,7 @@ export function RecoveryDialog() {
 
 function Offer({ recovery }: { recovery: Recovery }) {
   const [sure, setSure] = useState(false)
-  const { document, title, path, began, last, edits, blocks, disk, missing } = recovery
+  const { holds, document, title, path, began, last, edits, parts, disk, missing } = recovery
   const act = (action: 'open' | 'keep_both' | 'discard') => {
     if (action !== 'discard' && useStudio.getState().recoveries.length === 1) show(null)
     void ask({ kind: 'recover', document, action })
@@ -49,7 +49,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
         <div>
           <Text fw={600}>{path ?? `${title}, never saved`}</Text>
           <Text size="sm">
-            {counted(edits, 'edit')} from {when(began)} to {when(last)}; {counted(blocks, 'block')}
+            {counted(edits, 'edit')} from {when(began)} to {when(last)}; {counted(parts, holds === 'robot' ? 'link' : 'block')}
           </Text>
         </div>
         {disk !== 'same' && (
@@ -60,7 +60,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
       </Group>
       {disk === 'changed' && (
         <Text size="sm" mt={6}>
-          Somebody has written {path} since. Keep both saves the recovered drawing as a file of its own beside it.
+          Somebody has written {path} since. Keep both saves the recovered {holds === 'robot' ? 'robot' : 'drawing'} as a file of its own beside it.
         </Text>
       )}
       {missing && (

@@ -30,13 +30,14 @@ class History(Generic[Value]):
 
     ``version`` grows with every change, undo and redo included, and never returns: two pages that show the
     same version show the same value. ``saved`` is the form that the file holds, ``None`` where no file holds
-    one of these.
+    one of these. ``continued`` says whether the last replacement went on with the step before it.
     """
 
     def __init__(self, value: Value, *, version: int = 0) -> None:
         self.value = value
         self.saved: Value | None = value
         self.version = version
+        self.continued = False
         self._past: list[Step[Value]] = []
         self._future: list[Step[Value]] = []
 
@@ -60,7 +61,9 @@ class History(Generic[Value]):
 
         Changes in a row that name the same ``gesture`` are one step: the letters typed into one field.
         """
-        if not (gesture and self._past and self._past[-1].gesture == gesture and not self._future):
+        self.continued = bool(gesture and self._past and self._past[-1].gesture == gesture)
+        self.continued = self.continued and not self._future
+        if not self.continued:
             self._past.append(Step(title, self.value, gesture))
             del self._past[:-MOST_UNDO]
         self._future.clear()

@@ -22,7 +22,7 @@ from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputE
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
-from armblocks.studio.document_journal import Performed
+from armblocks.studio.file_kind import Performed
 from armblocks.studio.nesting import inside, linked_part, with_robot
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.outline import find, outline
@@ -74,17 +74,22 @@ class Hub:
     def __init__(self, folder: ProjectFolder) -> None:
         self.folder = folder
         self.pages: set[Page] = set()
-        self.documents = OpenDocuments(folder, StateFolder(folder.root), self.resolve_robot)
+        kept = StateFolder(folder.root)
+        self.documents = OpenDocuments(folder, kept, self.resolve_robot)
         self.runs: dict[str, RunProcess] = {}
-        self.robots = RobotDesk(folder, self)
+        self.robots = RobotDesk(folder, kept, self)
         self.records: dict[str, RunRecord] = {}
         self.workers = Workers()
-        self._watching: asyncio.Task[None] | None = None
+        self._watching: list[asyncio.Task[None]] = []
 
     def prepare(self) -> None:
         """Look after the files from now on."""
         self.folder.sweep(self.documents.kept.recent())
-        self._watching = asyncio.get_running_loop().create_task(self.documents.watch(self._tell_state))
+        loop = asyncio.get_running_loop()
+        self._watching = [
+            loop.create_task(self.documents.watch(self._tell_state)),
+            loop.create_task(self.robots.robots.watch(self.robots.tell)),
+        ]
 
     # -- pages -----------------------------------------------------------------------------------------------
 
@@ -102,7 +107,7 @@ class Hub:
                 files=self.folder.files(),
                 recent=self._recent(),
                 documents=[document.state() for document in self.documents],
-                recoveries=self.documents.recoveries(),
+                recoveries=self._recoveries(),
             )
         )
         await self.robots.welcome(page)
@@ -169,12 +174,16 @@ class Hub:
         match request:
             case say.Open():
                 path, example = request.path, request.example
-                found = documents.open_example(example) if example else documents.open_path(path)
+                found = documents.open_shipped(example) if example else documents.open_path(path)
                 return await self._show(page, found)
             case say.New():
                 return await self._show(page, documents.new())
             case say.Attach():
-                return await self._show(page, documents.attach(request), tuple(request.inside))
+                return await self._show(
+                    page,
+                    documents.attach(request.document, request.path, request.example),
+                    tuple(request.inside),
+                )
             case say.Look():
                 return await self._show(page, documents[request.document], tuple(request.inside))
 
@@ -225,8 +234,11 @@ class Hub:
         """What is between a document and its file."""
         documents = self.documents
         if isinstance(request, say.Recover):
-            opened = await documents.recover(request)
-            key = await self._show(page, opened) if opened is not None else None
+            if self.robots.robots.waits(request.document):
+                key = await self.robots.recover(page, request)
+            else:
+                opened = await documents.recover(request)
+                key = await self._show(page, opened) if opened is not None else None
             await self._tell_documents()
             return key
         found = documents[request.document]
@@ -258,9 +270,14 @@ class Hub:
         """Tell every page what is open."""
         event = say.Documents(
             documents=[document.state() for document in self.documents],
-            recoveries=self.documents.recoveries(),
+            recoveries=self._recoveries(),
         )
         await asyncio.gather(*(page.tell(event) for page in self.pages))
+
+    def _recoveries(self) -> list[say.Recovery]:
+        """Drawings and robots that wait to be recovered, the latest first."""
+        found = [*self.documents.recoveries(), *self.robots.robots.recoveries()]
+        return sorted(found, key=lambda entry: -entry.last)
 
     def _recent(self) -> list[str]:
         return [path for path in self.documents.kept.recent() if self._is_there(path)]
@@ -401,9 +418,10 @@ class Hub:
 
     def close(self) -> None:
         """End every run, and leave the documents so that nothing is lost."""
-        if self._watching is not None:
-            self._watching.cancel()
+        for watching in self._watching:
+            watching.cancel()
         self.documents.end()
+        self.robots.robots.end()
         for run in self.runs.values():
             run.end()
         self.workers.end()

@@ -1,11 +1,11 @@
-"""What is typed is not lost: an append-only record of a drawing beside its last save.
+"""What is typed is not lost: an append-only record of a drawing or a robot beside its last save.
 
-One file for each drawing that was edited, in the studio's own folder and not in the project. A record is a
+One file for each of them that was edited, in the studio's own folder and not in the project. A record is a
 line of JSON behind its length and CRC-32, so that a record torn by a crash is recognised and left out::
 
     <length> <crc32> {"change": …}\n
 
-What the records mean is the matter of :mod:`armblocks.studio.document_journal`; here they are written,
+What the records mean is the matter of :mod:`armblocks.studio.file_journal`; here they are written,
 brought to the disk and read again. While a journal is open its file is locked: another studio that finds it
 leaves it alone, and the lock of one that was killed is gone with it.
 """
@@ -32,7 +32,7 @@ Record = Mapping[str, Any]
 
 
 class Journal:
-    """The open journal of one drawing. Raises ``OSError`` as the disk does."""
+    """The open journal of one drawing or robot. Raises ``OSError`` as the disk does."""
 
     def __init__(self, path: Path, *, whole: int = 0) -> None:
         """Open the file at ``path``; its first ``whole`` bytes are kept and the rest is cut off."""

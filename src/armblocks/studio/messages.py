@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from armblocks.studio.alteration import Alteration
 from armblocks.studio.edits import Edit, Message, Place, SheetNote, Wire
 from armblocks.studio.robot_messages import (
     Opening,
@@ -228,20 +229,22 @@ class DocumentState(Message):
 
 
 class Recovery(Message):
-    """A drawing that was not saved when the studio ended, as its journal gives it back.
+    """A drawing or a robot that was not saved when the studio ended, as its journal gives it back.
 
     ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
-    the first and the last edit since the save were made (s since 1970), ``edits`` how many there are.
-    ``disk`` says whether the file is still the one that was edited. ``missing`` says what could not be read.
+    the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
+    ``parts`` how many blocks or links it has. ``disk`` says whether the file is still the one that was
+    edited. ``missing`` says what could not be read.
     """
 
+    holds: Literal["diagram", "robot"]
     document: str
     title: str
     path: str | None
     began: float
     last: float
     edits: int
-    blocks: int
+    parts: int
     disk: Literal["same", "changed", "gone"]
     missing: str
 
@@ -277,20 +280,13 @@ class Attach(Message):
     example: str = ""
 
 
-class Alteration(Message):
-    """What changes a drawing.
-
-    ``key`` is new for each: sent again after a broken line, it is done once. ``base`` is the version that the
-    page ``author`` saw: where another page has changed the same things since, the request is refused.
-    """
+class DiagramAlteration(Alteration):
+    """What changes a drawing."""
 
     document: str
-    key: str = ""
-    base: int | None = None
-    author: str = ""
 
 
-class Change(Alteration):
+class Change(DiagramAlteration):
     """Carry out an edit."""
 
     kind: Literal["change"] = "change"
@@ -299,26 +295,28 @@ class Change(Alteration):
     edit: Edit
 
 
-class Undo(Alteration):
+class Undo(DiagramAlteration):
     """Take the last edit back."""
 
+    does = "undo"
     kind: Literal["undo"] = "undo"
 
 
-class Redo(Alteration):
+class Redo(DiagramAlteration):
     """Do again what was undone."""
 
+    does = "redo"
     kind: Literal["redo"] = "redo"
 
 
-class ArrangeBlocks(Alteration):
+class ArrangeBlocks(DiagramAlteration):
     """Lay the blocks out anew, from left to right."""
 
     kind: Literal["arrange"] = "arrange"
     inside: list[str] = Field(default_factory=list[str])
 
 
-class Reload(Alteration):
+class Reload(DiagramAlteration):
     """Take what the file holds now, as one step that can be undone."""
 
     kind: Literal["reload"] = "reload"
@@ -384,7 +382,7 @@ class Close(Message):
 
 
 class Recover(Message):
-    """Say what becomes of a drawing that a journal gives back.
+    """Say what becomes of a drawing or a robot that a journal gives back.
 
     ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
     from and opens that; ``discard`` deletes the journal.

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from armblocks.studio.alteration import Alteration
 from armblocks.studio.edits import Message
 from armblocks.studio.robot_edits import RobotEdit
 
@@ -37,36 +38,59 @@ class RobotOfBlock(Message):
 
 
 class RobotAttach(Message):
-    """Show a robot that is open already: after a reload, or in a second page."""
+    """Show a robot that is open already: after a reload, after the line was down, or in a second page.
+
+    Where the server was started anew and does not know it, it comes from its journal, or else from the file
+    or the shipped robot of these names, under the same key: edits that wait to be sent again find it.
+    """
 
     kind: Literal["robot_attach"] = "robot_attach"
+    robot: str = Field(pattern=r"^[0-9a-f]{16}$")
+    path: str | None = None
+    shipped: str = ""
+
+
+class RobotAlteration(Alteration):
+    """What changes a robot."""
+
     robot: str
 
 
-class RobotChange(Message):
-    """Carry out an edit. ``key`` is new for each: sent again after a broken connection, it is done once.
+class RobotChange(RobotAlteration):
+    """Carry out an edit.
 
     Changes in a row of one ``gesture`` (the letters typed into one cell) are one step of undo.
     """
 
     kind: Literal["robot_change"] = "robot_change"
-    robot: str
-    key: str
     gesture: str = ""
     edit: RobotEdit
 
 
-class RobotUndo(Message):
+class RobotUndo(RobotAlteration):
     """Take the last edit back."""
 
+    does = "undo"
     kind: Literal["robot_undo"] = "robot_undo"
-    robot: str
 
 
-class RobotRedo(Message):
+class RobotRedo(RobotAlteration):
     """Do again what was undone."""
 
+    does = "redo"
     kind: Literal["robot_redo"] = "robot_redo"
+
+
+class RobotReload(RobotAlteration):
+    """Take what the file holds now, as one step that can be undone."""
+
+    kind: Literal["robot_reload"] = "robot_reload"
+
+
+class RobotKeepMine(Message):
+    """Leave the file that has changed on the disk until the next save, which overwrites it."""
+
+    kind: Literal["robot_keep_mine"] = "robot_keep_mine"
     robot: str
 
 
@@ -138,6 +162,8 @@ RobotRequest = (
     | RobotChange
     | RobotUndo
     | RobotRedo
+    | RobotReload
+    | RobotKeepMine
     | RobotSave
     | RobotForm
     | RobotBodies
@@ -205,6 +231,10 @@ class RobotShown(Message):
     shipped: str
     """The shipped robot that it is a copy of."""
     dirty: bool
+    disk: Literal["same", "changed", "gone"]
+    """How its file is now, compared with what was opened or saved."""
+    journaled: bool
+    """False where the journal cannot be written: then only a save keeps what is edited."""
     undo: str
     redo: str
     name: str

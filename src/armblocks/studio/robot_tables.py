@@ -8,6 +8,7 @@ from typing import Literal
 from armblocks.robot import DhConvention, Link, Robot, doubts, inertia_findings, serial_chain
 from armblocks.studio import robot_messages as say
 from armblocks.studio.history import History
+from armblocks.studio.project_folder import Disk
 from armblocks.studio.robot_columns import ROBOT, ROBOT_COLUMNS, Column, Owner
 from armblocks.studio.robot_link_columns import (
     DYNAMICS,
@@ -28,7 +29,14 @@ def robot_tables() -> say.RobotTables:
 
 
 def robot_shown(
-    key: str, history: History[Robot], path: str | None, shipped: str, notes: Sequence[str]
+    key: str,
+    history: History[Robot],
+    path: str | None,
+    shipped: str,
+    notes: Sequence[str],
+    *,
+    disk: Disk = "same",
+    journaled: bool = True,
 ) -> say.RobotShown:
     """An open robot as a page shows it."""
     robot = history.value
@@ -38,6 +46,8 @@ def robot_shown(
         path=path,
         shipped=shipped,
         dirty=history.dirty,
+        disk=disk,
+        journaled=journaled,
         undo=history.undo_title,
         redo=history.redo_title,
         name=robot.name,

@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { Refusal, type EventOf } from '../../connection'
 import { newKey } from '../../keys'
 import type { CellColumn, Opening, Readings, RobotTables } from '../../protocol'
-import { ask, line } from '../../store'
+import { ask, author, line } from '../../store'
 
 export type RobotShown = EventOf<'robot'>
 export type RobotEdit = Extract<Parameters<typeof line.ask>[0], { kind: 'robot_change' }>['edit']
@@ -68,10 +68,38 @@ export function leaveEditor(): void {
   useDesk.setState({ current: null, opening: null })
 }
 
-/** After the line was broken: show again what was on the screen. */
-export function attachAgain(): void {
-  const { current } = useDesk.getState()
-  if (current) void ask({ kind: 'robot_attach', robot: current }).then((found) => found === undefined && leaveEditor())
+/** Bring a robot that is open to the screen. */
+export async function showRobot(robot: string): Promise<void> {
+  const opening = await ask<Opening>({ kind: 'robot_attach', robot })
+  if (opening) robotOpened(opening)
+}
+
+const PLACE = 'armblocks-robot'
+type Name = Pick<RobotShown, 'robot' | 'path' | 'shipped'>
+
+/** Note which robot this tab shows: by it the same comes back after a reload. */
+useDesk.subscribe(({ robots, current }, before) => {
+  if (robots === before.robots && current === before.current) return
+  const shown = current ? robots[current] : undefined
+  if (!shown) return sessionStorage.removeItem(PLACE)
+  const { robot, path, shipped } = shown
+  sessionStorage.setItem(PLACE, JSON.stringify({ robot, path, shipped }))
+})
+
+/**
+ * After the line was broken, or a reload: the server opens again what this page has open, under the same keys. Gives what
+ * the tab showed before it was loaded anew.
+ */
+export async function attachAgain(): Promise<Opening | undefined> {
+  const { robots, current } = useDesk.getState()
+  const last = current ? null : (JSON.parse(sessionStorage.getItem(PLACE) ?? 'null') as Name | null)
+  const attach = async ({ robot, path, shipped }: Name) => {
+    const opening = await ask<Opening>({ kind: 'robot_attach', robot, path, shipped })
+    if (!opening && robot === current) leaveEditor()
+    return opening
+  }
+  await Promise.all(Object.values(robots).map(attach))
+  return last ? attach(last) : undefined
 }
 
 /** All joints at zero, or as near to it as their ranges allow. */
@@ -97,12 +125,27 @@ export async function edit(change: RobotEdit, gesture = ''): Promise<Refusal | u
   const { current } = useDesk.getState()
   if (!current) return undefined
   try {
-    await line.ask({ kind: 'robot_change', robot: current, key: newKey(), gesture, edit: change })
+    await line.ask({ kind: 'robot_change', ...alteration(current), gesture, edit: change })
     return undefined
   } catch (error) {
     if (error instanceof Refusal) return error
     throw error
   }
+}
+
+/** Take the last step back, or do it again. */
+export function alter(kind: 'robot_undo' | 'robot_redo', robot: string): void {
+  void ask({ kind, ...alteration(robot) })
+}
+
+/** Take what the file holds now, as one step that can be undone. */
+export function reload(robot: string): void {
+  void ask({ kind: 'robot_reload', ...alteration(robot) })
+}
+
+/** What goes with everything that changes a robot: which, what of it this page saw, and a key to do it once. */
+function alteration(robot: string) {
+  return { robot, key: newKey(), base: useDesk.getState().robots[robot]?.version ?? null, author }
 }
 
 let wanted = false

@@ -2,13 +2,14 @@ import { ActionIcon, Alert, Button, Menu, SegmentedControl, Text, Tooltip, useCo
 import { IconAlertTriangle, IconArrowBackUp, IconArrowForwardUp, IconArrowLeft, IconChevronDown, IconDeviceFloppy, IconPlus } from '@tabler/icons-react'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
+import { FileNotice } from '../../documents/disk_notice'
 import { ask, useStudio } from '../../store'
-import { edit, leaveEditor, useDesk, type Angles, type RobotShown } from './desk'
+import { alter, edit, leaveEditor, reload, showRobot, useDesk, type Angles, type RobotShown } from './desk'
 import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
 import { RobotFields } from './robot_fields'
 import { LinkTable } from './table'
-import { saveRobot, SaveDialog } from './save_dialog'
+import { saveRobot, saveRobotAs, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
 /** From this height on (px) both tables are seen at once. */
@@ -92,6 +93,7 @@ export default function RobotEditor() {
     <div className="robot-editor" role="region" aria-label={`Robot ${shown.name}`}>
       <Bar shown={shown} />
       <Notes />
+      <OfFile shown={shown} />
       <div className="robot-dock">
         <DockviewReact className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'} components={panels} defaultTabComponent={Tab} onReady={arrange} />
       </div>
@@ -107,12 +109,12 @@ function leaveCell(): void {
 
 function undo(robot: string): void {
   leaveCell()
-  void ask({ kind: 'robot_undo', robot })
+  alter('robot_undo', robot)
 }
 
 function redo(robot: string): void {
   leaveCell()
-  void ask({ kind: 'robot_redo', robot })
+  alter('robot_redo', robot)
 }
 
 function Bar({ shown }: { shown: RobotShown }) {
@@ -134,7 +136,7 @@ function Bar({ shown }: { shown: RobotShown }) {
         </Menu.Target>
         <Menu.Dropdown>
           {Object.values(others).map(({ robot, name, path }) => (
-            <Menu.Item key={robot} onClick={() => void ask({ kind: 'robot_attach', robot })}>
+            <Menu.Item key={robot} onClick={() => void showRobot(robot)}>
               {name} <span className="unit">{path ?? 'not saved'}</span>
             </Menu.Item>
           ))}
@@ -241,6 +243,17 @@ function Convention({ shown }: { shown: RobotShown }) {
       </Menu.Dropdown>
     </Menu>
   )
+}
+
+/** What is to be known of the robot's file and journal. */
+function OfFile({ shown }: { shown: RobotShown }) {
+  const { robot, path, disk, dirty, journaled } = shown
+  const actions = {
+    reload: () => reload(robot),
+    keepMine: () => void ask({ kind: 'robot_keep_mine', robot }),
+    saveAs: () => saveRobotAs(shown),
+  }
+  return <FileNotice {...{ path, disk, dirty, journaled, actions }} />
 }
 
 /** What was said while the file was read. */

@@ -2,7 +2,7 @@ import { Button, Group, Modal, Stack, Text, TextInput } from '@mantine/core'
 import { create } from 'zustand'
 import { Refusal } from '../../connection'
 import { line, useStudio } from '../../store'
-import { useDesk } from './desk'
+import { useDesk, type RobotShown } from './desk'
 
 interface Saving {
   robot: string | null
@@ -18,7 +18,12 @@ export function saveRobot(): void {
   const shown = current ? robots[current] : undefined
   if (!shown) return
   if (shown.path) void write(shown.robot, '', false)
-  else useSaving.setState({ robot: shown.robot, path: `${shown.name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`, refused: '' })
+  else saveRobotAs(shown)
+}
+
+/** Ask for a name, and save under that. */
+export function saveRobotAs({ robot, name, path }: Pick<RobotShown, 'robot' | 'name' | 'path'>): void {
+  useSaving.setState({ robot, path: path ?? `${name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`, refused: '' })
 }
 
 async function write(robot: string, path: string, overwrite: boolean): Promise<void> {

@@ -1,0 +1,42 @@
+"""A project folder and the studio's own, as a studio finds them that starts after another was killed."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any
+
+from armblocks.formats import load_robot
+from armblocks.studio.open_documents import OpenDocuments
+from armblocks.studio.open_robots import OpenRobots
+from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.state_folder import StateFolder
+
+
+class Disk:
+    """A project folder and what the studio keeps for it, as a studio that starts finds them."""
+
+    def __init__(self, root: Path) -> None:
+        self.project = ProjectFolder(root / "project")
+        self.kept = StateFolder(self.project.root)
+        self.kept.root = root / "state"
+        self.kept.journals = root / "state" / "journals"
+
+    def documents(self) -> OpenDocuments:
+        return OpenDocuments(self.project, self.kept, load_robot)
+
+    def robots(self) -> OpenRobots:
+        return OpenRobots(self.project, self.kept)
+
+    def as_after_a_crash(self, root: Path) -> Disk:
+        """The same disk, seen by a studio that starts after the one that writes now was killed."""
+        for name in ("project", "state"):
+            if (self.project.root.parent / name).exists():
+                shutil.copytree(self.project.root.parent / name, root / name)
+        return Disk(root)
+
+
+def going(talking: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    asyncio.run(talking())

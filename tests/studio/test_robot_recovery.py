@@ -1,0 +1,234 @@
+"""What was typed into a robot comes back after a crash, as what was drawn does: one journal serves both."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import pytest
+from crashed_disk import Disk, going
+
+from armblocks.errors import ArmblocksError, FormatError, InputError
+from armblocks.formats import load_robot, write_robot
+from armblocks.studio import messages as say
+from armblocks.studio import open_files
+from armblocks.studio import robot_messages as say_robot
+from armblocks.studio.open_robots import OpenRobot, OpenRobots
+from armblocks.studio.robot_edits import SetCell
+
+
+@pytest.fixture
+def disk(tmp_path: Path) -> Disk:
+    (tmp_path / "first" / "project").mkdir(parents=True)
+    return Disk(tmp_path / "first")
+
+
+def content(found: OpenRobot) -> bytes:
+    return write_robot(found.robot)
+
+
+def cell(
+    key: str, link: str, column: str, text: str, gesture: str = "", **more: Any
+) -> say_robot.RobotChange:
+    edit = SetCell(link=link, column=column, text=text, angles="deg")
+    return say_robot.RobotChange(robot="", key=key, gesture=gesture, edit=edit, **more)
+
+
+def requests(seed: int, count: int) -> list[Any]:
+    """Letters typed into cells, a few to a cell, with undo and redo between them."""
+    random_ = random.Random(seed)
+    made: list[Any] = []
+    while len(made) < count:
+        gesture = f"{seed} {len(made)}" if random_.random() < 0.7 else ""
+        link, column = f"link{random_.randrange(1, 8)}", random_.choice(["a", "d", "mass", "alpha", "Ixx"])
+        for _ in range(random_.randrange(1, 5)):
+            made.append(cell(f"{seed} {len(made)}", link, column, f"{random_.random():.3f}", gesture))
+        for kind in (say_robot.RobotUndo, say_robot.RobotRedo):
+            for _ in range(random_.randrange(3)):
+                made.append(kind(robot="", key=f"{seed} {len(made)}"))
+    return made
+
+
+def carry_out(robots: OpenRobots, found: OpenRobot, asked: list[Any]) -> None:
+    for request in asked:
+        try:
+            robots.perform(found, request)
+        except ArmblocksError:
+            continue
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_any_robot_edits_come_back_with_their_past_and_future(
+    disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    monkeypatch.setattr(open_files, "SNAPSHOT_EVERY", 25)  # some fall among the letters of one cell
+
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.open_shipped("puma560")
+        carry_out(robots, found, requests(seed, 60))
+        if found.snapshot is not None:
+            await found.snapshot
+        if seed % 3 == 0:
+            await robots.save(found, "arms/mine.json", overwrite=False)
+        carry_out(robots, found, requests(seed + 1000, 40))
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+        assert content(back) == content(found)
+        assert back.document.version == found.document.version
+        assert back.document.dirty == found.document.dirty
+        assert (back.path, back.origin) == (found.path, found.origin)
+        while back.document.undo_title:  # as far back as the journal reaches
+            assert back.document.undo_title == found.document.undo_title
+            back.document.undo()
+            found.document.undo()
+            assert content(back) == content(found)
+        while found.document.redo_title:
+            back.document.redo()
+            found.document.redo()
+        assert content(back) == content(found)
+
+    going(talking)
+
+
+def test_a_snapshot_among_the_letters_of_a_cell_does_not_part_the_step(
+    disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(open_files, "SNAPSHOT_EVERY", 2)
+
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.open_shipped("puma560")
+        for number, text in enumerate(("1", "1.2", "1.25")):
+            robots.perform(found, cell(str(number), "link2", "a", text, "one cell"))
+            if found.snapshot is not None:
+                await found.snapshot
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+        assert back.robot.links[1].dh is not None
+        assert back.robot.links[1].dh.a == 1.25
+        back.document.undo()
+        assert back.robot == load_robot("puma560")
+
+    going(talking)
+
+
+def test_unsaved_robots_are_offered_and_never_put_over_a_newer_file(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.open_shipped("puma560")
+        await robots.save(found, "arm.json", overwrite=False)
+        robots.perform(found, cell("1", "link1", "mass", "7"))
+        documents = disk.documents()
+        documents.perform(documents.new(), say.ArrangeBlocks(document="", key="1"))
+        second = disk.as_after_a_crash(tmp_path / "second")
+        theirs = write_robot(load_robot("kr180"))
+        second.project.path("arm.json").write_bytes(theirs)
+        after = second.robots()
+        (offer,) = after.recoveries()
+        assert (offer.holds, offer.path, offer.disk, offer.edits, offer.parts) == (
+            "robot",
+            "arm.json",
+            "changed",
+            1,
+            6,
+        )
+        assert [offer.holds for offer in second.documents().recoveries()] == ["diagram"]
+        back = await after.recover(say.Recover(document=found.key, action="keep_both"))
+        assert back is not None
+        assert back.path is not None
+        assert back.path.startswith("arm recovered 20")
+        assert back.robot.links[0].mass == 7
+        assert second.project.read("arm.json") == theirs
+        with pytest.raises(ArmblocksError, match="there is no robot to recover named"):
+            await after.recover(say.Recover(document=found.key, action="open"))
+
+    going(talking)
+
+
+def test_a_robot_sent_again_after_the_crash_is_changed_once(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.new()
+        robots.perform(found, cell("one", "link1", "a", "2"))
+        robots.perform(found, say_robot.RobotUndo(robot="", key="two"))
+        after = disk.as_after_a_crash(tmp_path / "second").robots()
+        back = after.attach(found.key)
+        assert not after.perform(back, cell("one", "link1", "a", "2"))
+        assert not after.perform(back, say_robot.RobotUndo(robot="", key="two"))
+        assert after.perform(back, say_robot.RobotRedo(robot="", key="three"))
+        assert back.robot.links[0].dh is not None
+        assert back.robot.links[0].dh.a == 2
+
+    going(talking)
+
+
+def test_a_page_finds_its_robot_again_after_the_server_was_started_anew(disk: Disk) -> None:
+    async def talking() -> None:
+        first = disk.robots()
+        made = first.new()
+        await first.save(made, "arm.json", overwrite=False)
+        first.end()
+        robots = disk.robots()
+        found = robots.attach("0123456789abcdef", "arm.json")
+        assert (found.key, found.robot) == ("0123456789abcdef", made.robot)
+        assert robots.attach("f" * 16, "arm.json") is found
+        assert robots["f" * 16] is found
+        assert robots.attach("e" * 16, origin="kr180").robot == load_robot("kr180")
+        assert robots.attach("d" * 16).robot == made.robot
+
+    going(talking)
+
+
+def test_what_was_dropped_is_in_the_journal_before_it_is_edited(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.bring(load_robot("kr180"))
+        assert found.document.dirty
+        with pytest.raises(InputError, match="has edits that no file holds"):
+            robots.close(found, discard=False)
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+        assert back.robot == load_robot("kr180")
+
+    going(talking)
+
+
+def test_a_robot_file_that_changed_on_the_disk_is_reloaded_as_a_step(disk: Disk, tmp_path: Path) -> None:
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.new()
+        with pytest.raises(FormatError, match="the robot has no file yet"):
+            robots.reload(found)
+        await robots.save(found, "arm.json", overwrite=False)
+        robots.perform(found, cell("1", "link1", "a", "2"))
+        mine = found.robot
+        disk.project.write("arm.json", write_robot(load_robot("kr180")))
+        with pytest.raises(FormatError, match="the file has changed on the disk since it was opened"):
+            await robots.save(found, "", overwrite=False)
+        assert found.shown().disk == "changed"
+        robots.reload(found)
+        assert found.robot == load_robot("kr180")
+        assert not found.document.dirty
+        back = disk.as_after_a_crash(tmp_path / "second").robots().attach(found.key)
+        back.document.undo()
+        assert back.robot == mine
+
+    going(talking)
+
+
+def test_two_pages_do_not_overwrite_each_other_s_cells(disk: Disk) -> None:
+    async def talking() -> None:
+        robots = disk.robots()
+        found = robots.open_shipped("puma560")
+        robots.perform(found, cell("1", "link1", "a", "2", author="other", base=0))
+        robots.perform(found, cell("2", "link1", "d", "3", author="me", base=0))  # another cell
+        for late in (
+            cell("3", "link1", "a", "4", author="me", base=0),
+            say_robot.RobotUndo(robot="", key="4", author="me", base=0),
+        ):
+            with pytest.raises(InputError, match=r"was changed in another page meanwhile.*do it again"):
+                robots.perform(found, late)
+        assert found.robot.links[0].dh is not None
+        assert (found.robot.links[0].dh.a, found.robot.links[0].dh.d) == (2, 3)
+        robots.perform(found, cell("5", "link1", "a", "4", author="me", base=2))  # having seen it
+
+    going(talking)
