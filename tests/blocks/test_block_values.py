@@ -140,7 +140,7 @@ def test_state_space_matrices_fit_each_other() -> None:
         StateSpace(B=[[1.0], [2.0]])
     with pytest.raises(
         InputError,
-        match=r"StateSpace: initial has shape \(2,\). Allowed: \(\) or \(1,\). Fix: give one",
+        match=r"StateSpace.initial: initial has shape \(2,\). Allowed: \(\) or \(1,\). Fix: give one",
     ):
         StateSpace(initial=[1.0, 2.0])
 

@@ -20,7 +20,6 @@ from armblocks.blocks import (
     descriptor,
     discontinuities,
     discrete,
-    discrete_filters,
     drives,
     dry_friction,
     dynamic_limits,
@@ -57,6 +56,8 @@ from armblocks.blocks import (
     selection,
     sinks,
     sources,
+    state_space,
+    transfer_functions,
     transforms,
     transport,
     waveforms,
@@ -83,7 +84,7 @@ from armblocks.blocks.arm_plant import ArmPlant
 from armblocks.blocks.arm_quantities import JacobianInverse, LoadedRne, Manipulability, RobotEnergy
 from armblocks.blocks.branching import If, SwitchCase
 from armblocks.blocks.constraints import AlgebraicConstraint
-from armblocks.blocks.continuous import Derivative, Integrator, StateSpace, TransferFunction
+from armblocks.blocks.continuous import Derivative, Integrator
 from armblocks.blocks.delays import (
     Delay,
     Memory,
@@ -102,12 +103,6 @@ from armblocks.blocks.discrete import (
     DiscreteDerivative,
     DiscreteIntegrator,
     RateLimiter,
-)
-from armblocks.blocks.discrete_filters import (
-    DiscreteFilter,
-    DiscreteFir,
-    DiscreteStateSpace,
-    DiscreteTransferFunction,
 )
 from armblocks.blocks.drives import DcMotor, MotorWinding
 from armblocks.blocks.dry_friction import Backlash, CoulombFriction, StickSlipFriction
@@ -252,6 +247,13 @@ from armblocks.blocks.selection import (
 )
 from armblocks.blocks.sinks import Display, Scope, Spectrum, Terminator, ToFile, ToWorkspace, XYGraph
 from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
+from armblocks.blocks.state_space import DiscreteStateSpace, StateSpace
+from armblocks.blocks.transfer_functions import (
+    DiscreteFilter,
+    DiscreteFir,
+    DiscreteTransferFunction,
+    TransferFunction,
+)
 from armblocks.blocks.transforms import T2xyz, Xyz2T
 from armblocks.blocks.transport import TransportDelay, VariableTimeDelay, VariableTransportDelay
 from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
@@ -281,6 +283,8 @@ BLOCKS = BlockLibrary(
         sources,
         maths,
         continuous,
+        state_space,
+        transfer_functions,
         descriptor,
         limited_integrators,
         zero_poles,
@@ -290,7 +294,6 @@ BLOCKS = BlockLibrary(
         dry_friction,
         delays,
         discrete,
-        discrete_filters,
         routing,
         virtual_wiring,
         structure,
