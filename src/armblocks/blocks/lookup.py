@@ -14,7 +14,7 @@ from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, METHODS
 from armblocks.blocks.long_tables import is_long, with_positions
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import Axes, axis, numbers_of, rising, table_axes
+from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, numbers_of, rising, table_axes
 from armblocks.diagram import (
     Block,
     Guard,
@@ -32,7 +32,7 @@ from armblocks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
-class LookupTable1D(Block):
+class LookupTable1D(BlockWithAxes):
     """A curve through given points: y = table(u), between them by the method chosen.
 
     ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``); ``flat`` takes the entry at or below
@@ -65,23 +65,8 @@ class LookupTable1D(Block):
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions")
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._axes().modes(inputs)
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self._axes().guards(inputs)
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": self._axes(p).value(p["table"], shape_of(self.table), x, u)}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).guard_values(x, u)
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).mode_values(u)
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return self._axes(p).resets(x, u, e)
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
@@ -91,7 +76,7 @@ class LookupTable1D(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LookupTable2D(Block):
+class LookupTable2D(BlockWithAxes):
     """A surface over given points: y = table(u1, u2), rows along u1 and columns along u2."""
 
     family: ClassVar[str] = "lookup"
@@ -127,23 +112,8 @@ class LookupTable2D(Block):
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions1", "positions2")
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._axes().modes(inputs)
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self._axes().guards(inputs)
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": self._axes(p).value(p["table"], shape_of(self.table), x, u)}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).guard_values(x, u)
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).mode_values(u)
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return self._axes(p).resets(x, u, e)
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
@@ -154,7 +124,7 @@ class LookupTable2D(Block):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LookupTableND(Block):
+class LookupTableND(BlockWithAxes):
     """A table of one to four axes: y = table(u1, u2, …), one input for each axis.
 
     ``positions`` holds the positions of the first axis, then those of the second, and so on: as many
@@ -202,23 +172,8 @@ class LookupTableND(Block):
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions")
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._axes().modes(inputs)
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self._axes().guards(inputs)
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": self._axes(p).value(p["table"], shape_of(self.table), x, u)}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).guard_values(x, u)
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).mode_values(u)
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return self._axes(p).resets(x, u, e)
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)

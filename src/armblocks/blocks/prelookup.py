@@ -12,15 +12,13 @@ from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, cells, contract
 from armblocks.blocks.long_tables import is_long, with_positions
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import Axes, axis, by_element, numbers_of, read, rising
+from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, by_element, numbers_of, read, rising
 from armblocks.diagram import (
     Block,
-    Guard,
     Parameter,
     Port,
     Shapes,
     Signals,
-    State,
     WorkedExample,
     made,
     parameter,
@@ -31,7 +29,7 @@ from armblocks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Prelookup(Block):
+class Prelookup(BlockWithAxes):
     """Where a position lies between break points: u = b(k) + f (b(k+1) - b(k)), index k from 0, fraction f.
 
     Several Interpolation Using Prelookup blocks can share it. The index never passes the last interval, so
@@ -66,12 +64,6 @@ class Prelookup(Block):
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
         return with_positions(self, self._is_long(), "positions")
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return self._axes().modes(inputs)
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return self._axes().guards(inputs)
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         points = p["positions"] if self._is_long() else SX(numbers_of(self, "positions"))
         cell = self._axes(p).cell("u", x, u)
@@ -89,15 +81,6 @@ class Prelookup(Block):
             return if_else(cell == 0.0, 0.0, if_else(cell == float(n), 1.0, free))
 
         return {"k": by_element([cell], interval), "f": by_element([u["u"], cell], fraction)}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).guard_values(x, u)
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).mode_values(u)
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return self._axes(p).resets(x, u, e)
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.positions), "linear")

@@ -283,3 +283,27 @@ def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) 
             entries, index
         )
     return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockWithAxes(Block):
+    """A block that looks its inputs up along axes: their borders are its events, their cells its modes."""
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return self._axes().modes(inputs)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return self._axes().guards(inputs)
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(p).guard_values(x, u)
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(p).mode_values(u)
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return self._axes(p).resets(x, u, e)
+
+    def _axes(self, p: Signals | None = None) -> Axes:
+        """The axis of each input; with the parameters of the run where they hold the positions."""
+        raise NotImplementedError
