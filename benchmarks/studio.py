@@ -235,7 +235,7 @@ def live(browser: Browser) -> tuple[int, int, list[float]]:
 
 
 def download(browser: Browser) -> tuple[float, float, float]:
-    """kB, compressed: what the first page needs, its fonts, what comes later for 3-D."""
+    """kB, compressed: what the first page needs, its fonts, what comes later: 3-D, dialogs and scopes."""
     weights: dict[str, float] = {}
 
     def weigh(answer) -> None:
@@ -416,7 +416,7 @@ def download_rows(browser: Browser) -> list[list[str]]:
             "400 kB",
             verdict(whole, 400),
         ],
-        ["later, for 3-D", f"{later:.0f} kB", "", "", ""],
+        ["later: 3-D, dialogs, scopes", f"{later:.0f} kB", "", "", ""],
     ]
 
 

@@ -47,7 +47,7 @@ def tones() -> str:
     banner = "/* Made from armblocks.report.style by scripts/studio_types.py: do not edit. */"
     return (
         f"{banner}\n:root {{\n{properties('light')}\n  --font: 'Inter Variable', {FONT_STACK};\n"
-        f"  --mono: 'JetBrains Mono Variable', {MONO_STACK};\n}}\n"
+        f"  --mono: 'JetBrains Mono', {MONO_STACK};\n}}\n"
         f":root[data-mantine-color-scheme='dark'] {{\n{properties('dark')}\n}}\n{classes}\n"
     )
 

@@ -2,38 +2,35 @@ import { useComputedColorScheme } from '@mantine/core'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps, type IDockviewPanelProps } from 'dockview-react'
 import { lazy, Suspense } from 'react'
 import { Canvas } from './canvas/canvas'
-import { ConnectDialog } from './canvas/connect_dialog'
-import { CommandPalette } from './command_palette'
-import { Tour } from './documents/tour'
-import { BlockDialog } from './inspector/block_dialog'
-import { OpenDialog } from './documents/open_dialog'
-import { RecoveryDialog } from './documents/recovery_dialog'
-import { SaveDialog } from './documents/save_dialog'
-import { Explorer } from './library/explorer'
-import { Find } from './library/find'
+import { later, useSettled, useWanted } from './later'
 import { Palette } from './library/palette'
-import { QuickInsert } from './library/quick_insert'
 import { Notices } from './notices'
 import { TopBar } from './run/top_bar'
-import { Configuration } from './run/configuration'
 import { Timeline } from './run/timeline'
-import { TunePanel } from './run/tune_panel'
-import { Shortcuts } from './shortcuts'
 import { DropZone } from './robot/drop'
 import { useDesk } from './robot/editor/desk'
-import { SignalInspector } from './scopes/inspector'
-import { Scopes } from './scopes/scopes'
+import { useStudio } from './store'
 
 const RobotEditor = lazy(() => import('./robot/editor/robot_editor'))
 const RobotView = lazy(() => import('./robot/robot_view'))
+const Dialogs = later(async () => (await import('./all_dialogs')).AllDialogs)
+const Explorer = later(async () => (await import('./library/explorer')).Explorer, 'Loading the tree …')
+const Scopes = later(async () => (await import('./scopes/scopes')).Scopes, 'Loading the scopes …')
+const SignalInspector = later(async () => (await import('./scopes/inspector')).SignalInspector, 'Loading the signals …')
+const TunePanel = later(async () => (await import('./run/tune_panel')).TunePanel, 'Loading the parameters …')
+
+function ScopesPanel() {
+  const ran = useStudio((s) => s.run !== null)
+  return ran ? <Scopes /> : <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
+}
 
 const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
   library: Palette,
-  explorer: Explorer,
+  explorer: () => <Explorer />,
   canvas: Canvas,
-  scopes: Scopes,
-  tune: TunePanel,
-  signals: SignalInspector,
+  scopes: ScopesPanel,
+  tune: () => <TunePanel />,
+  signals: () => <SignalInspector />,
   robot: () => (
     <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
       <RobotView />
@@ -78,6 +75,8 @@ function arrange({ api }: DockviewReadyEvent): void {
 export function App() {
   const scheme = useComputedColorScheme('light')
   const editing = useDesk((s) => s.current !== null)
+  const settled = useSettled()
+  const wanted = useWanted()
   return (
     <div className="studio">
       <div className={editing ? 'behind' : 'sheets'} inert={editing}>
@@ -92,23 +91,13 @@ export function App() {
         </main>
         <Timeline wires />
       </div>
-      <BlockDialog />
-      <Configuration />
-      <QuickInsert />
-      <ConnectDialog />
-      <CommandPalette />
-      <Find />
-      <Tour />
-      <Shortcuts />
+      {(settled || wanted) && <Dialogs />}
       {editing && (
         <Suspense fallback={<p className="robot-editor empty">Loading the robot editor …</p>}>
           <RobotEditor />
         </Suspense>
       )}
       <DropZone />
-      <SaveDialog />
-      <OpenDialog />
-      <RecoveryDialog />
       <Notices />
     </div>
   )

@@ -1,26 +1,12 @@
-import { useEffect, useMemo } from 'react'
-import { create } from 'zustand'
+import { useMemo } from 'react'
 import { commands } from './commands'
-import { openFind } from './library/find'
+import { show, useDialogs } from './dialogs'
 import { PickList } from './library/pick_list'
-
-const usePalette = create<{ opened: boolean; typed: string }>(() => ({ opened: false, typed: '' }))
 
 /** All that can be done, by its name: Ctrl+K. Find is beside it, Ctrl+F. */
 export function CommandPalette() {
-  const { opened, typed } = usePalette()
-  useEffect(() => {
-    const onKey = (event: KeyboardEvent) => {
-      if (!(event.ctrlKey || event.metaKey) || event.shiftKey) return
-      const key = event.key.toLowerCase()
-      if (key === 'k') usePalette.setState({ opened: true, typed: '' })
-      else if (key === 'f') openFind()
-      else return
-      event.preventDefault()
-    }
-    addEventListener('keydown', onKey)
-    return () => removeEventListener('keydown', onKey)
-  }, [])
+  const opened = useDialogs((s) => s.open === 'commands')
+  const typed = useDialogs((s) => s.typed)
   const found = useMemo(() => {
     const words = typed.toLowerCase().split(/\s+/).filter(Boolean)
     const possible = opened ? commands().filter(({ possible }) => possible?.() ?? true) : []
@@ -29,12 +15,12 @@ export function CommandPalette() {
   return (
     <PickList
       opened={opened}
-      onClose={() => usePalette.setState({ opened: false })}
+      onClose={() => show(null)}
       label="Command"
       placeholder="What do you want to do?"
       list="Commands"
       typed={typed}
-      onTyped={(next) => usePalette.setState({ typed: next })}
+      onTyped={(next) => useDialogs.setState({ typed: next })}
       nothing={`No command matches “${typed}”. Blocks are added by typing their name on the sheet.`}
       items={found.map(({ title, keys }) => ({ key: title, title, ...(keys ? { keys } : {}) }))}
       onPick={(index) => {

@@ -1,15 +1,9 @@
 import { align, distribute, flip, group, rotate, chosenBlocks } from './canvas/arranging'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
-import { openConnectDialog } from './canvas/connect_dialog'
 import { addNote, sheetView } from './canvas/sheet_keys'
-import { save, show } from './documents/dialogs'
+import { openConfiguration, openTour, save, show } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
-import { openTour } from './documents/tour'
-import { openFind } from './library/find'
-import { openQuickInsert } from './library/quick_insert'
-import { openConfiguration } from './run/configuration'
 import { startOrResume } from './run/top_bar'
-import { openShortcuts } from './shortcuts'
 import { alter, ask, look, useStudio } from './store'
 
 /** Something that can be done: in the command palette, in the list of keys, and by its key. */
@@ -36,9 +30,9 @@ export function commands(): Command[] {
 
 const LIST: Command[] = [
   { title: 'Run, or go on after a pause', keys: 'Ctrl+Enter', run: startOrResume },
-  { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: openFind },
-  { title: 'Add a block', run: () => openQuickInsert('') },
-  { title: 'Draw a wire by the names of its ends', keys: '>', run: openConnectDialog },
+  { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: () => show('find') },
+  { title: 'Add a block', run: () => show('insert') },
+  { title: 'Draw a wire by the names of its ends', keys: '>', run: () => show('connect') },
   { title: 'Write a note', keys: '"', run: addNote },
   { title: 'Undo', keys: 'Ctrl+Z', run: () => alter('undo') },
   { title: 'Redo', keys: 'Ctrl+Y', run: () => alter('redo') },
@@ -84,7 +78,7 @@ const LIST: Command[] = [
   { title: 'Export the sheet as PDF', run: () => exportDrawing('pdf') },
   { title: 'Configuration parameters', keys: 'Ctrl+E', run: openConfiguration },
   { title: 'Take the tour', run: openTour },
-  { title: 'All keys', keys: '?', run: openShortcuts },
+  { title: 'All keys', keys: '?', run: () => show('keys') },
 ]
 
 /** Whether these keys are the ones pressed. */

@@ -1,5 +1,6 @@
 import '@fontsource-variable/inter/wght.css'
-import '@fontsource-variable/jetbrains-mono/wght.css'
+import '@fontsource/jetbrains-mono/400.css'
+import '@fontsource/jetbrains-mono/700.css'
 import './mantine.css'
 import 'dockview-react/dist/styles/dockview.css'
 import '@xyflow/react/dist/style.css'

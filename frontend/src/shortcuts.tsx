@@ -1,12 +1,6 @@
 import { Kbd, Modal, Table } from '@mantine/core'
-import { create } from 'zustand'
 import { commands } from './commands'
-
-const useShortcuts = create<{ opened: boolean }>(() => ({ opened: false }))
-
-export function openShortcuts(): void {
-  useShortcuts.setState({ opened: true })
-}
+import { show, useDialogs } from './dialogs'
 
 /** What is no command: how one moves about. */
 const HABITS: [keys: string, what: string][] = [
@@ -19,9 +13,9 @@ const HABITS: [keys: string, what: string][] = [
 ]
 
 export function Shortcuts() {
-  const { opened } = useShortcuts()
+  const opened = useDialogs((s) => s.open === 'keys')
   return (
-    <Modal opened={opened} onClose={() => useShortcuts.setState({ opened: false })} title="Keys" size="md">
+    <Modal opened={opened} onClose={() => show(null)} title="Keys" size="md">
       <Table>
         <Table.Tbody>
           {[...HABITS, ...commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))].map(([keys, what]) => (

@@ -13,7 +13,7 @@ import {
   type NodeChange,
 } from '@xyflow/react'
 import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
-import { openQuickInsert } from '../library/quick_insert'
+import { show } from '../dialogs'
 import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
 import { WireValues } from '../run/wire_values'
 import { ask, change, look, useStudio } from '../store'
@@ -207,7 +207,7 @@ function Sheet() {
         }}
         onConnect={connect}
         onDoubleClick={(event) => {
-          if ((event.target as Element).classList.contains('react-flow__pane')) openQuickInsert('', { x: event.clientX, y: event.clientY })
+          if ((event.target as Element).classList.contains('react-flow__pane')) show('insert', '', { x: event.clientX, y: event.clientY })
         }}
         zoomOnDoubleClick={false}
         connectionLineType={ConnectionLineType.Step}

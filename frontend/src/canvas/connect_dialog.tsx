@@ -1,24 +1,17 @@
 import { Button, Group, Modal, Select, Stack } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
-import { create } from 'zustand'
+import { show, useDialogs } from '../dialogs'
 import { change, useStudio } from '../store'
-
-const useConnectDialog = create<{ opened: boolean }>(() => ({ opened: false }))
-
-/** Open the dialog that draws a wire by the names of its ends. */
-export function openConnectDialog(): void {
-  useConnectDialog.setState({ opened: true })
-}
 
 /** The way to draw a wire by keyboard: type the names of two ports. The selected block's are suggested. */
 export function ConnectDialog() {
-  const { opened } = useConnectDialog()
+  const opened = useDialogs((s) => s.open === 'connect')
   const blocks = useStudio((s) => s.document?.blocks)
   const wires = useStudio((s) => s.document?.wires)
   const selection = useStudio((s) => s.selection)
   const [source, setSource] = useState<string | null>(null)
   const [target, setTarget] = useState<string | null>(null)
-  const close = () => useConnectDialog.setState({ opened: false })
+  const close = () => show(null)
   const sources = useMemo(() => Object.values(blocks ?? {}).flatMap(({ name, outputs }) => outputs.map((port) => `${name}/${port.name}`)), [blocks])
   const targets = useMemo(() => {
     const driven = new Set(wires?.map((wire) => wire.target))

@@ -1,12 +1,10 @@
 import type { ReactFlowInstance } from '@xyflow/react'
 import { useEffect, type RefObject } from 'react'
 import { commands, pressed } from '../commands'
-import { openQuickInsert } from '../library/quick_insert'
-import { openShortcuts } from '../shortcuts'
+import { show, useDialogs } from '../dialogs'
 import { change, look, useStudio } from '../store'
 import { chosenBlocks } from './arranging'
 import { move, openBlock } from './canvas'
-import { openConnectDialog } from './connect_dialog'
 import { editNote, writeNote } from './note_node'
 import type { SheetNode } from './sheet_graph'
 import { wireKey, type Places } from './sheet_layout'
@@ -21,6 +19,12 @@ export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; 
 export function addNote(): void {
   const at = sheetView.middle?.()
   if (at) writeNote(at.x, at.y)
+}
+
+/** What the list of blocks has heard: who types fast does so before it has the focus. */
+function typedSoFar(): string {
+  const { open, typed } = useDialogs.getState()
+  return open === 'insert' ? typed : ''
 }
 
 /** The keys of the sheet: they are its own while it has the focus, and while nothing has it. */
@@ -57,13 +61,13 @@ export function useSheetKeys(
         if (at) to[id] = { x: at.x + arrow[0], y: at.y + arrow[1] }
       }
       move(to)
-    } else if (event.key === '>') openConnectDialog()
-    else if (event.key === '?') openShortcuts()
+    } else if (event.key === '>') show('connect')
+    else if (event.key === '?') show('keys')
     else if (event.key === '"') addNote()
     else if (event.key === ' ') sheetView.fit?.()
     else if (event.key === 'Escape' && document.inside.length && !selection.size) look(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])
-    else if (/^\p{L}$/u.test(event.key)) openQuickInsert(event.key)
+    else if (/^\p{L}$/u.test(event.key)) show('insert', typedSoFar() + event.key)
     else return false
     return true
   }

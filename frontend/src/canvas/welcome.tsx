@@ -1,5 +1,5 @@
 import { Anchor } from '@mantine/core'
-import { openTour } from '../documents/tour'
+import { openTour } from '../dialogs'
 import { ask, useStudio } from '../store'
 
 /** An empty sheet: how to begin, and the examples with their pictures. */

@@ -1,7 +1,7 @@
 import { Alert, Button, Group } from '@mantine/core'
 import { IconAlertTriangle, IconFileAlert, IconHistory } from '@tabler/icons-react'
 import { ask, useStudio } from '../store'
-import { show } from './dialogs'
+import { show } from '../dialogs'
 
 interface Standing {
   path?: string | null

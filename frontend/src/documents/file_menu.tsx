@@ -2,7 +2,7 @@ import { ActionIcon, Badge, Kbd, Menu, Text } from '@mantine/core'
 import { IconDeviceFloppy, IconFilePlus, IconFolderOpen, IconHistory, IconMenu2, IconPencil, IconRobot, IconX } from '@tabler/icons-react'
 import { showRobot, useDesk } from '../robot/editor/desk'
 import { ask, useStudio } from '../store'
-import { save, show } from './dialogs'
+import { save, show } from '../dialogs'
 
 /** Files that the menu itself lists; the dialog has them all. */
 const MOST_FILES = 12

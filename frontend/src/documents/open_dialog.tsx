@@ -3,7 +3,7 @@ import { IconFile, IconHistory, IconPencil } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
 import type { Request } from '../connection'
 import { ask, useStudio } from '../store'
-import { projectFiles, show, useDialogs } from './dialogs'
+import { projectFiles, show, useDialogs } from '../dialogs'
 
 /** Open: what is open now, what was used last, and every file of the project folder. */
 export function OpenDialog() {

@@ -2,7 +2,7 @@ import { Badge, Button, Card, Group, Modal, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import type { Recovery } from '../protocol'
 import { ask, useStudio } from '../store'
-import { show, useDialogs } from './dialogs'
+import { show, useDialogs } from '../dialogs'
 
 const when = (seconds: number) =>
   new Date(1000 * seconds).toLocaleString(undefined, { dateStyle: 'medium', timeStyle: 'short' })

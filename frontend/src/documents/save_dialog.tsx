@@ -2,7 +2,7 @@ import { Alert, Autocomplete, Button, Group, Modal, Stack, Text } from '@mantine
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
 import { line, useStudio } from '../store'
-import { projectFiles, show, useDialogs } from './dialogs'
+import { projectFiles, show, useDialogs } from '../dialogs'
 
 const named = (typed: string) => (/\.json$/i.test(typed.trim()) ? typed.trim() : `${typed.trim()}.json`)
 

@@ -1,6 +1,6 @@
 import { Button, CloseButton, Group, Paper, Text } from '@mantine/core'
 import { useEffect, useLayoutEffect, useState } from 'react'
-import { create } from 'zustand'
+import { openTour, useTour } from '../dialogs'
 import { useStudio } from '../store'
 
 const SEEN = 'armblocks-tour-seen'
@@ -23,10 +23,6 @@ const STOPS: Stop[] = [
   { at: '.robot', title: 'The arm', text: 'Turn the view with the mouse. The arm stands as the signals say at the instant of the cursor.' },
   { at: '[aria-label="Menu"]', title: 'Where to go on', text: 'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.' },
 ]
-
-const useTour = create<{ stop: number | null }>(() => ({ stop: null }))
-
-export const openTour = (): void => useTour.setState({ stop: 0 })
 
 function leave(): void {
   useTour.setState({ stop: null })

@@ -1,3 +1,4 @@
+import '../mantine_later.css'
 import { ScrollArea, Tree, useTree, type TreeNodeData } from '@mantine/core'
 import { IconChevronRight, IconSitemap } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'

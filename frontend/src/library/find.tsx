@@ -1,18 +1,15 @@
 import { useEffect, useState } from 'react'
-import { create } from 'zustand'
+import { show, useDialogs } from '../dialogs'
 import type { Found } from '../protocol'
 import { ask, showBlock, useStudio } from '../store'
 import { PickList } from './pick_list'
 
 const WAIT_MS = 80
 
-const useFind = create<{ opened: boolean; typed: string }>(() => ({ opened: false, typed: '' }))
-
-export const openFind = (): void => useFind.setState({ opened: true, typed: '' })
-
 /** Blocks of the whole model by name, type or what a parameter says; Enter goes there. */
 export function Find() {
-  const { opened, typed } = useFind()
+  const opened = useDialogs((s) => s.open === 'find')
+  const typed = useDialogs((s) => s.typed)
   const document = useStudio((s) => s.document?.state.document)
   const [found, setFound] = useState<Found[]>([])
   useEffect(() => {
@@ -30,12 +27,12 @@ export function Find() {
   return (
     <PickList
       opened={opened}
-      onClose={() => useFind.setState({ opened: false })}
+      onClose={() => show(null)}
       label="Find"
       placeholder="Find in the model: a name, a type, a value"
       list="Found"
       typed={typed}
-      onTyped={(next) => useFind.setState({ typed: next })}
+      onTyped={(next) => useDialogs.setState({ typed: next })}
       nothing={typed.trim() ? `Nothing in the model matches “${typed}”.` : 'Names, types and values of all blocks, in every subsystem.'}
       items={found.map(({ inside, name, title, match }) => ({
         key: [...inside, name].join('/'),

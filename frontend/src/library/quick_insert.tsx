@@ -1,6 +1,6 @@
 import { useMemo } from 'react'
-import { create } from 'zustand'
 import { insertBlock } from '../canvas/insert'
+import { show, useDialogs } from '../dialogs'
 import { useStudio } from '../store'
 import { Face } from './palette'
 import { PickList } from './pick_list'
@@ -8,34 +8,22 @@ import { matching } from './search'
 
 const MOST_SHOWN = 8
 
-interface QuickInsertState {
-  opened: boolean
-  typed: string
-  at: { x: number; y: number } | null
-}
-
-const useQuickInsert = create<QuickInsertState>(() => ({ opened: false, typed: '', at: null }))
-
-/** Open the list of blocks with what was typed so far; the block goes to `at` (screen px) or to a free place. */
-export function openQuickInsert(typed: string, at: { x: number; y: number } | null = null): void {
-  useQuickInsert.setState({ opened: true, typed, at })
-}
-
 /** Type a few letters, press Enter: the way to add a block by keyboard alone. */
 export function QuickInsert() {
-  const { opened, typed, at } = useQuickInsert()
+  const opened = useDialogs((s) => s.open === 'insert')
+  const typed = useDialogs((s) => s.typed)
+  const at = useDialogs((s) => s.at)
   const library = useStudio((s) => s.welcome?.library)
   const found = useMemo(() => matching(library ?? [], typed).slice(0, MOST_SHOWN), [library, typed])
-  const close = () => useQuickInsert.setState({ opened: false })
   return (
     <PickList
       opened={opened}
-      onClose={close}
+      onClose={() => show(null)}
       label="Add a block"
       placeholder="Add a block: type its name"
       list="Blocks"
       typed={typed}
-      onTyped={(next) => useQuickInsert.setState({ typed: next })}
+      onTyped={(next) => useDialogs.setState({ typed: next })}
       nothing={`No block matches “${typed}”.`}
       items={found.map((kind) => ({ key: kind.type, face: <Face kind={kind} />, title: kind.title, note: kind.summary }))}
       onPick={(index) => {

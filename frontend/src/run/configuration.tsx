@@ -1,20 +1,15 @@
 import { Alert, Button, Group, Modal, NativeSelect, Stack, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { create } from 'zustand'
+import { show, useDialogs } from '../dialogs'
 import { valueText } from '../inspector/value_text'
 import { ask, change, useStudio } from '../store'
 
 const CHECK_DELAY_MS = 200
-const useConfiguration = create<{ opened: boolean }>(() => ({ opened: false }))
-
-export function openConfiguration(): void {
-  if (useStudio.getState().document) useConfiguration.setState({ opened: true })
-}
 
 /** How the model is run: solver, steps, tolerances, stop time; kept with the model. */
 export function Configuration() {
-  const { opened } = useConfiguration()
-  const close = () => useConfiguration.setState({ opened: false })
+  const opened = useDialogs((s) => s.open === 'configuration')
+  const close = () => show(null)
   return (
     <Modal opened={opened} onClose={close} closeButtonProps={{ 'aria-label': 'Close' }} title={<b>Configuration parameters</b>} size="md">
       {opened && <Form onClose={close} />}

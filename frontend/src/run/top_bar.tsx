@@ -1,4 +1,4 @@
-import { ActionIcon, Badge, Button, Group, NativeSelect, NumberInput, Text, Tooltip } from '@mantine/core'
+import { ActionIcon, Badge, Button, Group, NativeSelect, Text, TextInput, Tooltip } from '@mantine/core'
 import {
   IconArrowBackUp,
   IconArrowForwardUp,
@@ -13,12 +13,10 @@ import {
   IconSettings,
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
-import { save, show } from '../documents/dialogs'
+import { openConfiguration, save, show } from '../dialogs'
 import { FileMenu } from '../documents/file_menu'
 import { DocumentTitle } from '../documents/title'
-import { openQuickInsert } from '../library/quick_insert'
 import { alter, ask, change, useStudio } from '../store'
-import { openConfiguration } from './configuration'
 import { stepCursor, useCursor } from './cursor'
 import { useRuns } from './runs'
 
@@ -61,6 +59,8 @@ export function TopBar() {
       if (pressed === 'enter') startOrResume()
       else if (pressed === 'e') openConfiguration()
       else if (pressed === 'o') show('open')
+      else if (pressed === 'k' && !event.shiftKey) show('commands')
+      else if (pressed === 'f' && !event.shiftKey) show('find')
       else if (pressed === 's' && event.shiftKey) show('save_as')
       else if (pressed === 's') void save()
       else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) alter('undo')
@@ -80,7 +80,7 @@ export function TopBar() {
         <Tool label={document?.state.undo ? `Undo ${document.state.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!document?.state.undo} onClick={() => alter('undo')} />
         <Tool label={document?.state.redo ? `Redo ${document.state.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!document?.state.redo} onClick={() => alter('redo')} />
         <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!document} onClick={() => void save()} />
-        <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!document} onClick={() => openQuickInsert('')} />
+        <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!document} onClick={() => show('insert')} />
         <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!document} onClick={() => alter('arrange')} />
       </Group>
       <Group gap={4} role="group" aria-label="Run" className="run-controls">
@@ -91,19 +91,7 @@ export function TopBar() {
         <Tool label="Pause" icon={IconPlayerPauseFilled} disabled={state !== 'running'} onClick={() => control('pause')} />
         <Tool label={busy ? 'Step' : 'One instant on'} icon={IconPlayerSkipForwardFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? control('step') : stepCursor(1))} />
         <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
-        <NumberInput
-          size="xs"
-          w={92}
-          aria-label="Stop time, s"
-          hideControls
-          min={0}
-          suffix=" s"
-          value={Number(document?.settings['stop_time'] ?? 10)}
-          onBlur={(event) => {
-            const value = Number.parseFloat(event.currentTarget.value)
-            if (document && value > 0 && value !== document.settings['stop_time']) void change({ kind: 'settings', values: { stop_time: value } })
-          }}
-        />
+        <StopTime />
         <NativeSelect
           size="xs"
           w={160}
@@ -121,6 +109,28 @@ export function TopBar() {
       <RunState />
       <RunProgress />
     </header>
+  )
+}
+
+/** When the model stops, s: what is typed counts when the field is left. */
+function StopTime() {
+  const known = useStudio((s) => s.document !== null)
+  const value = Number(useStudio((s) => s.document?.settings['stop_time']) ?? 10)
+  const written = `${value} s`
+  return (
+    <TextInput
+      key={written}
+      size="xs"
+      w={92}
+      aria-label="Stop time, s"
+      inputMode="decimal"
+      defaultValue={written}
+      onBlur={({ currentTarget }) => {
+        const typed = Number.parseFloat(currentTarget.value)
+        currentTarget.value = `${typed > 0 ? typed : value} s`
+        if (known && typed > 0 && typed !== value) void change({ kind: 'settings', values: { stop_time: typed } })
+      }}
+    />
   )
 }
 

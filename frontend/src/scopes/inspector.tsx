@@ -1,3 +1,4 @@
+import '../mantine_later.css'
 import { ActionIcon, Checkbox, NativeSelect, Switch, TextInput, Tooltip } from '@mantine/core'
 import { IconSearch, IconTrash } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'

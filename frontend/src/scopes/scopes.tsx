@@ -16,7 +16,7 @@ export function Scopes() {
   const run = useStudio((s) => s.run?.run)
   const all = useStudio((s) => s.run?.views)
   const views = all?.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
-  if (!run) return <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
+  if (!run) return null
   if (!views.length) return <p className="empty">The model has no Scope and no XY Graph, and no wire is logged: add a Scope, or click a wire and log it.</p>
   return (
     <div className="scopes-panel">

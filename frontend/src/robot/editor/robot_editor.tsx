@@ -1,3 +1,4 @@
+import '../../mantine_later.css'
 import { ActionIcon, Alert, Button, Menu, SegmentedControl, Text, Tooltip, useComputedColorScheme } from '@mantine/core'
 import { IconAlertTriangle, IconArrowBackUp, IconArrowForwardUp, IconArrowLeft, IconChevronDown, IconDeviceFloppy, IconPlus } from '@tabler/icons-react'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'

@@ -1,0 +1,31 @@
+import './mantine_later.css'
+import { ConnectDialog } from './canvas/connect_dialog'
+import { CommandPalette } from './command_palette'
+import { OpenDialog } from './documents/open_dialog'
+import { RecoveryDialog } from './documents/recovery_dialog'
+import { SaveDialog } from './documents/save_dialog'
+import { Tour } from './documents/tour'
+import { BlockDialog } from './inspector/block_dialog'
+import { Find } from './library/find'
+import { QuickInsert } from './library/quick_insert'
+import { Configuration } from './run/configuration'
+import { Shortcuts } from './shortcuts'
+
+/** All that opens over the page, in one piece that comes after the first picture. */
+export function AllDialogs() {
+  return (
+    <>
+      <BlockDialog />
+      <Configuration />
+      <QuickInsert />
+      <ConnectDialog />
+      <CommandPalette />
+      <Find />
+      <Tour />
+      <Shortcuts />
+      <SaveDialog />
+      <OpenDialog />
+      <RecoveryDialog />
+    </>
+  )
+}

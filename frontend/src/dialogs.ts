@@ -1,0 +1,47 @@
+import { create } from 'zustand'
+import { ask, useStudio } from './store'
+
+/** Every dialog that opens by itself; that of a block opens with `useStudio().edit`, and the tour has its own stops. */
+type Dialog = 'commands' | 'find' | 'keys' | 'insert' | 'connect' | 'configuration' | 'save_as' | 'open' | 'recovery'
+
+interface Dialogs {
+  open: Dialog | null
+  /** Tells one opening from the next. */
+  times: number
+  /** What is typed into the lists that are searched. */
+  typed: string
+  /** Where a new block goes, in screen px; `null` is a free place. */
+  at: { x: number; y: number } | null
+}
+
+/** Which dialog is open: known before the dialogs themselves, which come after the first picture of the page. */
+export const useDialogs = create<Dialogs>(() => ({ open: null, times: 0, typed: '', at: null }))
+
+/** Open a dialog, or close the one that is open. */
+export function show(open: Dialog | null, typed = '', at: Dialogs['at'] = null): void {
+  // What closes still says for a moment what it said.
+  useDialogs.setState((s) => (open ? { open, times: s.times + 1, typed, at } : { open }))
+}
+
+/** The stop of the tour that is shown; `null` while nobody is shown around. */
+export const useTour = create<{ stop: number | null }>(() => ({ stop: null }))
+
+export const openTour = (): void => useTour.setState({ stop: 0 })
+
+/** Configuration parameters are those of a document. */
+export function openConfiguration(): void {
+  if (useStudio.getState().document) show('configuration')
+}
+
+/** The files of the project folder as they are now, and those used last. */
+export async function projectFiles(): Promise<{ files: string[]; recent: string[] }> {
+  return (await ask<{ files: string[]; recent: string[] }>({ kind: 'files' })) ?? { files: [], recent: [] }
+}
+
+/** Save under the present name; asks for one where there is none. */
+export async function save(): Promise<void> {
+  const { document } = useStudio.getState()
+  if (!document) return
+  if (document.state.path) await ask({ kind: 'save', document: document.state.document })
+  else show('save_as')
+}

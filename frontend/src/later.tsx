@@ -1,0 +1,44 @@
+import { lazy, Suspense, useEffect, useState, type ComponentType } from 'react'
+import { useDialogs, useTour } from './dialogs'
+import { useStudio } from './store'
+
+const PATIENCE_MS = 1500
+const parts: (() => Promise<unknown>)[] = []
+
+/**
+ * A part of the page that is not in its first download: fetched as soon as the page has shown its document and has
+ * nothing else to do, or earlier where somebody wants it. Until it is there, `words` stand in its place.
+ */
+export function later(load: () => Promise<ComponentType>, words = ''): ComponentType {
+  const Part = lazy(() => load().then((part) => ({ default: part })))
+  parts.push(load)
+  return () => (
+    <Suspense fallback={words && <p className="empty">{words}</p>}>
+      <Part />
+    </Suspense>
+  )
+}
+
+/** Whether the first picture of the page is there, so that what comes later may come. It is fetched then. */
+export function useSettled(): boolean {
+  const shown = useStudio((s) => s.document !== null)
+  const [settled, setSettled] = useState(false)
+  useEffect(() => {
+    if (!shown) return
+    const settle = () => {
+      setSettled(true)
+      for (const load of parts) void load()
+    }
+    const idle = requestIdleCallback(settle, { timeout: PATIENCE_MS })
+    return () => cancelIdleCallback(idle)
+  }, [shown])
+  return settled
+}
+
+/** Whether somebody wants a dialog, now or before the page has settled. */
+export function useWanted(): boolean {
+  const dialog = useDialogs((s) => s.open !== null)
+  const touring = useTour((s) => s.stop !== null)
+  const editing = useStudio((s) => s.editing !== null)
+  return dialog || touring || editing
+}
