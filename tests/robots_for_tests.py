@@ -10,7 +10,8 @@ from casadi import Function
 from numpy.typing import ArrayLike
 
 from armblocks.dynamics import TRACES
-from armblocks.formats.robot_files import list_robots, shipped_robot
+from armblocks.formats import list_robots
+from armblocks.formats.robot_files import shipped_robot
 from armblocks.robot import (
     Fixed,
     FrictionModel,

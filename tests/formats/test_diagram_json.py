@@ -44,7 +44,7 @@ from armblocks.formats import (
     write_diagram,
     write_robot,
 )
-from armblocks.formats.robot_files import shipped_folder
+from armblocks.formats.shipped import shipped_folder
 from armblocks.robot import FrictionModel, Robot
 
 SCHEMAS = Path(formats.__file__).parent / "schema"

@@ -11,7 +11,7 @@ import pytest
 
 from armblocks.errors import ArmblocksWarning, FormatError, InertiaWarning, UnknownNameError
 from armblocks.formats import load_robot, read_script
-from armblocks.formats.robot_files import shipped_folder
+from armblocks.formats.shipped import shipped_folder
 from armblocks.robot import (
     DhConvention,
     FrictionModel,

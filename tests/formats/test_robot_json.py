@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from armblocks.errors import ArmblocksError, ArmblocksWarning, FormatError, InertiaWarning, UnknownNameError
 from armblocks.formats import load_robot, read_robot, robot_files, write_robot
+from armblocks.formats.shipped import shipped_folder
 from armblocks.robot import (
     DhConvention,
     DhRow,
@@ -308,4 +309,4 @@ def test_oversized_file_is_refused(tmp_path: Path) -> None:
 
 def test_incomplete_installation_is_said() -> None:
     with pytest.raises(FormatError, match=r"the shipped songs are missing.*install armblocks again"):
-        robot_files.shipped_folder("songs")
+        shipped_folder("songs")

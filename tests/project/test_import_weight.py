@@ -4,7 +4,9 @@ import json
 import subprocess
 import sys
 
-HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "fastapi"}
+# What else the studio's page can do without, so that it is there while the server imports it.
+BEHIND_THE_PAGE = {"casadi", "pydantic", "armblocks.blocks", "armblocks.diagram", "armblocks.report"}
+HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "starlette", "numpy"}
 
 
 def loaded_by(statement: str) -> set[str]:
@@ -20,3 +22,9 @@ def test_import_armblocks_loads_no_heavy_library() -> None:
 
 def test_the_command_line_starts_without_heavy_libraries() -> None:
     assert loaded_by("import armblocks.cli.main") & HEAVY == set()
+
+
+def test_the_page_of_the_studio_is_served_before_anything_heavy_is_imported() -> None:
+    loaded = loaded_by("import armblocks.studio.launch")
+    assert "starlette" in loaded
+    assert loaded & (HEAVY - {"starlette"} | BEHIND_THE_PAGE) == set()

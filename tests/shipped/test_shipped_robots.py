@@ -12,7 +12,7 @@ import pytest
 
 from armblocks import formats
 from armblocks.formats import list_robots, load_robot, write_robot
-from armblocks.formats.robot_files import shipped_folder
+from armblocks.formats.shipped import shipped_folder
 from armblocks.robot import Robot, inertia_findings
 from robots_for_tests import evaluate
 

@@ -12,7 +12,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 
 from armblocks.studio.guard import Guard, Keys
 from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.server import studio_app
+from armblocks.studio.server import HubToCome, studio_app
 
 HOST = "127.0.0.1:8642"
 ORIGIN = f"http://{HOST}"
@@ -39,7 +39,7 @@ def keys() -> Keys:
 def app(web: Path, keys: Keys, tmp_path: Path) -> Guard:
     project = tmp_path / "project"
     project.mkdir()
-    return studio_app(ProjectFolder(project), keys, frozenset({HOST}), web)
+    return studio_app(HubToCome(ProjectFolder(project)), keys, frozenset({HOST}), web)
 
 
 def call(app: Guard, path: str, headers: dict[str, str], *, method: str = "GET", kind: str = "http") -> Any:

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from armblocks.cli.terminal import STRONG, results_console, table
@@ -53,6 +52,8 @@ def bench(
 
 
 def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list[str]:
+    import numpy as np
+
     generator = np.random.default_rng(0)
     batch = [generator.uniform(-1.0, 1.0, (samples, arm.n)) for _ in range(inputs)]
     single = [np.ascontiguousarray(values[0]) for values in batch]

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.text import Text
 
 from armblocks.cli.terminal import ACCENT, ERROR, GOOD, STRONG, results_console
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from armblocks.diagram import Block, Diagram
     from armblocks.diagram.difference import DiagramDifference, PlacedWire, ValueChange
 
@@ -119,19 +121,23 @@ def _where_different(before: object, after: object) -> str:
     if isinstance(before, tuple) and isinstance(after, tuple):
         old, new = _as_array(cast("Any", before)), _as_array(cast("Any", after))
         if old.shape == new.shape:
-            return f"{np.count_nonzero(old != new)} of {old.size} entries"
+            return f"{(old != new).sum()} of {old.size} entries"
         return "its content"
     return ", ".join(_different_fields(cast("Any", before), cast("Any", after))) or "its content"
 
 
 def _different_fields(before: object, after: object) -> list[str]:
     if dataclasses.is_dataclass(before) and type(before) is type(after):
+        import numpy as np
+
         fields = [entry.name for entry in dataclasses.fields(before) if entry.compare and entry.init]
         return [name for name in fields if np.any(getattr(before, name) != getattr(after, name))]
     return []
 
 
 def _as_array(value: Any) -> NDArray[np.float64]:
+    import numpy as np
+
     return np.asarray(value, dtype=np.float64)
 
 
@@ -149,7 +155,11 @@ def value_text(value: object) -> str:
     if isinstance(value, tuple):
         rows = cast("tuple[object, ...]", value)
         text = _array_text(rows)
-        return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}… of shape {np.shape(cast('Any', rows))}"
+        if len(text) <= _LONGEST:
+            return text
+        import numpy as np
+
+        return f"{text[:_LONGEST]}… of shape {np.shape(cast('Any', rows))}"
     return _object_text(value)
 
 
@@ -213,6 +223,6 @@ def _plain(value: object) -> object:
     """The value where JSON has such values, else its text (an infinity is the text ``inf``)."""
     if isinstance(value, tuple):
         return [_plain(entry) for entry in cast("tuple[object, ...]", value)]
-    if isinstance(value, float) and not np.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value if value is None or isinstance(value, bool | int | float | str) else value_text(value)

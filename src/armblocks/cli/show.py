@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.console import Console
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armblocks.robot import Link, Robot
     from armblocks.spatial import Transform
 
-_DEGREE = float(np.pi / 180.0)
+_DEGREE = math.pi / 180.0
 
 
 def show(
@@ -204,8 +204,8 @@ def _or_nan(value: float | None) -> float:
 
 def _number(value: float) -> str:
     """Six digits and no more zeros than needed; nothing for what a link does not have."""
-    return "" if np.isnan(value) else f"{value:.6g}"
+    return "" if math.isnan(value) else f"{value:.6g}"
 
 
 def _with_unit(value: float, unit: str) -> str:
-    return "" if np.isnan(value) else f"{value:.6g} {unit}"
+    return "" if math.isnan(value) else f"{value:.6g} {unit}"

@@ -29,17 +29,17 @@ def studio(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
     """Open the studio in the browser: build a diagram, run it, watch scopes and arm. Ctrl-C ends it."""
-    import armblocks as ab
+    from armblocks.formats import list_examples
     from armblocks.studio.launch import serve
 
     root = folder or Path.cwd()
-    if model and model not in ab.list_examples():
+    if model and model not in list_examples():
         path = Path(model)
         if not path.is_file():
             raise FormatError(
                 "there is no such file and no such example",
                 where=model,
-                allowed=f"a diagram file, or one of {', '.join(ab.list_examples())}",
+                allowed=f"a diagram file, or one of {', '.join(list_examples())}",
                 fix="check the name",
             )
         root = folder or path.resolve().parent

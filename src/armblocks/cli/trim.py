@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 from rich.console import Console
 
@@ -103,6 +102,8 @@ def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
 
 
 def _ends(name: str, value: object) -> tuple[float, float]:
+    import numpy as np
+
     numbers = np.atleast_1d(np.asarray(value, dtype=np.float64))
     if numbers.shape != (2,):
         raise InputError(
@@ -116,6 +117,8 @@ def _ends(name: str, value: object) -> tuple[float, float]:
 
 def print_trim(found: TrimResult, console: Console) -> None:
     """How well it rests, then the values of all that was sought."""
+    import numpy as np
+
     console.print(
         f"{found.point.name} at {found.point.time:g} s: at rest, {len(found.residuals)} equations to "
         f"{found.largest_residual:.2g} in {found.iterations} iterations",

@@ -8,7 +8,6 @@ from armblocks.lazy_exports import lazy_exports
 if TYPE_CHECKING:
     from armblocks.formats.diagram_files import (
         example_descriptions,
-        list_examples,
         load_diagram,
         load_library,
         read_diagram,
@@ -19,11 +18,11 @@ if TYPE_CHECKING:
     from armblocks.formats.diagram_python import diagram_to_python
     from armblocks.formats.document_kinds import DocumentKind, kind_of_data, kind_of_document
     from armblocks.formats.matlab_script import Script, read_script
-    from armblocks.formats.robot_files import ROBOT_FORMATS, list_robots, load_robot, read_robots
+    from armblocks.formats.robot_files import ROBOT_FORMATS, load_robot, read_robots
     from armblocks.formats.robot_format import RobotFormat
     from armblocks.formats.robot_json import read_robot, write_robot
     from armblocks.formats.robot_references import ResolveRobot
-    from armblocks.formats.subsystem_libraries import list_libraries
+    from armblocks.formats.shipped import list_examples, list_libraries, list_robots
     from armblocks.formats.table_files import load_table
 else:
     __getattr__ = lazy_exports(
@@ -40,9 +39,9 @@ else:
             "example_descriptions": "armblocks.formats.diagram_files",
             "kind_of_data": "armblocks.formats.document_kinds",
             "kind_of_document": "armblocks.formats.document_kinds",
-            "list_examples": "armblocks.formats.diagram_files",
-            "list_libraries": "armblocks.formats.subsystem_libraries",
-            "list_robots": "armblocks.formats.robot_files",
+            "list_examples": "armblocks.formats.shipped",
+            "list_libraries": "armblocks.formats.shipped",
+            "list_robots": "armblocks.formats.shipped",
             "load_diagram": "armblocks.formats.diagram_files",
             "load_library": "armblocks.formats.diagram_files",
             "load_robot": "armblocks.formats.robot_files",

@@ -20,16 +20,10 @@ from armblocks.formats.diagram_json import (
     read_library,
 )
 from armblocks.formats.json_document import read_document
-from armblocks.formats.robot_files import load_robot, shipped_folder
+from armblocks.formats.robot_files import load_robot
 from armblocks.formats.robot_references import ResolveRobot
+from armblocks.formats.shipped import SUFFIX, list_examples, shipped_folder
 from armblocks.formats.subsystem_libraries import library_path
-
-SUFFIX = ".json"
-
-
-def list_examples() -> tuple[str, ...]:
-    """Names of the shipped diagrams, sorted."""
-    return tuple(sorted(path.stem for path in shipped_folder("examples").glob(f"*{SUFFIX}")))
 
 
 @cache

@@ -32,8 +32,9 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.parameter import kind_of
 from armblocks.errors import FormatError
-from armblocks.formats.robot_files import list_robots, load_robot
+from armblocks.formats.robot_files import load_robot
 from armblocks.formats.robot_references import shortest_reference
+from armblocks.formats.shipped import list_robots
 from armblocks.robot import Robot
 
 _Named = TypeVar("_Named", Robot, str)

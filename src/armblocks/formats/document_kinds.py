@@ -6,11 +6,10 @@ from enum import Enum
 
 from armblocks.errors import UnknownNameError
 from armblocks.files import read_bounded
-from armblocks.formats.diagram_files import list_examples
 from armblocks.formats.diagram_json import DEEPEST, MOST_BYTES
 from armblocks.formats.json_document import read_document
-from armblocks.formats.robot_files import is_path, list_robots
-from armblocks.formats.subsystem_libraries import list_libraries
+from armblocks.formats.robot_files import is_path
+from armblocks.formats.shipped import list_examples, list_libraries, list_robots
 
 
 class DocumentKind(Enum):

@@ -13,18 +13,11 @@ from armblocks.files import read_bounded
 from armblocks.formats.matlab_script import MATLAB_SCRIPT
 from armblocks.formats.robot_format import RobotFormat
 from armblocks.formats.robot_json import ROBOT_JSON
+from armblocks.formats.shipped import ROBOT_FILE, list_robots, shipped_folder
 from armblocks.robot import FrictionModel, Robot, warn_of_doubts, warn_of_inertias
 
 ROBOT_FORMATS: tuple[RobotFormat, ...] = (ROBOT_JSON, MATLAB_SCRIPT)
 """Every format of robot files. A new one is one file with a ``RobotFormat``, and its name here."""
-
-SHIPPED_FILE = "robot.json"
-
-
-def list_robots() -> tuple[str, ...]:
-    """Names of the shipped robots, sorted."""
-    folder = shipped_folder("robots")
-    return tuple(sorted(entry.name for entry in folder.iterdir() if (entry / SHIPPED_FILE).is_file()))
 
 
 def load_robot(
@@ -61,7 +54,7 @@ def shipped_robot(name: str) -> Robot:
     known = list_robots()
     if name not in known:
         raise UnknownNameError("shipped robot", name, known)
-    path = shipped_folder("robots") / name / SHIPPED_FILE
+    path = shipped_folder("robots") / name / ROBOT_FILE
     (robot,) = _read_file(path).values()
     return replace(robot, source=name)
 
@@ -72,27 +65,13 @@ def is_path(name_or_path: str) -> bool:
     return "/" in name_or_path or "\\" in name_or_path or name_or_path.lower().endswith(suffixes)
 
 
-def shipped_folder(kind: str) -> Path:
-    """The folder of the shipped ``robots`` or ``examples``: in the installed package, or in a checkout.
-
-    Raises ``FormatError`` where the installation is incomplete.
-    """
-    package = Path(__file__).resolve().parent.parent
-    for folder in (package / "shipped" / kind, package.parent.parent / kind):
-        if folder.is_dir():
-            return folder
-    raise FormatError(
-        f"the shipped {kind} are missing", where=str(package), fix="install armblocks again, from a wheel"
-    )
-
-
 def _read_file(path: Path) -> Mapping[str, Robot]:
     if path.is_dir():
         raise FormatError(
             "this is a folder",
             where=str(path),
             allowed="a robot file: " + ", ".join(suffix for f in ROBOT_FORMATS for suffix in f.suffixes),
-            fix=f"give the path of a file in it, such as {path.name}/{SHIPPED_FILE}",
+            fix=f"give the path of a file in it, such as {path.name}/{ROBOT_FILE}",
         )
     format = _format(str(path))
     return format.read(read_bounded(path, format.most_bytes), str(path))

@@ -29,8 +29,9 @@ from armblocks.diagram import TimeTable, UserFunction
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.formats.json_document import Node, closed_members
 from armblocks.formats.python_functions import load_function
-from armblocks.formats.robot_files import is_path, list_robots, shipped_robot
+from armblocks.formats.robot_files import is_path, shipped_robot
 from armblocks.formats.robot_json import robot_from, robot_to
+from armblocks.formats.shipped import list_robots
 from armblocks.formats.table_files import load_table
 from armblocks.robot import FrictionModel, Robot
 

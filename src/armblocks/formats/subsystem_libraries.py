@@ -24,10 +24,9 @@ from armblocks.diagram import Diagram
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.files import read_bounded
 from armblocks.formats.json_document import Node, read_document
-from armblocks.formats.robot_files import shipped_folder
 from armblocks.formats.robot_references import relative_to_folder
+from armblocks.formats.shipped import SUFFIX, list_libraries, shipped_folder
 
-SUFFIX = ".json"
 MOST_BYTES = 16 * 2**20
 DEEPEST = 320
 """Objects and arrays inside each other, as in diagrams."""
@@ -49,11 +48,6 @@ class ReadEntry(Protocol):
 def read_library_file(path: Path) -> bytes:
     """The bytes of a library file, wherever it lies."""
     return read_bounded(path, MOST_BYTES)
-
-
-def list_libraries() -> tuple[str, ...]:
-    """Names of the shipped libraries, sorted."""
-    return tuple(sorted(path.stem for path in shipped_folder("libraries").glob(f"*{SUFFIX}")))
 
 
 def library_path(reference: str, folder: Path | None) -> Path:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import dataclasses
 import secrets
 import warnings
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Sequence
+from functools import lru_cache
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Literal
 
-from starlette.websockets import WebSocketDisconnect
+from pydantic import ValidationError
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
@@ -19,6 +19,7 @@ from armblocks.diagram import Diagram, ParameterFormula
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
 from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputError, UnknownNameError
+from armblocks.report.diagram_file import drawing_bytes
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
@@ -26,12 +27,13 @@ from armblocks.studio.file_kind import Performed
 from armblocks.studio.nesting import inside, linked_part, with_robot
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.outline import find, outline
+from armblocks.studio.page import NoRequestError, Page
 from armblocks.studio.parameter_values import parameter_json, parameter_value
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.robot_desk import RobotDesk
 from armblocks.studio.robot_scene import link_frames_of, scene_of
 from armblocks.studio.run_process import RunProcess
-from armblocks.studio.run_record import RunRecord, Said
+from armblocks.studio.run_record import RunRecord
 from armblocks.studio.run_report import report_of
 from armblocks.studio.run_settings import setting_rules, solver_choices
 from armblocks.studio.sheet import library, sheet, sheet_change
@@ -39,33 +41,8 @@ from armblocks.studio.state_folder import StateFolder
 from armblocks.studio.typed_settings import setting_faults
 from armblocks.studio.workers import Workers
 
-GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
-"""What sending to a page raises that has left."""
 PAGE_SECONDS = 1.5
 """A page that has its document draws for so long: the process for its first run is made after that."""
-SendText = Callable[[str], Awaitable[None]]
-SendBytes = Callable[[bytes], Awaitable[None]]
-
-
-@dataclasses.dataclass(eq=False)
-class Page:
-    """One page that is connected: how to reach it, and what it shows."""
-
-    send_text: SendText
-    send_bytes: SendBytes
-    shows: dict[str, tuple[str, ...]] = dataclasses.field(default_factory=dict[str, tuple[str, ...]])
-    """Documents that it shows, and the path of the sheet that it looks at."""
-    hears: dict[str, int] = dataclasses.field(default_factory=dict[str, int])
-    """Runs that it is told from their beginning, and how far: until then it gets nothing else of them."""
-
-    async def tell(self, event: say.Message) -> None:
-        """Send an event; a page that is gone is nobody's trouble."""
-        await self.send(event.model_dump_json())
-
-    async def send(self, said: Said) -> None:
-        """Send a message or a frame as it is."""
-        with contextlib.suppress(*GONE):
-            await (self.send_text(said) if isinstance(said, str) else self.send_bytes(said))
 
 
 class Hub:
@@ -118,8 +95,11 @@ class Hub:
         self.robots.leave(page)
 
     async def answer(self, page: Page, text: str) -> None:
-        """Carry out one request and reply to it, whatever becomes of it."""
-        envelope = say.Envelope.model_validate_json(text)
+        """Carry out one request and reply to it, whatever becomes of it; raises ``NoRequestError``."""
+        try:
+            envelope = say.Envelope.model_validate_json(text)
+        except ValidationError as error:
+            raise NoRequestError(str(error)) from None
         try:
             reply = say.Reply(number=envelope.number, value=await self.carry_out(page, envelope.request))
         except ArmblocksError as error:
@@ -306,6 +286,17 @@ class Hub:
             warnings.simplefilter("ignore", InertiaWarning)
             return formats.load_robot(self.folder.robot_path(name, formats.list_robots()))
 
+    async def drawing(
+        self, document: str, kind: str, *, sheet: str, theme: Literal["light", "dark"] | None
+    ) -> bytes:
+        """A sheet of a document as a file; drawn aside, so that nobody else waits for it."""
+        diagram = self.documents[document].document.diagram
+        return await asyncio.to_thread(drawing_bytes, diagram, kind, sheet=sheet, theme=theme)
+
+    async def example_drawing(self, name: str) -> bytes:
+        """A shipped example as SVG; raises ``UnknownNameError``."""
+        return await asyncio.to_thread(_example_drawing, name)
+
     # -- robots ----------------------------------------------------------------------------------------------
 
     def _is_robot_file(self, path: str) -> bool:
@@ -425,3 +416,8 @@ class Hub:
         for run in self.runs.values():
             run.end()
         self.workers.end()
+
+
+@lru_cache(maxsize=64)
+def _example_drawing(name: str) -> bytes:
+    return drawing_bytes(formats.load_diagram(name, BLOCKS), "svg")

@@ -6,14 +6,19 @@ import contextlib
 import socket
 import webbrowser
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from armblocks.errors import InputError
 from armblocks.studio.guard import Keys
 from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.server import built_page, studio_app
+from armblocks.studio.server import HubToCome, built_page, studio_app
 from armblocks.studio.state_folder import StateFolder
+
+if TYPE_CHECKING:
+    from armblocks.studio.hub import Hub
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 MOST_MESSAGE_BYTES = 8 * 2**20
@@ -43,7 +48,8 @@ def serve(
     listener = listener or _listener(port)
     taken: int = listener.getsockname()[1]
     keys = Keys(taken, kept.begin_session(taken, afresh=afresh).secret)
-    app = studio_app(project, keys, frozenset(f"{host}:{taken}" for host in LOOPBACK), web)
+    hub = HubToCome(project)
+    app = studio_app(hub, keys, frozenset(f"{host}:{taken}" for host in LOOPBACK), web)
     fragment = f"#{quote(model)}" if model else ""
     link = f"http://127.0.0.1:{taken}/login?key={keys.new_login()}{fragment}"
     announce(link)
@@ -58,7 +64,15 @@ def serve(
         ws="websockets-sansio",
         timeout_graceful_shutdown=1,
     )
-    uvicorn.Server(config).run(sockets=[listener])
+    server = uvicorn.Server(config)
+
+    def give_up(made: Future[Hub]) -> None:
+        server.should_exit |= made.exception() is not None
+
+    hub.made.add_done_callback(give_up)
+    server.run(sockets=[listener])
+    if hub.made.done():
+        hub.made.result()  # what kept it from being made is the reason of the end
 
 
 def _listener_as_before(kept: StateFolder) -> socket.socket | None:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import read_bounded, write_atomically
-from armblocks.formats.robot_files import shipped_folder
+from armblocks.formats.shipped import shipped_folder
 
 READABLE = (".json", ".m")
 """Suffixes of files that can be opened: diagrams, robots and scripts."""

@@ -1,31 +1,41 @@
-"""The studio's server: one page, one websocket, a few downloads. Everything passes the guard first."""
+"""The studio's server: one page, one websocket, a few downloads. Everything passes the guard first.
+
+The page needs nothing of what stands behind it, so it is there at once: the hub, whose imports take longer
+than a page takes to come, is made meanwhile (:class:`HubToCome`), and what asks for it waits.
+"""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncGenerator
+import os
+from collections.abc import AsyncGenerator, MutableMapping
+from concurrent.futures import Future
 from contextlib import asynccontextmanager
-from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from threading import Thread
+from typing import TYPE_CHECKING, Any
 
-from fastapi import FastAPI, WebSocket, WebSocketDisconnect
-from fastapi.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
-from fastapi.staticfiles import StaticFiles
-from pydantic import ValidationError
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from armblocks import formats
-from armblocks.blocks import BLOCKS
-from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
-from armblocks.report.diagram_file import drawing_bytes
+from armblocks.errors import ArmblocksError, FormatError
 from armblocks.studio.guard import Guard, Keys
-from armblocks.studio.hub import Hub, Page
+from armblocks.studio.page import NoRequestError, Page
 from armblocks.studio.project_folder import ProjectFolder
+
+if TYPE_CHECKING:
+    from armblocks.studio.hub import Hub
 
 WEB = Path(__file__).parent / "web"
 """The built page; made by the front end's build, not kept in the repository."""
-
 DRAWING_TYPES = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
+THEMES = ("light", "dark", None)
+FOREVER = "private, max-age=31536000, immutable"
+"""How long a browser may keep a file whose name says its content."""
 
 
 def built_page(folder: Path = WEB) -> Path:
@@ -40,85 +50,134 @@ def built_page(folder: Path = WEB) -> Path:
     return folder
 
 
-@lru_cache(maxsize=64)
-def example_drawing(name: str) -> bytes:
-    """A shipped example as SVG; raises ``UnknownNameError``."""
-    known = formats.list_examples()
-    if name not in known:
-        raise UnknownNameError("example", name, known)
-    return drawing_bytes(formats.load_diagram(name, BLOCKS), "svg")
+class Assets(StaticFiles):
+    """Files of the page whose names change with their content: a browser asks for each of them once."""
+
+    def file_response(
+        self,
+        full_path: str | os.PathLike[str],
+        stat_result: os.stat_result,
+        scope: MutableMapping[str, Any],
+        status_code: int = 200,
+    ) -> Response:
+        """The file, to be kept for good."""
+        answer = super().file_response(full_path, stat_result, scope, status_code)
+        answer.headers["cache-control"] = FOREVER
+        return answer
 
 
-def studio_app(folder: ProjectFolder, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
+class HubToCome:
+    """The hub of a folder, made in a thread of its own from the moment at which it is first asked for."""
+
+    def __init__(self, folder: ProjectFolder) -> None:
+        self.made: Future[Hub] = Future()
+        self._folder = folder
+        self._begun = False
+
+    def begin(self) -> None:
+        """Have it made, if nobody has yet."""
+        if not self._begun:
+            self._begun = True
+            Thread(target=self._make, name="hub").start()
+
+    async def here(self) -> Hub:
+        """The hub, as soon as it is there; raises what kept it from being made."""
+        self.begin()
+        return await asyncio.shield(asyncio.wrap_future(self.made))
+
+    def _make(self) -> None:
+        try:
+            from armblocks.studio.hub import Hub
+            from armblocks.studio.sheet import library
+
+            library()  # the first page asks for it
+            self.made.set_result(Hub(self._folder))
+        except BaseException as error:
+            self.made.set_exception(error)
+
+
+def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
     """The whole application, guarded. ``hosts``: the ``Host`` values that mean this server."""
-    hub = Hub(folder)
 
     @asynccontextmanager
-    async def lifespan(_: FastAPI) -> AsyncGenerator[None]:
-        hub.prepare()
+    async def lifespan(_: Starlette) -> AsyncGenerator[None]:
+        async def prepare() -> None:
+            (await hub.here()).prepare()
+
+        preparing = asyncio.create_task(prepare())
         yield
-        hub.close()
+        preparing.cancel()
+        if hub.made.done() and hub.made.exception() is None:
+            hub.made.result().close()
 
-    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, lifespan=lifespan)
-
-    @app.get("/health")
-    async def health() -> PlainTextResponse:  # pyright: ignore[reportUnusedFunction]
+    async def health(_: Request) -> Response:
         return PlainTextResponse("armblocks studio")
 
-    @app.get("/login")
-    async def login(key: str = "") -> Response:  # pyright: ignore[reportUnusedFunction]
-        if not keys.spend_login(key):
+    async def login(request: Request) -> Response:
+        if not keys.spend_login(request.query_params.get("key", "")):
             return PlainTextResponse("this login link was used or is wrong: start the studio again", 401)
         answer = RedirectResponse("/", status_code=303)
         answer.set_cookie(keys.cookie_name, keys.session, httponly=True, samesite="strict", path="/")
         return answer
 
-    @app.get("/drawing/{document}.{kind}")
-    async def drawing(  # pyright: ignore[reportUnusedFunction]
-        document: str, kind: str, sheet: str = "", theme: Literal["light", "dark"] | None = None
-    ) -> Response:
+    async def drawing(request: Request) -> Response:
         """A sheet as a file to keep; drawn aside, so that nobody else waits for it."""
+        asked, kind = request.query_params, request.path_params["kind"]
+        theme = asked.get("theme")
+        if theme not in THEMES:
+            return PlainTextResponse("a theme is light or dark", 422)
         try:
-            diagram = hub.documents[document].document.diagram
-            data = await asyncio.to_thread(drawing_bytes, diagram, kind, sheet=sheet, theme=theme)
-        except UnknownNameError as error:
+            data = await (await hub.here()).drawing(
+                request.path_params["document"],
+                kind,
+                sheet=asked.get("sheet", ""),
+                theme=theme,
+            )
+        except ArmblocksError as error:
             return PlainTextResponse(str(error), 404)
         return Response(data, media_type=DRAWING_TYPES[kind])
 
-    @app.get("/example/{name}.svg")
-    async def example(name: str) -> Response:  # pyright: ignore[reportUnusedFunction]
+    async def example(request: Request) -> Response:
         """The drawing of a shipped example, for the gallery."""
         try:
-            data = await asyncio.to_thread(example_drawing, name)
-        except UnknownNameError as error:
+            data = await (await hub.here()).example_drawing(request.path_params["name"])
+        except ArmblocksError as error:
             return PlainTextResponse(str(error), 404)
         return Response(data, media_type=DRAWING_TYPES["svg"])
 
-    @app.get("/report/{document}")
-    async def report(document: str) -> Response:  # pyright: ignore[reportUnusedFunction]
+    async def report(request: Request) -> Response:
         try:
-            return Response(await hub.report(document), media_type="text/html")
+            data = await (await hub.here()).report(request.path_params["document"])
         except ArmblocksError as error:
             return PlainTextResponse(str(error), 404)
+        return Response(data, media_type="text/html")
 
-    @app.websocket("/ws")
-    async def talk(socket: WebSocket) -> None:  # pyright: ignore[reportUnusedFunction]
+    async def talk(socket: WebSocket) -> None:
         await socket.accept()
-        page = Page(socket.send_text, socket.send_bytes)
-        await hub.welcome(page)
+        rooms, page = await hub.here(), Page(socket.send_text, socket.send_bytes)
+        await rooms.welcome(page)
         try:
             while True:
-                await hub.answer(page, await socket.receive_text())
-        except (ValidationError, KeyError):
+                await rooms.answer(page, await socket.receive_text())
+        except (NoRequestError, KeyError):
             await socket.close(1008, "this is no request of the studio")
         except WebSocketDisconnect:
             pass
         finally:
-            hub.leave(page)
+            rooms.leave(page)
 
-    @app.get("/")
-    async def index() -> FileResponse:  # pyright: ignore[reportUnusedFunction]
-        return FileResponse(web / "index.html")
+    async def index(_: Request) -> Response:
+        return FileResponse(web / "index.html", headers={"cache-control": "no-cache"})
 
-    app.mount("/", StaticFiles(directory=web))
-    return Guard(app, keys, hosts)
+    routes: list[Any] = [
+        Route("/health", health),
+        Route("/login", login),
+        Route("/drawing/{document}.{kind}", drawing),
+        Route("/example/{name}.svg", example),
+        Route("/report/{document}", report),
+        WebSocketRoute("/ws", talk),
+        Route("/", index),
+        Mount("/assets", Assets(directory=web / "assets", check_dir=False)),
+        Mount("/", StaticFiles(directory=web)),
+    ]
+    return Guard(Starlette(routes=routes, lifespan=lifespan), keys, hosts)

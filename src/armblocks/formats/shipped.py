@@ -1,0 +1,42 @@
+"""What comes with armblocks, by name: where it lies and what there is, without reading any of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armblocks.errors import FormatError
+
+SUFFIX = ".json"
+"""Of diagrams and libraries."""
+ROBOT_FILE = "robot.json"
+"""In the folder that is named as the robot."""
+
+
+def list_robots() -> tuple[str, ...]:
+    """Names of the shipped robots, sorted."""
+    folder = shipped_folder("robots")
+    return tuple(sorted(entry.name for entry in folder.iterdir() if (entry / ROBOT_FILE).is_file()))
+
+
+def list_examples() -> tuple[str, ...]:
+    """Names of the shipped diagrams, sorted."""
+    return tuple(sorted(path.stem for path in shipped_folder("examples").glob(f"*{SUFFIX}")))
+
+
+def list_libraries() -> tuple[str, ...]:
+    """Names of the shipped libraries, sorted."""
+    return tuple(sorted(path.stem for path in shipped_folder("libraries").glob(f"*{SUFFIX}")))
+
+
+def shipped_folder(kind: str) -> Path:
+    """The folder of the shipped ``robots`` or ``examples``: in the installed package, or in a checkout.
+
+    Raises ``FormatError`` where the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / "shipped" / kind, package.parent.parent / kind):
+        if folder.is_dir():
+            return folder
+    raise FormatError(
+        f"the shipped {kind} are missing", where=str(package), fix="install armblocks again, from a wheel"
+    )

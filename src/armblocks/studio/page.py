@@ -1,0 +1,45 @@
+"""A page that is connected: how to reach it, and what it shows."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from starlette.websockets import WebSocketDisconnect
+
+from armblocks.studio.run_record import Said
+
+if TYPE_CHECKING:
+    from armblocks.studio.edits import Message
+
+GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
+"""What sending to a page raises that has left."""
+SendText = Callable[[str], Awaitable[None]]
+SendBytes = Callable[[bytes], Awaitable[None]]
+
+
+class NoRequestError(ValueError):
+    """What a page has sent is no request of the studio."""
+
+
+@dataclass(eq=False)
+class Page:
+    """One page. Its documents, runs and robots are the hub's affair."""
+
+    send_text: SendText
+    send_bytes: SendBytes
+    shows: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
+    """Documents that it shows, and the path of the sheet that it looks at."""
+    hears: dict[str, int] = field(default_factory=dict[str, int])
+    """Runs that it is told from their beginning, and how far: until then it gets nothing else of them."""
+
+    async def tell(self, event: Message) -> None:
+        """Send an event; a page that is gone is nobody's trouble."""
+        await self.send(event.model_dump_json())
+
+    async def send(self, said: Said) -> None:
+        """Send a message or a frame as it is."""
+        with contextlib.suppress(*GONE):
+            await (self.send_text(said) if isinstance(said, str) else self.send_bytes(said))
