@@ -11,6 +11,7 @@ import os
 from collections.abc import AsyncGenerator, MutableMapping
 from concurrent.futures import Future
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -96,6 +97,79 @@ class HubToCome:
             self.made.set_exception(error)
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What the server answers; each method is the endpoint of a route."""
+
+    hub: HubToCome
+    keys: Keys
+    web: Path
+
+    async def health(self, _: Request) -> Response:
+        """Whether it is the studio that answers here."""
+        return PlainTextResponse("armblocks studio")
+
+    async def login(self, request: Request) -> Response:
+        """Turn the one-time key of the link into the cookie of the session."""
+        if not self.keys.spend_login(request.query_params.get("key", "")):
+            return PlainTextResponse("this login link was used or is wrong: start the studio again", 401)
+        answer = RedirectResponse("/", status_code=303)
+        answer.set_cookie(
+            self.keys.cookie_name, self.keys.session, httponly=True, samesite="strict", path="/"
+        )
+        return answer
+
+    async def index(self, _: Request) -> Response:
+        """The page."""
+        return FileResponse(self.web / "index.html", headers={"cache-control": "no-cache"})
+
+    async def drawing(self, request: Request) -> Response:
+        """A sheet as a file to keep."""
+        asked, kind = request.query_params, request.path_params["kind"]
+        theme = asked.get("theme")
+        if theme not in THEMES:
+            return PlainTextResponse("a theme is light or dark", 422)
+        hub, document = await self.hub.here(), request.path_params["document"]
+        try:
+            data = await hub.drawing(document, kind, sheet=asked.get("sheet", ""), theme=theme)
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type=DRAWING_TYPES[kind])
+
+    async def example(self, request: Request) -> Response:
+        """The drawing of a shipped example, for the gallery."""
+        hub = await self.hub.here()
+        try:
+            data = await hub.example_drawing(request.path_params["name"])
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type=DRAWING_TYPES["svg"])
+
+    async def report(self, request: Request) -> Response:
+        """The report of the last run of a document."""
+        hub = await self.hub.here()
+        try:
+            data = await hub.report(request.path_params["document"])
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type="text/html")
+
+    async def talk(self, socket: WebSocket) -> None:
+        """The websocket of a page, for as long as it is there."""
+        await socket.accept()
+        hub, page = await self.hub.here(), Page(socket.send_text, socket.send_bytes)
+        await hub.welcome(page)
+        try:
+            while True:
+                await hub.answer(page, await socket.receive_text())
+        except (NoRequestError, KeyError):
+            await socket.close(1008, "this is no request of the studio")
+        except WebSocketDisconnect:
+            pass
+        finally:
+            hub.leave(page)
+
+
 def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
     """The whole application, guarded. ``hosts``: the ``Host`` values that mean this server."""
 
@@ -110,73 +184,15 @@ def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> 
         if hub.made.done() and hub.made.exception() is None:
             hub.made.result().close()
 
-    async def health(_: Request) -> Response:
-        return PlainTextResponse("armblocks studio")
-
-    async def login(request: Request) -> Response:
-        if not keys.spend_login(request.query_params.get("key", "")):
-            return PlainTextResponse("this login link was used or is wrong: start the studio again", 401)
-        answer = RedirectResponse("/", status_code=303)
-        answer.set_cookie(keys.cookie_name, keys.session, httponly=True, samesite="strict", path="/")
-        return answer
-
-    async def drawing(request: Request) -> Response:
-        """A sheet as a file to keep; drawn aside, so that nobody else waits for it."""
-        asked, kind = request.query_params, request.path_params["kind"]
-        theme = asked.get("theme")
-        if theme not in THEMES:
-            return PlainTextResponse("a theme is light or dark", 422)
-        try:
-            data = await (await hub.here()).drawing(
-                request.path_params["document"],
-                kind,
-                sheet=asked.get("sheet", ""),
-                theme=theme,
-            )
-        except ArmblocksError as error:
-            return PlainTextResponse(str(error), 404)
-        return Response(data, media_type=DRAWING_TYPES[kind])
-
-    async def example(request: Request) -> Response:
-        """The drawing of a shipped example, for the gallery."""
-        try:
-            data = await (await hub.here()).example_drawing(request.path_params["name"])
-        except ArmblocksError as error:
-            return PlainTextResponse(str(error), 404)
-        return Response(data, media_type=DRAWING_TYPES["svg"])
-
-    async def report(request: Request) -> Response:
-        try:
-            data = await (await hub.here()).report(request.path_params["document"])
-        except ArmblocksError as error:
-            return PlainTextResponse(str(error), 404)
-        return Response(data, media_type="text/html")
-
-    async def talk(socket: WebSocket) -> None:
-        await socket.accept()
-        rooms, page = await hub.here(), Page(socket.send_text, socket.send_bytes)
-        await rooms.welcome(page)
-        try:
-            while True:
-                await rooms.answer(page, await socket.receive_text())
-        except (NoRequestError, KeyError):
-            await socket.close(1008, "this is no request of the studio")
-        except WebSocketDisconnect:
-            pass
-        finally:
-            rooms.leave(page)
-
-    async def index(_: Request) -> Response:
-        return FileResponse(web / "index.html", headers={"cache-control": "no-cache"})
-
+    answers = Answers(hub, keys, web)
     routes: list[Any] = [
-        Route("/health", health),
-        Route("/login", login),
-        Route("/drawing/{document}.{kind}", drawing),
-        Route("/example/{name}.svg", example),
-        Route("/report/{document}", report),
-        WebSocketRoute("/ws", talk),
-        Route("/", index),
+        Route("/health", answers.health),
+        Route("/login", answers.login),
+        Route("/drawing/{document}.{kind}", answers.drawing),
+        Route("/example/{name}.svg", answers.example),
+        Route("/report/{document}", answers.report),
+        WebSocketRoute("/ws", answers.talk),
+        Route("/", answers.index),
         Mount("/assets", Assets(directory=web / "assets", check_dir=False)),
         Mount("/", StaticFiles(directory=web)),
     ]
