@@ -415,6 +415,8 @@ class Hub:
         self.robots.robots.end()
         for run in self.runs.values():
             run.end()
+        for record in self.records.values():
+            record.close()
         self.workers.end()
 
 

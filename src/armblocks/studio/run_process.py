@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import asyncio
 import json
+import signal
 from collections.abc import Awaitable, Callable
 from multiprocessing.connection import Connection
+from queue import SimpleQueue
 from threading import Thread
+from time import monotonic
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -21,8 +24,14 @@ from armblocks.studio.workers import Worker
 
 TellRun = Callable[[say.Message | bytes], Awaitable[None]]
 _EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(say.RunEvent)
-STOP_SECONDS = 1.0
+STOP_SECONDS = 0.8
 """A worker that has not stopped by itself after this long is ended."""
+SILENT_SECONDS = 600.0
+"""A worker that says nothing for so long, and is not paused, hangs: it is ended."""
+MOST_SECONDS = 24 * 3600.0
+"""No run lasts longer than this, however long it is paused."""
+JOIN_SECONDS = 5.0
+"""A process whose pipe is closed is gone after this long."""
 ENDED = ("done", "stopped", "failed")
 
 
@@ -39,27 +48,35 @@ class RunProcess:
         self._tell = tell
         self._loop = asyncio.get_running_loop()
         self._queue: asyncio.Queue[bytes | None] = asyncio.Queue()
+        self._commands: SimpleQueue[bytes | None] = SimpleQueue()
+        self._until = monotonic() + MOST_SECONDS
         self._forced = False
         """Whether it was told to stop and did not."""
+        self._broken: str = ""
+        """Why it was ended, where it was not told to stop."""
         self._passing: asyncio.Task[None] | None = None
 
     def start(self, job: dict[str, Any]) -> None:
         """Hand the worker its job, see :func:`armblocks.studio.run_worker.work`."""
         self.job = {**job, "run": self.key, "document": self.document}
-        self._worker.pipe.send_bytes(json.dumps(self.job).encode())
-        Thread(target=self._read, args=(self._worker.pipe,), daemon=True).start()
+        self._commands.put(json.dumps(self.job).encode())
+        for going in (self._read, self._write):
+            Thread(target=going, args=(self._worker.pipe,), daemon=True).start()
         self._passing = self._loop.create_task(self._pass_on())
 
     def obey(self, request: say.Control | say.SetSpeed | say.Rewind | say.Tune) -> None:
         """Pass a command on to the worker; raises ``InputError`` where the run has ended."""
         if self.state in ENDED:
             raise InputError("the run has ended", where="run", fix="start the model again")
-        self._worker.pipe.send_bytes(request.model_dump_json().encode())
+        self._commands.put(request.model_dump_json().encode())
         if isinstance(request, say.Control) and request.action == "stop":
             self._loop.call_later(STOP_SECONDS, self._force)
 
     def end(self) -> None:
-        """End the run and its process."""
+        """End the run and its process; nobody is told any more."""
+        if self._passing is not None:
+            self._passing.cancel()
+        self._commands.put(None)
         self._worker.end()
 
     def _force(self) -> None:
@@ -78,9 +95,31 @@ class RunProcess:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._queue.put_nowait, None)
 
+    def _write(self, pipe: Connection) -> None:
+        """In a thread of its own: what the worker is told. One that does not listen keeps nobody waiting."""
+        try:
+            while (command := self._commands.get()) is not None:
+                pipe.send_bytes(command)
+        except OSError:  # it is gone: the thread that reads says so
+            pass
+
+    async def _heard(self) -> bytes | None:
+        """What the worker says next; it is ended where it says nothing, or goes on, for too long."""
+        rest = max(self._until - monotonic(), 0.0)
+        patience = min(SILENT_SECONDS, rest) if self.state == "running" else rest
+        try:
+            async with asyncio.timeout(patience):
+                return await self._queue.get()
+        except TimeoutError:
+            if not self._broken:
+                long = f"has gone on for {MOST_SECONDS:g} s" if patience == rest else "hangs"
+                self._broken = f"the run {long}: it was ended"
+            self._worker.process.kill()
+            return await self._queue.get()
+
     async def _pass_on(self) -> None:
         last: say.RunProgress | None = None
-        while (message := await self._queue.get()) is not None:
+        while (message := await self._heard()) is not None:
             if message[:1] == b"S":
                 await self._tell(message[1:])
                 continue
@@ -88,14 +127,16 @@ class RunProcess:
             if isinstance(event, say.RunProgress):
                 self.state, last = event.state, event
             await self._tell(event)
+        self._commands.put(None)
         if self.state not in ENDED:
+            await asyncio.to_thread(self._worker.process.join, JOIN_SECONDS)
             self.state = "stopped" if self._forced else "failed"
             await self._tell(self._lost(last))
 
     def _lost(self, last: say.RunProgress | None) -> say.RunProgress:
         """What is said of a worker that ended without a word."""
         fault = say.Fault(
-            what="the process of the run ended without a result",
+            what=self._broken or _cause(self._worker.process.exitcode),
             where="run",
             allowed="a run within the limits of memory and time",
             fix="run the model again; if it happens again, record fewer samples or shorten the run",
@@ -108,3 +149,18 @@ class RunProcess:
             message="stopped" if self._forced else "",
             fault=None if self._forced else fault,
         )
+
+
+def _cause(exitcode: int | None) -> str:
+    """Why a process ended that said nothing about it."""
+    if exitcode is None or exitcode >= 0:
+        return "the process of the run ended without a result"
+    names = {one.value: one.name for one in signal.Signals}
+    name = names.get(-exitcode, f"signal {-exitcode}")
+    match name:
+        case "SIGKILL":
+            return "the system ended the process of the run (SIGKILL): its memory may have been used up"
+        case "SIGXCPU":
+            return "the run has used all the processor time that it may have (SIGXCPU)"
+        case _:
+            return f"the process of the run crashed ({name})"

@@ -70,7 +70,8 @@ def limit_process() -> None:
     import resource
 
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS))
+    # The signal of the lower limit says which one it was; that of the upper one would be taken for no memory.
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS + 5))
 
 
 def begun(job: Mapping[str, Any]) -> RunHistory:
@@ -119,9 +120,11 @@ class _Run:
             self._fail(error)
         except MemoryError:
             fix = "record fewer samples, or shorten the run"
-            self._fail(
-                SimulationError("the run needs more memory than it may have", fix=fix, where=self.document)
-            )
+            self._fail(SimulationError("the run needs more memory than it may have", fix=fix, where="run"))
+        except OSError:
+            raise  # the server is gone
+        except Exception as error:  # a defect: it is told, and the model is not harmed
+            self._fail(_defect(error))
 
     def _go(self) -> None:
         history = begun(self.job)
@@ -306,6 +309,15 @@ class _Run:
         self.state = "failed"
         self._progress(error.what, _fault(error))
         sleep(0.05)
+
+
+def _defect(error: Exception) -> SimulationError:
+    return SimulationError(
+        f"armblocks has a defect ({type(error).__name__}: {str(error)[:200]})",
+        where="run",
+        allowed="a model that runs, or words about why it does not",
+        fix="report it with the model; your drawing is not harmed",
+    )
 
 
 def _fault(error: ArmblocksError) -> say.Fault:

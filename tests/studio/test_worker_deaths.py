@@ -1,0 +1,244 @@
+"""Whatever happens to the process of a run, it is told, the editor lives on, and the next run works."""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import json
+import os
+import signal
+import sys
+from collections.abc import Awaitable, Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import pytest
+
+from armblocks.studio import run_process, run_worker, workers
+from armblocks.studio.hub import Hub, Page
+from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.run_history import RunHistory
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
+PATIENCE_SECONDS = 60.0
+"""Nothing here waits so long on a machine that works; it is there so that a hang fails and does not hang."""
+
+
+class Talk:
+    """A page that runs models, and hears what becomes of them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.hub = Hub(ProjectFolder(folder))
+        self.told: list[dict[str, Any]] = []
+        self.news = asyncio.Event()
+        self.page = Page(self._hear, self._hear_frame)
+        self._number = 0
+
+    async def _hear(self, text: str) -> None:
+        self.told.append(json.loads(text))
+        self.news.set()
+
+    async def _hear_frame(self, data: bytes) -> None:
+        del data
+
+    async def ask(self, kind: str, **values: Any) -> Any:
+        self._number += 1
+        await self.hub.answer(
+            self.page, json.dumps({"number": self._number, "request": {"kind": kind, **values}})
+        )
+        reply = next(e for e in reversed(self.told) if e["kind"] == "reply")
+        assert reply["fault"] is None, reply["fault"]
+        return reply["value"]
+
+    async def until(self, run: str, *states: str) -> dict[str, Any]:
+        """The first word about a run that says it is in one of these states."""
+        async with asyncio.timeout(PATIENCE_SECONDS):
+            while True:
+                self.news.clear()
+                for event in self.told:
+                    if event["kind"] == "run_progress" and event["run"] == run and event["state"] in states:
+                        return event
+                await self.news.wait()
+
+    def pid(self, run: str) -> int:
+        pid = self.hub.runs[run]._worker.process.pid  # pyright: ignore[reportPrivateUsage]
+        assert pid is not None
+        return pid
+
+
+def talk(folder: Path, talking: Callable[[Talk], Awaitable[None]]) -> None:
+    async def going() -> None:
+        talk = Talk(folder)
+        await talk.hub.welcome(talk.page)
+        try:
+            await talking(talk)
+        finally:
+            talk.hub.close()
+
+    asyncio.run(going())
+
+
+def in_worker(monkeypatch: pytest.MonkeyPatch, begin: Callable[[Connection], None]) -> None:
+    """Let the next workers begin so; what they do then is what they always do."""
+    monkeypatch.setattr(workers, "_work", begin)
+
+
+# What follows runs in workers.
+
+
+def crash(pipe: Connection) -> None:
+    def fault(_: RunHistory) -> None:
+        ctypes.string_at(0)
+
+    RunHistory.mark = fault
+    run_worker.work(pipe)
+
+
+def hang_in_python(pipe: Connection) -> None:
+    def forever(_: RunHistory) -> None:
+        while True:
+            pass
+
+    RunHistory.mark = forever
+    run_worker.work(pipe)
+
+
+def hang_in_native_code(pipe: Connection) -> None:
+    def forever(_: RunHistory) -> None:
+        ctypes.PyDLL(None).pause()  # and Python's lock is held meanwhile
+
+    RunHistory.mark = forever
+    run_worker.work(pipe)
+
+
+def use_up_memory(pipe: Connection) -> None:
+    def more(_: RunHistory) -> None:
+        kept: list[bytes] = []
+        while True:
+            kept.append(bytes(64 * 2**20))
+
+    run_worker.MOST_MEMORY = 4 * 2**30
+    RunHistory.mark = more
+    run_worker.work(pipe)
+
+
+def use_up_the_processor(pipe: Connection) -> None:
+    run_worker.MOST_CPU_SECONDS = 1
+    hang_in_python(pipe)
+
+
+def fail_unforeseen(pipe: Connection) -> None:
+    def defect(_: RunHistory) -> None:
+        raise KeyError("something")
+
+    RunHistory.mark = defect
+    run_worker.work(pipe)
+
+
+DEATHS: list[tuple[Callable[[Connection], None], str]] = [
+    (crash, "the process of the run crashed (SIGSEGV)"),
+    (use_up_memory, "the run needs more memory than it may have"),
+    (use_up_the_processor, "the run has used all the processor time that it may have (SIGXCPU)"),
+    (fail_unforeseen, "armblocks has a defect (KeyError: 'something')"),
+]
+
+
+@pytest.mark.parametrize(("death", "words"), DEATHS)
+def test_a_worker_that_breaks_is_told_and_the_next_run_works(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, death: Callable[[Connection], None], words: str
+) -> None:
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        with monkeypatch.context() as patch:
+            in_worker(patch, death)
+            talk.hub.workers.prepare()
+            run = await talk.ask("run", document=document)
+            told = await talk.until(run, "failed", "done")
+            assert told["state"] == "failed"
+            assert told["fault"]["what"] == words
+            assert told["fault"]["where"] == "run"
+            assert told["fault"]["fix"]
+            talk.hub.workers.end()  # the next one was made as the first
+        assert await talk.ask("ping") is None
+        await talk.ask("arrange", document=document, key="1")
+        again = await talk.ask("run", document=document)
+        assert (await talk.until(again, "done", "failed"))["state"] == "done"
+
+    talk(tmp_path, talking)
+
+
+@pytest.mark.parametrize("hang", [hang_in_python, hang_in_native_code])
+def test_stop_answers_whatever_the_worker_is_busy_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, hang: Callable[[Connection], None]
+) -> None:
+    in_worker(monkeypatch, hang)
+
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        run = await talk.ask("run", document=document)
+        pid = talk.pid(run)
+        for _ in range(3000):  # more than a pipe holds: nobody waits for one that does not listen
+            await talk.ask("speed", run=run, speed=1.0)
+        await talk.ask("control", run=run, action="stop")
+        told = await talk.until(run, "stopped", "failed", "done")
+        assert (told["state"], told["fault"]) == ("stopped", None)
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+    assert run_process.STOP_SECONDS < 1.0  # what is left of the second is for the system to end it
+    talk(tmp_path, talking)
+
+
+def test_a_worker_that_hangs_is_ended_when_nobody_stops_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_worker(monkeypatch, hang_in_python)
+    monkeypatch.setattr(run_process, "SILENT_SECONDS", 1.0)
+
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        run = await talk.ask("run", document=document)
+        assert (await talk.until(run, "failed"))["fault"]["what"] == "the run hangs: it was ended"
+
+    talk(tmp_path, talking)
+
+
+def test_no_run_lasts_for_ever_also_while_it_is_paused(tmp_path: Path) -> None:
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        run = await talk.ask("run", document=document, speed=0.1)
+        await talk.until(run, "running")
+        await talk.ask("control", run=run, action="pause")
+        await talk.until(run, "paused")
+        talk.hub.runs[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
+        await talk.ask("control", run=run, action="back")
+        told = await talk.until(run, "failed")
+        assert (
+            told["fault"]["what"] == f"the run has gone on for {run_process.MOST_SECONDS:g} s: it was ended"
+        )
+
+    talk(tmp_path, talking)
+
+
+def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) -> None:
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        run = await talk.ask("run", document=document, speed=1.0)
+        await talk.until(run, "running")
+        os.kill(talk.pid(run), signal.SIGKILL)
+        told = await talk.until(run, "failed")
+        assert "(SIGKILL): its memory may have been used up" in told["fault"]["what"]
+        late: list[str | bytes] = []
+
+        async def hear(said: str | bytes) -> None:
+            late.append(said)
+
+        other = Page(hear, hear)
+        await talk.hub.welcome(other)
+        attach = {"number": 1, "request": {"kind": "attach", "document": document}}
+        await talk.hub.answer(other, json.dumps(attach))
+        assert any(isinstance(said, bytes) for said in late), "the samples are shown to who comes later"
+
+    talk(tmp_path, talking)
