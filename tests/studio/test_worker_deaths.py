@@ -17,7 +17,8 @@ from typing import Any
 import pytest
 
 from armblocks.studio import run_process, run_worker, workers
-from armblocks.studio.hub import Hub, Page
+from armblocks.studio.hub import Hub
+from armblocks.studio.page import Page
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.run_history import RunHistory
 

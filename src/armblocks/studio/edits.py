@@ -44,6 +44,11 @@ MOST_BLOCKS = 20_000
 """Blocks that one sheet may hold in the editor."""
 
 
+Px = Annotated[float, Field(ge=-1e7, le=1e7)]
+"""A place on the sheet; further out nothing could be drawn exactly."""
+Size = Annotated[float, Field(gt=0, le=1e5)]
+
+
 class Message(BaseModel):
     """A value that travels between page and server: unknown members are refused."""
 
@@ -53,10 +58,10 @@ class Message(BaseModel):
 class Place(Message):
     """Where a block stands: top left corner and, if not its own, its size in px."""
 
-    x: float
-    y: float
-    width: float | None = None
-    height: float | None = None
+    x: Px
+    y: Px
+    width: Size | None = None
+    height: Size | None = None
     flipped: bool = False
     rotation: Literal[0, 90, 180, 270] = 0
     """Degrees clockwise."""
@@ -65,8 +70,8 @@ class Place(Message):
 class SheetNote(Message):
     """Words on the sheet: their top left corner in px."""
 
-    x: float
-    y: float
+    x: Px
+    y: Px
     text: Annotated[str, Field(max_length=10_000)]
 
 
@@ -87,7 +92,7 @@ class Wire(Message):
 
     source: str
     target: str
-    bends: tuple[float, ...] = ()
+    bends: tuple[Px, ...] = ()
 
 
 class AddBlocks(Message):

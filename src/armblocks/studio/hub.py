@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
+import re
 import secrets
 import warnings
 from collections.abc import Sequence
@@ -43,6 +45,20 @@ from armblocks.studio.workers import Workers
 
 PAGE_SECONDS = 1.5
 """A page that has its document draws for so long: the process for its first run is made after that."""
+LOG = logging.getLogger(__name__)
+NO_REQUEST = say.Fault(
+    what="this is no request of the studio",
+    where="page",
+    allowed="what the page of this version asks",
+    fix="load the page again: it may be of another version",
+)
+DEFECT = say.Fault(
+    what="armblocks has a defect",
+    where="studio",
+    allowed="what was asked, or words about why it cannot be",
+    fix="report it with what you did; what you have drawn is not harmed",
+)
+_NUMBERED = re.compile(r'\s*\{\s*"number"\s*:\s*(\d{1,15})\s*,')
 
 
 class Hub:
@@ -95,17 +111,28 @@ class Hub:
         self.robots.leave(page)
 
     async def answer(self, page: Page, text: str) -> None:
-        """Carry out one request and reply to it, whatever becomes of it; raises ``NoRequestError``."""
+        """Carry out one request and reply to it, whatever becomes of it.
+
+        A page that gets no reply asks again: so also what is no request is answered, and what meets a defect.
+        Raises ``NoRequestError`` for what has not even a number.
+        """
         try:
             envelope = say.Envelope.model_validate_json(text)
         except ValidationError as error:
-            raise NoRequestError(str(error)) from None
+            numbered = _NUMBERED.match(text)
+            if numbered is None:
+                raise NoRequestError(str(error)) from None
+            await page.tell(say.Reply(number=int(numbered[1]), fault=NO_REQUEST))
+            return
+        number, fault, value = envelope.number, None, None
         try:
-            reply = say.Reply(number=envelope.number, value=await self.carry_out(page, envelope.request))
+            value = await self.carry_out(page, envelope.request)
         except ArmblocksError as error:
             fault = say.Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)
-            reply = say.Reply(number=envelope.number, fault=fault)
-        await page.tell(reply)
+        except Exception as error:
+            LOG.exception("a request met a defect")
+            fault = DEFECT.model_copy(update={"what": f"{DEFECT.what} ({type(error).__name__})"})
+        await page.tell(say.Reply(number=number, value=value, fault=fault))
 
     async def carry_out(self, page: Page, request: say.Request) -> Any:
         """Do what a page asks; the value goes into the reply. Raises ``ArmblocksError``."""

@@ -153,7 +153,7 @@ def _locked(descriptor: int) -> bool:
 
 
 def _line(record: Record) -> bytes:
-    text = json.dumps(record, allow_nan=False, separators=(",", ":"), ensure_ascii=False).encode()
+    text = json.dumps(record, separators=(",", ":"), ensure_ascii=False).encode()
     return b"%d %08x %s\n" % (len(text), zlib.crc32(text), text)
 
 

@@ -1,0 +1,242 @@
+"""Whatever comes over the websocket is answered, with a value or in words: every kind of message is tried."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import copy
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+
+from armblocks.formats import load_robot, write_robot
+from armblocks.studio import messages as say
+from armblocks.studio.hub import Hub
+from armblocks.studio.page import Page
+from armblocks.studio.project_folder import ProjectFolder
+
+NESTED = "…nested…"
+"""Stands in a request for a list in a list in a list …"""
+HOSTILE: tuple[Any, ...] = (
+    None,
+    True,
+    -1,
+    0,
+    2**70,
+    1e308,
+    -1e308,
+    5e-324,
+    float("nan"),
+    float("inf"),
+    "",
+    " ",
+    "x" * 100_000,
+    "../../secret.json",
+    "..\\..\\secret.json",
+    "/etc/passwd",
+    "//host/share/a.json",
+    "C:\\a.json",
+    "a\0.json",
+    "%2e%2e%2fsecret.json",
+    "link.json",
+    "\ud800",
+    "__import__('os').system('true')",
+    "9**9**9**9",
+    "(" * 5000,
+    "[" * 5000,
+    [],
+    [[]],
+    ["x"] * 3000,
+    [1e308] * 3000,
+    {},
+    {"": {"": None}},
+    {"a/b": 1, "__class__": "x"},
+    {"gain": NESTED},
+    NESTED,
+)
+
+
+def requests(document: str, robot: str) -> list[dict[str, Any]]:
+    """One request at least of every kind, each of which the studio can carry out or refuse."""
+    place = {"x": 0.0, "y": 0.0, "width": None, "height": None, "flipped": False, "rotation": 0}
+    block = {"name": "new", "type": "Gain", "parameters": {"gain": "2*pi"}, "place": place}
+    wire = {"source": "PID/y", "target": "new/u", "bends": [1.0]}
+    note = {"x": 1.0, "y": 1.0, "text": "note"}
+    edits: list[dict[str, Any]] = [
+        {"kind": "add", "blocks": [block], "wires": [wire]},
+        {"kind": "notes", "notes": {"/1": note}},
+        {"kind": "parameters", "block": "PID", "values": {"P": "1"}},
+        {"kind": "move", "places": {"PID": place}, "notes": {}},
+        {"kind": "rename", "block": "PID", "name": "PID"},
+        {"kind": "settings", "values": {"stop_time": 1.0}},
+    ]
+    common = {"document": document, "base": None, "author": "me"}
+    of_robot = {"robot": robot, "base": None, "author": "me"}
+    q = {"q": [0.0] * 6, "qd": [0.0] * 6, "qdd": [0.0] * 6}
+    content = base64.b64encode(write_robot(load_robot("kr180"))).decode()
+    cell = {"kind": "cell", "link": "link1", "column": "a", "text": "1", "angles": "deg"}
+    return [
+        {"kind": "open", "path": "", "example": "van_der_pol_pid"},
+        {"kind": "open", "path": "arm.json", "example": ""},
+        {"kind": "new"},
+        {"kind": "attach", "document": document, "inside": [], "path": None, "example": ""},
+        {"kind": "look", "document": document, "inside": []},
+        *({"kind": "change", **common, "inside": [], "edit": edit} for edit in edits),
+        {"kind": "undo", **common},
+        {"kind": "redo", **common},
+        {"kind": "arrange", **common, "inside": []},
+        {"kind": "save", "document": document, "path": "saved.json", "overwrite": True},
+        {"kind": "reload", **common},
+        {"kind": "keep_mine", "document": document},
+        {"kind": "ping"},
+        {"kind": "files"},
+        {"kind": "outline", "document": document},
+        {"kind": "find", "document": document, "text": "PID"},
+        {"kind": "close", "document": "0123456789abcdef", "discard": False},
+        {"kind": "recover", "document": "0123456789abcdef", "action": "open"},
+        {"kind": "run", "document": "0123456789abcdef", "speed": 1.0, "tuned": {"PID.P": 1.0}},
+        {"kind": "control", "run": "0123456789abcdef", "action": "stop"},
+        {"kind": "rewind", "run": "0123456789abcdef", "time": 0.0},
+        {"kind": "speed", "run": "0123456789abcdef", "speed": None},
+        {"kind": "tune", "run": "0123456789abcdef", "parameter": "PID.P", "value": 1.0},
+        {
+            "kind": "typed",
+            "document": document,
+            "inside": [],
+            "block": "PID",
+            "type": "PID",
+            "parameter": "P",
+            "text": "1",
+        },
+        {"kind": "typed_settings", "document": document, "values": {"stop_time": 1.0}},
+        {"kind": "scene", "document": document, "inside": [], "block": "PID"},
+        {"kind": "pose", "document": document, "inside": [], "block": "PID", "q": [0.0]},
+        {"kind": "robot_open", "path": "", "shipped": "puma560"},
+        {"kind": "robot_of_block", "document": document, "inside": [], "block": "PID"},
+        {"kind": "robot_attach", "robot": robot, "path": None, "shipped": ""},
+        {"kind": "robot_change", **of_robot, "gesture": "", "edit": cell},
+        {"kind": "robot_undo", **of_robot},
+        {"kind": "robot_redo", **of_robot},
+        {"kind": "robot_reload", **of_robot},
+        {"kind": "robot_keep_mine", "robot": robot},
+        {"kind": "robot_save", "robot": robot, "path": "arm.json", "overwrite": True},
+        {"kind": "robot_form"},
+        {"kind": "robot_bodies", "robot": robot},
+        {"kind": "robot_pose", "robot": robot, "q": [0.0] * 6},
+        {"kind": "robot_read", "robot": robot, **q},
+        {
+            "kind": "robot_picture",
+            "robot": robot,
+            "document": "",
+            "inside": [],
+            "block": "",
+            "q": [0.0],  # a wrong count: a picture takes long
+            "theme": "light",
+        },
+        {"kind": "drop", "name": "arm.json", "content": content},
+    ]
+
+
+def kinds(union: Any) -> set[str]:
+    """The kinds of all requests that the server knows."""
+    found: set[str] = set()
+    for member in get_args(union):
+        if hasattr(member, "model_fields"):
+            found.add(member.model_fields["kind"].default)
+        else:
+            found |= kinds(member)
+    return found
+
+
+def spoilt(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The request with each value in it, at any depth, in turn replaced by something hostile or left out."""
+
+    def places(value: Any, path: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+        if path:
+            yield path
+        members: Any = ()
+        if isinstance(value, dict):
+            members = value.items()  # pyright: ignore[reportUnknownVariableType, reportUnknownMemberType]
+        elif isinstance(value, list):
+            members = list(enumerate(value))[:1]  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        for name, inner in members:
+            yield from places(inner, (*path, name))
+
+    for path in places(request, ()):
+        if path == ("kind",):
+            continue
+        for hostile in HOSTILE:
+            made = copy.deepcopy(request)
+            holder: Any = made
+            for name in path[:-1]:
+                holder = holder[name]
+            holder[path[-1]] = hostile
+            yield made
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    project = tmp_path / "project"
+    project.mkdir()
+    (tmp_path / "secret.json").write_text("SECRET")
+    (project / "link.json").symlink_to(tmp_path / "secret.json")
+    (project / "arm.json").write_bytes(write_robot(load_robot("puma560")))
+    return project
+
+
+def test_every_kind_of_message_answers_hostile_values_in_words(folder: Path) -> None:
+    told: list[dict[str, Any]] = []
+    defects: list[str] = []
+
+    async def hear(text: str) -> None:
+        event = json.loads(text)
+        if event["kind"] == "reply":
+            told.append(event)
+        assert "SECRET" not in text
+
+    async def hear_bytes(data: bytes) -> None:
+        raise AssertionError("no run was asked for")
+
+    async def going() -> None:
+        hub = Hub(ProjectFolder(folder))
+        page = Page(hear, hear_bytes)
+        await hub.welcome(page)
+        number = 0
+
+        async def send(request: dict[str, Any]) -> dict[str, Any]:
+            nonlocal number
+            number += 1
+            text = json.dumps({"number": number, "request": request})
+            text = text.replace(json.dumps(NESTED), "[" * 2000 + "]" * 2000)
+            await hub.answer(page, text)
+            assert told[-1]["number"] == number
+            return told[-1]
+
+        robot = (await send({"kind": "robot_open", "path": "arm.json"}))["value"]["robots"][0]["robot"]
+        assert {request["kind"] for request in requests("", "")} == kinds(say.Request)
+        for place in range(len(requests("", ""))):
+            document = (await send({"kind": "open", "example": "van_der_pol_pid"}))["value"]
+            request = requests(document, robot)[place]
+            await send({"kind": "save", "document": document, "path": f"{place}.json"})
+            fault = (await send(request))["fault"]
+            nothing_to = ("scene", "pose", "robot_of_block", "undo", "redo")
+            if document in request.values() and request["kind"] not in nothing_to:
+                assert fault is None, fault
+            for bad in spoilt(request):
+                fault = (await send(bad))["fault"]
+                if fault is not None:
+                    assert fault["what"], bad
+                    assert fault["fix"], bad
+                    if "defect" in fault["what"]:
+                        defects.append(f"{fault['what']}: {str(bad)[:300]}")
+            await send({"kind": "close", "document": document, "discard": True})
+        assert (await send({"kind": "ping"}))["fault"] is None
+        hub.close()
+
+    asyncio.run(going())
+    assert defects == []
+    assert sorted(path.name for path in folder.parent.iterdir()) == ["project", "secret.json"]
+    assert (folder.parent / "secret.json").read_text() == "SECRET"
