@@ -13,6 +13,8 @@ export interface Command {
   keys?: string
   /** Whether the key is heard only while the sheet has the focus. */
   onSheet?: boolean
+  /** Whether fields have this key for themselves while they are typed into. */
+  fieldsOwn?: boolean
   /** Whether it can be done now; always where it is not said. */
   possible?: () => boolean
   run: () => void
@@ -34,8 +36,8 @@ const LIST: Command[] = [
   { title: 'Add a block', run: () => show('insert') },
   { title: 'Draw a wire by the names of its ends', keys: '>', run: () => show('connect') },
   { title: 'Write a note', keys: '"', run: addNote },
-  { title: 'Undo', keys: 'Ctrl+Z', run: () => alter('undo') },
-  { title: 'Redo', keys: 'Ctrl+Y', run: () => alter('redo') },
+  { title: 'Undo', keys: 'Ctrl+Z', fieldsOwn: true, run: () => alter('undo') },
+  { title: 'Redo', keys: 'Ctrl+Y, Ctrl+Shift+Z', fieldsOwn: true, run: () => alter('redo') },
   { title: 'Save', keys: 'Ctrl+S', run: () => void save() },
   { title: 'Save under another name', keys: 'Ctrl+Shift+S', run: () => show('save_as') },
   { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
@@ -78,13 +80,21 @@ const LIST: Command[] = [
   { title: 'Export the sheet as PDF', run: () => exportDrawing('pdf') },
   { title: 'Configuration parameters', keys: 'Ctrl+E', run: openConfiguration },
   { title: 'Take the tour', run: openTour },
+  { title: 'All commands by name', keys: 'Ctrl+K', run: () => show('commands') },
   { title: 'All keys', keys: '?', run: () => show('keys') },
 ]
 
-/** Whether these keys are the ones pressed. */
-export function pressed(keys: string, event: KeyboardEvent): boolean {
-  const parts = keys.split('+')
-  const key = parts.at(-1)!.toLowerCase()
-  const [ctrl, shift] = [parts.includes('Ctrl'), parts.includes('Shift')]
-  return ctrl && (event.ctrlKey || event.metaKey) && event.shiftKey === shift && event.key.toLowerCase() === key
+/** Whether these keys, all of them with Ctrl, are the ones pressed. */
+function pressed(keys: string, event: KeyboardEvent): boolean {
+  return keys.split(', ').some((way) => {
+    const parts = way.split('+')
+    const key = parts.at(-1)!.toLowerCase()
+    return parts.includes('Ctrl') && (event.ctrlKey || event.metaKey) && event.shiftKey === parts.includes('Shift') && event.key.toLowerCase() === key
+  })
+}
+
+/** The command that these keys call, among those of the sheet or among all others. */
+export function commandOf(event: KeyboardEvent, ofSheet: boolean): Command | undefined {
+  const typing = event.target instanceof Element && event.target.closest('input, textarea') !== null
+  return LIST.find(({ keys, onSheet = false, fieldsOwn = false }) => keys && onSheet === ofSheet && !(fieldsOwn && typing) && pressed(keys, event))
 }

@@ -1,32 +1,39 @@
 import { Kbd, Modal, Table } from '@mantine/core'
+import { Fragment } from 'react'
 import { commands } from './commands'
 import { show, useDialogs } from './dialogs'
+import { KEYS } from './key_list'
 
-/** What is no command: how one moves about. */
-const HABITS: [keys: string, what: string][] = [
-  ['letters', 'Add a block: type its name on the sheet'],
-  ['Enter', 'Open the block: its parameters, or the sheet inside; edit the note'],
-  ['Tab', 'Go from block to block'],
-  ['arrows', 'Move what is selected, with Shift by single pixels'],
-  ['Del', 'Delete blocks, wires and notes'],
-  ['Ctrl+K', 'All commands by name'],
-]
-
+/** Every key of the page, by the place where it is heard. */
 export function Shortcuts() {
   const opened = useDialogs((s) => s.open === 'keys')
+  const called = commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))
   return (
-    <Modal opened={opened} onClose={() => show(null)} title="Keys" size="md">
-      <Table>
-        <Table.Tbody>
-          {[...HABITS, ...commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))].map(([keys, what]) => (
-            <Table.Tr key={keys}>
-              <Table.Td>
-                <Kbd>{keys}</Kbd>
-              </Table.Td>
-              <Table.Td>{what}</Table.Td>
-            </Table.Tr>
-          ))}
-        </Table.Tbody>
+    <Modal opened={opened} onClose={() => show(null)} title="Keys" size="lg">
+      <Table className="keys" aria-label="Keys">
+        {[{ place: 'Commands', keys: called }, ...KEYS].map(({ place, keys }) => (
+          <Fragment key={place}>
+            <Table.Thead>
+              <Table.Tr>
+                <Table.Th colSpan={2} scope="rowgroup">
+                  {place}
+                </Table.Th>
+              </Table.Tr>
+            </Table.Thead>
+            <Table.Tbody>
+              {keys.map(([ways, what]) => (
+                <Table.Tr key={ways}>
+                  <Table.Td className="ways">
+                    {ways.split(', ').map((way) => (
+                      <Kbd key={way}>{way}</Kbd>
+                    ))}
+                  </Table.Td>
+                  <Table.Td>{what}</Table.Td>
+                </Table.Tr>
+              ))}
+            </Table.Tbody>
+          </Fragment>
+        ))}
       </Table>
     </Modal>
   )

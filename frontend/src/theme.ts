@@ -12,7 +12,8 @@ export const theme = createTheme({
   primaryShade: { light: 7, dark: 3 },
   autoContrast: true,
   defaultRadius: 'sm',
+  // The page never scrolls; to forbid it anyway would style the whole of it anew for each dialog.
   // The colours of titles and labels on their own tint are too pale to read.
-  components: { Alert: { styles: { title: { color: 'var(--ink)' } } } },
+  components: { Modal: { defaultProps: { lockScroll: false } }, Alert: { styles: { title: { color: 'var(--ink)' } } } },
   fontSizes: { xs: '11px', sm: '12px', md: '13px', lg: '15px', xl: '18px' },
 })

@@ -11,7 +11,7 @@ from typer.testing import Result
 import armblocks as ab
 from armblocks.blocks import Constant
 from armblocks.cli.diff import value_text
-from armblocks.diagram import Diagram, with_parameters
+from armblocks.diagram import Diagram, Note, PortRef, with_parameters
 
 Invoke = Callable[..., Result]
 
@@ -51,6 +51,19 @@ def test_json_holds_the_same(invoke: Invoke, tmp_path: Path, changed: Diagram) -
     assert said["parameters"] == [{"path": "jtraj", "name": "tmax", "before": 10.0, "after": 5.0}]
     assert said["settings"] == [{"path": "", "name": "stop_time", "before": 10.0, "after": 5.0}]
     assert said["added"] == said["removed"] == said["wires_added"] == []
+
+
+def test_logged_outputs_and_notes_are_told(invoke: Invoke, tmp_path: Path) -> None:
+    old = ab.load_diagram("van_der_pol_pid")
+    notes = {"/n1": Note(x=0.0, y=0.0, text="held by a PID")}
+    new = dataclasses.replace(old, logged=(PortRef("PID", "y"),), notes=notes)
+    ab.save_diagram(new, tmp_path / "new.json")
+    said = invoke("diff", "van_der_pol_pid", "new.json").stdout
+    assert "Logged\n  + PID/y\n" in said
+    assert 'Notes\n  ~ /n1: none -> "held by a PID"\n' in said
+    found = json.loads(invoke("diff", "van_der_pol_pid", "new.json", "--json").stdout)
+    assert found["logged_added"] == [{"path": "", "port": "PID/y"}]
+    assert found["notes"] == [{"path": "", "name": "/n1", "before": None, "after": "held by a PID"}]
 
 
 def test_unlike_diagrams_fit_into_80_columns(invoke: Invoke) -> None:

@@ -26,6 +26,7 @@ from armblocks.diagram import (
     Diagram,
     DiagramBuilder,
     DiagramDifference,
+    Note,
     Placement,
     PortRef,
     diagram_difference,
@@ -71,6 +72,9 @@ def swapped(found: DiagramDifference) -> DiagramDifference:
         parameters=turned(found.parameters),  # pyright: ignore[reportArgumentType]
         wires_added=found.wires_removed,
         wires_removed=found.wires_added,
+        logged_added=found.logged_removed,
+        logged_removed=found.logged_added,
+        notes=turned(found.notes),  # pyright: ignore[reportArgumentType]
         settings=turned(found.settings),  # pyright: ignore[reportArgumentType]
         descriptions=turned(found.descriptions),  # pyright: ignore[reportArgumentType]
     )
@@ -217,6 +221,32 @@ def test_settings_and_description_are_reported() -> None:
     assert [(c.before, c.after) for c in found.descriptions] == [("", "a loop")]
 
 
+def test_outputs_that_are_logged_are_reported_under_their_later_names() -> None:
+    before = dataclasses.replace(loop(), logged=(PortRef("plant", "y"), PortRef("wanted", "y")))
+    after = dataclasses.replace(
+        loop({"plant": "tank"}), logged=(PortRef("tank", "y"), PortRef("controller", "u"))
+    )
+    found = diagram_difference(before, after)
+    only(found, "renamed", "logged_added", "logged_removed")
+    assert [(entry.path, str(entry.port)) for entry in found.logged_added] == [("", "controller/u")]
+    assert [(entry.path, str(entry.port)) for entry in found.logged_removed] == [("", "wanted/y")]
+
+
+def test_words_on_the_sheet_are_reported_and_their_place_is_not() -> None:
+    def noted(**notes: tuple[float, str]) -> Diagram:
+        found = {f"/{name}": Note(x=x, y=0.0, text=text) for name, (x, text) in notes.items()}
+        return dataclasses.replace(loop(), notes=found)
+
+    before = noted(a=(0.0, "stays"), b=(0.0, "old"), c=(0.0, "gone"))
+    found = diagram_difference(before, noted(a=(9.0, "stays"), b=(0.0, "new"), d=(0.0, "more")))
+    only(found, "notes")
+    assert [(c.name, c.before, c.after) for c in found.notes] == [
+        ("/b", "old", "new"),
+        ("/c", "gone", None),
+        ("/d", None, "more"),
+    ]
+
+
 @pytest.mark.parametrize(
     "after",
     [
@@ -224,15 +254,25 @@ def test_settings_and_description_are_reported() -> None:
         loop(law=Gain(gain=8.0)),
         loop({"wanted": "target"}, wanted=Step(time=9.0)),
         chains("a", "b"),
+        dataclasses.replace(loop(), logged=(PortRef("plant", "y"),), notes={"/a": Note(x=0, y=0, text="a")}),
         ab.load_diagram("van_der_pol_pid"),
     ],
-    ids=["renamed", "retuned", "replaced", "unlike", "example"],
+    ids=["renamed", "retuned", "replaced", "unlike", "logged", "example"],
 )
 def test_the_way_back_is_the_way_there_reversed(after: Diagram) -> None:
     before = loop()
     there, back = diagram_difference(before, after), diagram_difference(after, before)
     assert swapped(there).added == back.added
-    for kind in ("removed", "types", "settings", "descriptions", "wires_added", "wires_removed"):
+    for kind in (
+        "removed",
+        "types",
+        "settings",
+        "descriptions",
+        "wires_added",
+        "wires_removed",
+        "logged_added",
+        "notes",
+    ):
         assert getattr(swapped(there), kind) == getattr(back, kind)
     assert set(swapped(there).parameters) == set(back.parameters)
     assert there.count == back.count

@@ -1,6 +1,6 @@
 import type { ReactFlowInstance } from '@xyflow/react'
 import { useEffect, type RefObject } from 'react'
-import { commands, pressed } from '../commands'
+import { commandOf } from '../commands'
 import { show, useDialogs } from '../dialogs'
 import { change, look, useStudio } from '../store'
 import { chosenBlocks } from './arranging'
@@ -78,7 +78,7 @@ export function useSheetKeys(
     if (focused instanceof HTMLInputElement || focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')) return
     const ours = focused === window.document.body || sheet.current?.contains(focused)
     if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return
-    const command = commands().find(({ onSheet, keys }) => onSheet && keys && pressed(keys, event))
+    const command = commandOf(event, true)
     if (command) command.run()
     else if (event.ctrlKey || event.metaKey || event.altKey || !plain(event)) return
     event.preventDefault()

@@ -13,6 +13,7 @@ import {
   IconSettings,
 } from '@tabler/icons-react'
 import { useEffect } from 'react'
+import { commandOf } from '../commands'
 import { openConfiguration, save, show } from '../dialogs'
 import { FileMenu } from '../documents/file_menu'
 import { DocumentTitle } from '../documents/title'
@@ -54,23 +55,14 @@ export function TopBar() {
 
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
-      if (!(event.ctrlKey || event.metaKey)) return
-      const pressed = event.key.toLowerCase()
-      if (pressed === 'enter') startOrResume()
-      else if (pressed === 'e') openConfiguration()
-      else if (pressed === 'o') show('open')
-      else if (pressed === 'k' && !event.shiftKey) show('commands')
-      else if (pressed === 'f' && !event.shiftKey) show('find')
-      else if (pressed === 's' && event.shiftKey) show('save_as')
-      else if (pressed === 's') void save()
-      else if (pressed === 'z' && !event.shiftKey && !(event.target instanceof HTMLInputElement)) alter('undo')
-      else if ((pressed === 'y' || (pressed === 'z' && event.shiftKey)) && !(event.target instanceof HTMLInputElement)) alter('redo')
-      else return
+      const command = commandOf(event, false)
+      if (!command) return
       event.preventDefault()
+      if (command.possible?.() ?? true) command.run()
     }
     addEventListener('keydown', onKey)
     return () => removeEventListener('keydown', onKey)
-  })
+  }, [])
 
   return (
     <header className="top-bar">

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from armblocks.diagram import Block, Diagram
-    from armblocks.diagram.difference import DiagramDifference, PlacedWire, ValueChange
+    from armblocks.diagram.difference import DiagramDifference, PlacedPort, PlacedWire, ValueChange
 
 DIFFERENT = 1
 _LONGEST = 160
@@ -59,17 +59,21 @@ def print_difference(found: DiagramDifference, before: str, after: str, console:
     removed = [f"{entry.path}: {_block_text(entry.block)}" for entry in found.removed]
     renamed = [f"{entry.before} -> {entry.after} ({entry.block.type_name()})" for entry in found.renamed]
     types = [f"{entry.path}: {entry.before} -> {entry.after}" for entry in found.types]
-    settings = [_change_text(entry, "." if entry.path else "") for entry in found.settings]
-    about = [_change_text(entry, "." if entry.path else "") for entry in found.descriptions]
-    parameters = [_change_text(entry, "." if entry.path else "") for entry in found.parameters]
-    masks = [_change_text(entry, "." if entry.path else "") for entry in found.masks]
+    settings, about, parameters, masks = (
+        [_change_text(entry, "." if entry.path else "") for entry in entries]
+        for entries in (found.settings, found.descriptions, found.parameters, found.masks)
+    )
+    notes = [_change_text(entry, "") for entry in found.notes]
     _print_group("Blocks", (("-", removed), ("+", added), ("~", [*renamed, *types])), console)
     _print_group("Parameters", (("~", parameters),), console)
     _print_group("Masks", (("~", masks),), console)
     wires = (("-", _wires(found.wires_removed)), ("+", _wires(found.wires_added)))
     _print_group("Wires", wires, console)
+    logged = (("-", _ports(found.logged_removed)), ("+", _ports(found.logged_added)))
+    _print_group("Logged", logged, console)
     _print_group("Settings", (("~", settings),), console)
     _print_group("Description", (("~", about),), console)
+    _print_group("Notes", (("~", notes),), console)
 
 
 def _print_group(title: str, entries: Sequence[tuple[str, Sequence[str]]], console: Console) -> None:
@@ -89,6 +93,10 @@ def _print_group(title: str, entries: Sequence[tuple[str, Sequence[str]]], conso
 
 def _wires(wires: Sequence[PlacedWire]) -> list[str]:
     return [f"{f'in {entry.path}: ' if entry.path else ''}{entry.wire}" for entry in wires]
+
+
+def _ports(ports: Sequence[PlacedPort]) -> list[str]:
+    return [f"{f'in {entry.path}: ' if entry.path else ''}{entry.port}" for entry in ports]
 
 
 def _block_text(block: Block) -> str:
@@ -204,8 +212,11 @@ def difference_document(found: DiagramDifference) -> dict[str, object]:
         "masks": [_change(entry) for entry in found.masks],
         "wires_added": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_added],
         "wires_removed": [{"path": entry.path, "wire": str(entry.wire)} for entry in found.wires_removed],
+        "logged_added": [{"path": entry.path, "port": str(entry.port)} for entry in found.logged_added],
+        "logged_removed": [{"path": entry.path, "port": str(entry.port)} for entry in found.logged_removed],
         "settings": [_change(entry) for entry in found.settings],
         "descriptions": [_change(entry) for entry in found.descriptions],
+        "notes": [_change(entry) for entry in found.notes],
     }
 
 

@@ -37,8 +37,8 @@ class Renaming:
 class ValueChange:
     """Another value under a name.
 
-    ``path`` is that of the block, for settings and descriptions that of the subsystem (``""`` outside), by
-    the later diagram's names. ``None`` stands where one side has no such value.
+    ``path`` is that of the block, for settings, descriptions and notes that of the subsystem (``""``
+    outside), by the later diagram's names. ``None`` stands where one side has no such value.
     """
 
     path: str
@@ -59,12 +59,21 @@ class PlacedWire:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlacedPort:
+    """An output that only one of two diagrams logs, named as a :class:`PlacedWire` names its ends."""
+
+    path: str
+    port: PortRef
+
+
+@dataclass(frozen=True, kw_only=True)
 class DiagramDifference:
     """All that is different between two diagrams and inside their subsystems; false where there is nothing.
 
     ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
     where one type has no such parameter. A value that follows by a formula is the formula. ``masks`` are
-    parameters that the diagram at ``path`` declares otherwise.
+    parameters that the diagram at ``path`` declares otherwise. ``logged_*`` are outputs that are recorded
+    without a Scope; ``notes`` the words on a sheet, wherever they stand.
     """
 
     added: tuple[PlacedBlock, ...] = ()
@@ -75,8 +84,11 @@ class DiagramDifference:
     masks: tuple[ValueChange, ...] = ()
     wires_added: tuple[PlacedWire, ...] = ()
     wires_removed: tuple[PlacedWire, ...] = ()
+    logged_added: tuple[PlacedPort, ...] = ()
+    logged_removed: tuple[PlacedPort, ...] = ()
     settings: tuple[ValueChange, ...] = ()
     descriptions: tuple[ValueChange, ...] = ()
+    notes: tuple[ValueChange, ...] = ()
 
     @property
     def count(self) -> int:
@@ -90,10 +102,11 @@ class DiagramDifference:
 def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
     """What one has to change in ``before`` to get ``after``.
 
-    Compared are blocks with their types and parameters, wires, settings and descriptions, inside subsystems
-    too. Not compared are the layout, the diagram's own name (a file without one is called after the file) and
-    unknown keys of a file. A block that is gone and a new one are the same one renamed where type, parameters
-    and all wires agree, also when blocks at the other ends are renamed with it.
+    Compared are blocks with their types and parameters, wires, logged outputs, settings, descriptions and
+    what notes say, inside subsystems too. Not compared are the layout, the diagram's own name (a file without
+    one is called after the file) and unknown keys of a file. A block that is gone and a new one are the same
+    one renamed where type, parameters and all wires agree, also when blocks at the other ends are renamed
+    with it.
     """
     found = _Findings()
     _compare_levels(before, after, "", found)
@@ -114,8 +127,11 @@ class _Findings:
     masks: list[ValueChange] = field(default_factory=list[ValueChange])
     wires_added: list[PlacedWire] = field(default_factory=list[PlacedWire])
     wires_removed: list[PlacedWire] = field(default_factory=list[PlacedWire])
+    logged_added: list[PlacedPort] = field(default_factory=list[PlacedPort])
+    logged_removed: list[PlacedPort] = field(default_factory=list[PlacedPort])
     settings: list[ValueChange] = field(default_factory=list[ValueChange])
     descriptions: list[ValueChange] = field(default_factory=list[ValueChange])
+    notes: list[ValueChange] = field(default_factory=list[ValueChange])
 
 
 def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings) -> None:
@@ -134,10 +150,22 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings
     for name, block in after.blocks.items():
         if name not in before.blocks and name not in names.values():
             found.added.append(PlacedBlock(path=at(name), block=block))
-    wires_before = {_renamed_wire(wire, names) for wire in before.connections}
+    wires_before = {
+        Connection(_renamed(wire.source, names), _renamed(wire.target, names)) for wire in before.connections
+    }
     wires_after = set(after.connections)
     found.wires_added += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_after - wires_before))
     found.wires_removed += (PlacedWire(path=path, wire=wire) for wire in sorted(wires_before - wires_after))
+    logged_before, logged_after = {_renamed(port, names) for port in before.logged}, set(after.logged)
+    found.logged_added += (PlacedPort(path=path, port=port) for port in sorted(logged_after - logged_before))
+    found.logged_removed += (
+        PlacedPort(path=path, port=port) for port in sorted(logged_before - logged_after)
+    )
+    _compare_sheets(before, after, path, found)
+
+
+def _compare_sheets(before: Diagram, after: Diagram, path: str, found: _Findings) -> None:
+    """What two levels say of themselves as a whole."""
     for name in _SETTINGS:
         old_value, new_value = getattr(before.settings, name), getattr(after.settings, name)
         if old_value != new_value:
@@ -151,6 +179,13 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings
         found.descriptions.append(
             ValueChange(path=path, name="description", before=before.description, after=after.description)
         )
+    old_notes, new_notes = (
+        {name: note.text for name, note in diagram.notes.items()} for diagram in (before, after)
+    )
+    for name in sorted({**old_notes, **new_notes}):
+        old_text, new_text = old_notes.get(name), new_notes.get(name)
+        if old_text != new_text:
+            found.notes.append(ValueChange(path=path, name=name, before=old_text, after=new_text))
 
 
 def _compare_blocks(before: Block, after: Block, path: str, found: _Findings) -> None:
@@ -267,11 +302,9 @@ def _value_content(block: Block, rule: Parameter) -> object:
         return value
     inside = cast("Diagram", value)
     blocks = frozenset((name, _content(inner)) for name, inner in inside.blocks.items())
-    return (blocks, inside.connections, inside.settings, inside.description, inside.mask, inside.link)
+    whole = (inside.settings, inside.description, inside.mask, inside.link, inside.logged)
+    return (blocks, inside.connections, *whole)
 
 
-def _renamed_wire(wire: Connection, names: Mapping[str, str]) -> Connection:
-    def end(port: PortRef) -> PortRef:
-        return PortRef(names.get(port.block, port.block), port.port)
-
-    return Connection(end(wire.source), end(wire.target))
+def _renamed(port: PortRef, names: Mapping[str, str]) -> PortRef:
+    return PortRef(names.get(port.block, port.block), port.port)

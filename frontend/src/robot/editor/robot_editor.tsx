@@ -3,6 +3,7 @@ import { ActionIcon, Alert, Button, Menu, SegmentedControl, Text, Tooltip, useCo
 import { IconAlertTriangle, IconArrowBackUp, IconArrowForwardUp, IconArrowLeft, IconChevronDown, IconDeviceFloppy, IconPlus } from '@tabler/icons-react'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
+import { show } from '../../dialogs'
 import { FileNotice } from '../../documents/disk_notice'
 import { ask, useStudio } from '../../store'
 import { alter, edit, leaveEditor, reload, showRobot, useDesk, type Angles, type RobotShown } from './desk'
@@ -79,6 +80,7 @@ export default function RobotEditor() {
     const onKey = (event: KeyboardEvent) => {
       event.stopPropagation()
       const pressed = event.key.toLowerCase()
+      if (event.key === '?' && !(event.target instanceof HTMLInputElement)) show('keys')
       if (!(event.ctrlKey || event.metaKey)) return
       if (pressed === 's') saveRobot()
       else if (pressed === 'z' && !event.shiftKey) undo(key)

@@ -1,0 +1,76 @@
+"""The list of keys names every key that the page listens to, at the place where it is heard."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[2] / "frontend" / "src"
+COMMANDS = ("commands.ts", "command_palette.tsx")
+"""Here a key is what the list itself says: its text is compared with what is pressed."""
+WRITTEN = {"escape": "esc", "delete": "del", " ": "space"}
+LISTENING = re.compile(r"event\.key\b|moved\.key\b|onKeyDown|keydown")
+HEARD = re.compile(
+    r"""\b(?:event\.key|pressed|key)\s(?:===|!==)\s'([^']+)'   # event.key === 'Enter'
+    | [{,]\s*(Arrow\w+|Enter|Escape|Home|End|Delete|Tab):      # { ArrowUp: -1, Enter: 1 }[event.key]
+    """,
+    re.VERBOSE,
+)
+
+
+def listed() -> list[tuple[list[str], list[str]]]:
+    """For each place of the list: its source files and its keys."""
+    text = (SOURCE / "key_list.ts").read_text(encoding="utf-8")
+    places = re.findall(r"sources: \[(.*?)\],\s*keys: \[(.*?)\n    \],", text, re.DOTALL)
+    assert len(places) == text.count("    place: '")
+    ways = re.compile(r"^ *\['(.+?)', '", re.MULTILINE)
+    return [
+        (re.findall(r"'(.+?)'", sources), [way for found in ways.findall(keys) for way in found.split(", ")])
+        for sources, keys in places
+    ]
+
+
+def listeners() -> dict[str, set[str]]:
+    """The keys that each source file compares with what is pressed."""
+    found: dict[str, set[str]] = {}
+    for path in sorted(SOURCE.rglob("*.ts*")):
+        text = path.read_text(encoding="utf-8")
+        keys = {one or other for one, other in HEARD.findall(text)} if LISTENING.search(text) else set[str]()
+        if keys:
+            found[path.relative_to(SOURCE).as_posix()] = keys
+    return found
+
+
+def names(key: str, ways: list[str]) -> bool:
+    """Whether one of the ways is this key: alone, or with Ctrl or Shift."""
+    if key.startswith("Arrow"):
+        arrow = {"Up": "↑", "Down": "↓", "Left": "←", "Right": "→"}[key.removeprefix("Arrow")]
+        return "arrows" in ways or arrow in ways
+    written = WRITTEN.get(key.lower(), key.lower())
+    return any(way.lower() == written or way.lower().endswith(f"+{written}") for way in ways)
+
+
+def test_the_sources_are_read() -> None:
+    heard = listeners()
+    assert {"Enter", "Delete", "?", " ", "Escape"} <= heard["canvas/sheet_keys.ts"]
+    assert {"ArrowUp", "ArrowDown", "Enter"} <= heard["robot/editor/table.tsx"]
+    assert {"s", "z", "y", "?"} <= heard["robot/editor/robot_editor.tsx"]
+    assert names("z", ["Ctrl+Z"])
+    assert not names("z", ["Ctrl+Y"])
+
+
+@pytest.mark.parametrize("source", listeners())
+def test_every_key_is_in_the_list_of_keys(source: str) -> None:
+    assert source not in COMMANDS, "a command's key is stated once, in its entry of commands.ts"
+    places = [keys for sources, keys in listed() if source in sources]
+    assert places, f"key_list.ts names no place for the keys of {source}"
+    missing = {key for key in listeners()[source] if not any(names(key, keys) for keys in places)}
+    assert not missing, f"key_list.ts does not list {missing} of {source}"
+
+
+def test_the_list_names_sources_that_are_there() -> None:
+    heard = listeners()
+    for sources, _ in listed():
+        assert set(sources) <= set(heard)
