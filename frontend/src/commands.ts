@@ -20,10 +20,10 @@ export interface Command {
   run: () => void
 }
 
+const selected = () => useStudio.getState().selection.size > 0
 const chosen = () => chosenBlocks().length > 0
 const several = () => chosenBlocks().length > 1
 const ran = () => useStudio.getState().run !== null
-const wires = () => useStudio.getState().document?.wires ?? []
 
 /** Every command, in the order of the palette. */
 export function commands(): Command[] {
@@ -45,9 +45,9 @@ const LIST: Command[] = [
   { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
   { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
   { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
-  { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: chosen, run: () => duplicate(chosenBlocks(), wires()) },
-  { title: 'Copy', keys: 'Ctrl+C', onSheet: true, possible: chosen, run: () => void copy(chosenBlocks(), wires()) },
-  { title: 'Cut', keys: 'Ctrl+X', onSheet: true, possible: chosen, run: () => void cut(chosenBlocks(), wires()) },
+  { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: selected, run: () => void duplicate() },
+  { title: 'Copy', keys: 'Ctrl+C', onSheet: true, possible: selected, run: () => void copy() },
+  { title: 'Cut', keys: 'Ctrl+X', onSheet: true, possible: selected, run: () => void cut() },
   { title: 'Paste', keys: 'Ctrl+V', onSheet: true, run: () => void paste() },
   {
     title: 'Select all',

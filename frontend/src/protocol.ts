@@ -24,6 +24,7 @@ export interface Envelope {
     | Ping
     | Files
     | AskOutline
+    | Copy
     | Find
     | Close
     | Recover
@@ -99,6 +100,7 @@ export interface Change {
   inside?: string[];
   edit:
     | AddBlocks
+    | PasteBlocks
     | RemoveBlocks
     | Connect
     | MoveBlocks
@@ -157,6 +159,20 @@ export interface Wire {
   bends?: number[];
 }
 /**
+ * Put what was copied on the sheet: ``text`` is a diagram as a file holds it.
+ *
+ * ``names``: what its blocks and notes are to be called here, where that is not as there. ``shift``: px that
+ * they stand further right and down than there.
+ */
+export interface PasteBlocks {
+  kind: "paste";
+  text: string;
+  names?: {
+    [k: string]: string;
+  };
+  shift?: number;
+}
+/**
  * Take blocks, wires and notes off the sheet; the wires of the blocks go with them.
  */
 export interface RemoveBlocks {
@@ -176,7 +192,8 @@ export interface Connect {
 /**
  * Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
  *
- * Ways that are drawn between blocks that move alike move with them.
+ * Ways that are drawn between blocks that move alike move with them. ``wires`` are new, and those of
+ * ``instead`` give way: a block is put into a wire, or taken out of its wires.
  */
 export interface MoveBlocks {
   kind: "move";
@@ -186,6 +203,8 @@ export interface MoveBlocks {
   notes?: {
     [k: string]: SheetNote;
   };
+  wires?: Wire[];
+  instead?: Wire[];
 }
 /**
  * Words on the sheet: their top left corner in px.
@@ -355,6 +374,16 @@ export interface Files {
 export interface AskOutline {
   kind: "outline";
   document: string;
+}
+/**
+ * Ask for blocks and notes of a sheet as text, which :class:`PasteBlocks` puts on a sheet again.
+ */
+export interface Copy {
+  kind: "copy";
+  document: string;
+  inside?: string[];
+  blocks: string[];
+  notes?: string[];
 }
 /**
  * Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`.

@@ -32,7 +32,7 @@ from armblocks.blocks import (
     TransferFunction,
     Trigonometry,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, PortRef
+from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, PortRef, formula
 from armblocks.face.block_examples import example_block
 from armblocks.report.block_faces import face_size
 from armblocks.report.diagram_drawing import (
@@ -232,6 +232,25 @@ def test_a_mask_shows_its_name() -> None:
     for kind in (Subsystem, EnabledSubsystem):
         shown = {mark.text for mark in text_marks(block_picture(kind(diagram=masked)))}
         assert {"Servo", "u", "y"} <= shown
+
+
+@pytest.mark.parametrize(
+    "name", ["JointServo", "ServoWithGearAndBrake", "a servo with its gear", "two_words_more"]
+)
+def test_a_mask_s_name_is_not_cut(name: str) -> None:
+    inner = DiagramBuilder(name)
+    stiffness = inner.parameter("K", 3.0, doc="stiffness")
+    inner.add("y", Outport(), inner.add("spring", Gain(gain=stiffness), inner.add("u", Inport())))
+    shown = [mark.text for mark in text_marks(block_picture(Subsystem(diagram=inner.build())))]
+    assert name.replace("_", " ") in " ".join(shown)
+
+
+def test_faces_show_formulas_that_are_short() -> None:
+    for text, shown in (("1/K", "1/K"), ("K*K*K*K*K*K*K*K*K*K", "5.9e4")):
+        block = Gain(gain=formula(text)).in_scope({"K": 3.0}, "spring")
+        assert shown in {mark.text for mark in text_marks(block_picture(block))}
+    constant = Constant(value=formula("[K 2]")).in_scope({"K": 3.0}, "spring")
+    assert "[K 2]" in {mark.text for mark in text_marks(block_picture(constant))}
 
 
 def test_a_run_shows_on_the_sinks_faces() -> None:

@@ -140,12 +140,15 @@ def page(browser: Browser, studio: Studio) -> Iterator[Page]:
 
 
 @pytest.fixture(scope="module")
-def open_studio(browser: Browser) -> Iterator[Callable[[Path], Page]]:
-    """Start a studio that all tests of a file share, and show its page."""
+def open_studio(browser: Browser) -> Iterator[Callable[..., Page]]:
+    """Start a studio that all tests of a file share, and show its page; ``model`` opens first.
+
+    Where the model has no arm, the page does not draw one, which takes a browser without graphics long.
+    """
     with ExitStack() as stack:
 
-        def opened(folder: Path) -> Page:
-            started = Studio(folder)
+        def opened(folder: Path, model: str = "kr180model") -> Page:
+            started = Studio(folder, model)
             stack.callback(started.stop)
             return stack.enter_context(watched(browser, started.link))
 

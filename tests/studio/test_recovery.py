@@ -14,7 +14,7 @@ from crashed_disk import Disk, going
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
 from armblocks.studio import messages as say
-from armblocks.studio.edits import AddBlocks, Edit, MoveBlocks, NewBlock, Place, SetParameters
+from armblocks.studio.edit_messages import AddBlocks, Edit, MoveBlocks, NewBlock, Place, SetParameters
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 
 

@@ -10,11 +10,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from armblocks.blocks import BLOCKS, Gain
-from armblocks.diagram import Diagram, DiagramBlock, diagram_views, formula, mask_parameter
+from armblocks.diagram import Diagram, DiagramBlock, Placement, diagram_views, formula, mask_parameter
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
+from armblocks.studio.clipping import clipped
 from armblocks.studio.document import Document
-from armblocks.studio.edits import (
+from armblocks.studio.edit_messages import (
     AddBlocks,
     BendWires,
     Connect,
@@ -25,6 +26,7 @@ from armblocks.studio.edits import (
     LogSignal,
     MoveBlocks,
     NewBlock,
+    PasteBlocks,
     Place,
     RemoveBlocks,
     Rename,
@@ -33,9 +35,9 @@ from armblocks.studio.edits import (
     SetSettings,
     SheetNote,
     Wire,
-    applied,
     summary,
 )
+from armblocks.studio.edits import applied
 from armblocks.studio.nesting import inside
 from armblocks.studio.outline import find, outline
 from armblocks.studio.placing import placed
@@ -44,6 +46,13 @@ from armblocks.studio.sheet import sheet
 NAMES = ["sine", "gain", "scope", "Gain 2", "ä"]
 TYPES = ["SineWave", "Gain", "Scope", "Sum", "JTraj", "Integrator"]
 PORTS = ["sine/y", "gain/y", "gain/u", "scope/u1", "Gain 2/u", "Gain 2/y", "nobody/y", "x"]
+
+COPIED = clipped(
+    Diagram(name="there", blocks={"gain": Gain(gain=2.0)}, layout={"gain": Placement(x=1.0, y=2.0)}),
+    ["gain"],
+    [],
+    load_robot,
+)
 
 names, ports = st.sampled_from(NAMES), st.sampled_from(PORTS)
 numbers = st.floats(-1e4, 1e4, allow_nan=False)
@@ -65,6 +74,10 @@ edits: st.SearchStrategy[Edit] = st.one_of(
     st.builds(RemoveBlocks, blocks=st.lists(names, max_size=2), wires=st.lists(wires, max_size=1)),
     st.builds(Connect, wire=wires, replace=st.booleans()),
     st.builds(MoveBlocks, places=st.dictionaries(names, places, max_size=2), notes=notes),
+    st.builds(MoveBlocks, wires=st.lists(wires, max_size=2), instead=st.lists(wires, max_size=2)),
+    st.builds(
+        PasteBlocks, text=st.just(COPIED), names=st.dictionaries(names, names, max_size=2), shift=numbers
+    ),
     st.builds(BendWires, wires=st.lists(wires, min_size=1, max_size=2)),
     st.builds(SetNotes, notes=notes),
     st.builds(RemoveBlocks, notes=st.lists(note_names, min_size=1, max_size=2)),

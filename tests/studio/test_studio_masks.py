@@ -14,7 +14,7 @@ from armblocks.diagram import DiagramBlock
 from armblocks.errors import ArmblocksError, DiagramError, FormatError, InputError
 from armblocks.formats import load_diagram, load_robot
 from armblocks.studio.document import Document
-from armblocks.studio.edits import BreakLink, SetParameters
+from armblocks.studio.edit_messages import BreakLink, SetParameters
 from armblocks.studio.placing import placed
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.sheet import sheet

@@ -14,7 +14,7 @@ from armblocks.formats import load_robot
 from armblocks.studio import messages as say
 from armblocks.studio.aspects import changed_aspects, clash
 from armblocks.studio.document import Document
-from armblocks.studio.edits import (
+from armblocks.studio.edit_messages import (
     AddBlocks,
     Connect,
     Edit,

@@ -19,8 +19,9 @@ import { WireValues } from '../run/wire_values'
 import { ask, change, look, useStudio } from '../store'
 import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
-import { GRID, insertBlock } from './insert'
+import { BLOCK_TYPE, GRID, insertBlock } from './insert'
 import { NoteNode } from './note_node'
+import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from './rewiring'
 import { SheetGraph, type SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { SheetRoutes, wireKey, type Places } from './sheet_layout'
@@ -30,8 +31,9 @@ import { useBending, WireEdge, type WireEdgeType } from './wire_edge'
 const nodeTypes = { block: BlockNode, note: NoteNode }
 const edgeTypes = { wire: WireEdge }
 const SETTLE_MS = 120
-/** px from a wire at which a block that is dropped goes into it. */
-const INTO_WIRE = 12
+
+/** What the mouse holds: blocks that it takes out of their wires, and one without wires, which goes into a wire that it is dropped on. */
+const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
 
 export function Canvas() {
   const document = useStudio((s) => s.document)
@@ -100,15 +102,23 @@ function Sheet() {
   const flow = useReactFlow<SheetNode, WireEdgeType>()
   const [drag, setDrag] = useState<Places>({})
   const [chosenWires, setChosenWires] = useState<ReadonlySet<string>>(new Set())
+  const [{ freed, loose }, setHeld] = useState(NOTHING_HELD)
+  /** What is held, also before the next drawing knows of it. */
+  const held = useRef(NOTHING_HELD)
+  /** The wire that a dragged block would go into. */
+  const [into, setInto] = useState<string | null>(null)
   const [{ graph, routes }] = useState(() => ({ graph: new SheetGraph(), routes: new SheetRoutes() }))
 
   // A place that the server has taken over needs no memory of the drag any more.
   useEffect(() => setDrag((now) => (Object.keys(now).length ? {} : now)), [blocks, notes])
 
-  const shown = useMemo(() => (bending ? wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire)) : wires), [wires, bending])
-  const routed = useMemo(() => routes.update(blocks, shown, drag), [routes, blocks, shown, drag])
+  const shown = useMemo(() => {
+    if (bending) return wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire))
+    return freed.length ? takenOut(present(blocks, freed), wires) : wires
+  }, [wires, bending, freed, blocks])
+  const routed = useMemo(() => routes.update(blocks, shown, drag, loose), [routes, blocks, shown, drag, loose])
   const nodes = useMemo(() => graph.nodes(blocks, notes, findings, level, drag, selection), [graph, blocks, notes, findings, level, drag, selection])
-  const edges = useMemo(() => graph.edges(shown, routed, kinds, level, chosenWires), [graph, shown, routed, kinds, level, chosenWires])
+  const edges = useMemo(() => graph.edges(shown, routed, kinds, level, chosenWires, into), [graph, shown, routed, kinds, level, chosenWires, into])
 
   const onNodesChange = useCallback(
     (changes: NodeChange<SheetNode>[]) => {
@@ -135,16 +145,47 @@ function Sheet() {
 
   const drop = useCallback(
     (event: React.DragEvent) => {
-      const type = event.dataTransfer.getData('application/x-armblocks-block')
+      const type = event.dataTransfer.getData(BLOCK_TYPE)
       if (!type) return
       event.preventDefault()
       const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
-      const into = wireAt(at, edges)
-      if (into) insertBlock(type, { x: at.x, y: into.y }, into.wire)
+      const found = wireAt(at, edges)
+      setInto(null)
+      if (found) insertBlock(type, { x: at.x, y: found.y }, found.wire)
       else insertBlock(type, at)
     },
     [flow, edges],
   )
+
+  const takeHold = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
+    const taken = present(blocks, nodes.map(({ id }) => id))
+    const freed = event.shiftKey || event.altKey ? taken.map(({ name }) => name) : []
+    const [one] = taken
+    const alone = taken.length === 1 && one && isLoose(one, freed.length ? takenOut(taken, wires) : wires)
+    if (freed.length || alone) setHeld((held.current = { freed, loose: alone ? one.name : null }))
+  }
+  const carry = (_: unknown, node: SheetNode) => {
+    const block = node.id === held.current.loose ? blocks[node.id] : undefined
+    if (block) setInto(keyOf(wireAt(middleOf(block, node.position), edges)?.wire))
+  }
+  const letGo = (_: unknown, node: SheetNode, moved: SheetNode[]) => {
+    const to = Object.fromEntries(moved.map(({ id, position }) => [id, position]))
+    const { freed, loose } = held.current
+    held.current = NOTHING_HELD
+    const left = freed.length ? takenOut(present(blocks, freed), wires) : wires
+    const block = loose === null ? undefined : blocks[loose]
+    const found = block && wireAt(middleOf(block, node.position), edges)
+    if (found) to[block.name] = levelled(block, node.position, found.y)
+    const after = found ? putInto(block, found.wire, left) : left
+    // The wires stay as they are drawn until the server has them so.
+    void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() => setHeld((now) => (now === held.current ? now : NOTHING_HELD)))
+    setInto(null)
+  }
+  const hover = (event: React.DragEvent) => {
+    event.preventDefault()
+    if (!event.dataTransfer.types.includes(BLOCK_TYPE)) return
+    setInto(keyOf(wireAt(flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }), edges)?.wire))
+  }
 
   const sheet = useRef<HTMLDivElement>(null)
   const sought = useStudio((s) => s.sought)
@@ -181,7 +222,7 @@ function Sheet() {
 
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   return (
-    <div className="canvas" ref={sheet} onFocus={selectFocused} onDragOver={(event) => event.preventDefault()} onDrop={drop}>
+    <div className="canvas" ref={sheet} onFocus={selectFocused} onDragOver={hover} onDragLeave={() => setInto(null)} onDrop={drop}>
       <svg className="defs" width="0" height="0" aria-hidden>
         <marker id="wire-head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" markerUnits="userSpaceOnUse" orient="auto">
           <path d="M0 0.300L8 4L0 7.700Z" className="f-wire" />
@@ -194,7 +235,9 @@ function Sheet() {
         edgeTypes={edgeTypes}
         colorMode={scheme}
         onNodesChange={onNodesChange}
-        onNodeDragStop={(_, __, moved) => move(Object.fromEntries(moved.map(({ id, position }) => [id, position])))}
+        onNodeDragStart={takeHold}
+        onNodeDrag={carry}
+        onNodeDragStop={letGo}
         onNodeDoubleClick={(_, node) => node.type === 'block' && openBlock(node.data.block)}
         onEdgesChange={(changes) => {
           const chosen = new Set(chosenWires)
@@ -217,6 +260,7 @@ function Sheet() {
         snapToGrid
         snapGrid={[GRID, GRID]}
         selectionOnDrag
+        selectionKeyCode={null}
         panOnDrag={[1, 2]}
         panOnScroll
         zoomOnPinch
@@ -251,29 +295,22 @@ export function openBlock(block: SheetBlock): void {
   else edit(block.name)
 }
 
-/** Put blocks and notes where they are now, as one step. */
-export function move(to: Places): void {
+const keyOf = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
+
+const present = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] => names.map((name) => blocks[name]).filter((block) => block !== undefined)
+
+const middleOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({ x: at.x + width / 2, y: at.y + height / 2 })
+
+/** Put blocks and notes where they are now, as one step; some wires may give way to others by it. */
+export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[] }): Promise<void> {
   const { document } = useStudio.getState()
   const places: Record<string, Place> = {}
   const notes: Record<string, SheetNote> = {}
   for (const [id, { x, y }] of Object.entries(to)) {
     const place = document?.blocks[id]?.place
     const note = document?.notes[id]
-    if (place && (place.x !== x || place.y !== y)) places[id] = { ...place, x, y }
+    if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, x, y }
     if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
   }
-  if (Object.keys(places).length || Object.keys(notes).length) void change({ kind: 'move', places, notes })
-}
-
-/** The wire whose level piece passes under a point, and the height of that piece. */
-function wireAt(at: { x: number; y: number }, edges: WireEdgeType[]): { wire: Wire; y: number } | undefined {
-  for (const { source, sourceHandle, target, targetHandle, data } of edges) {
-    const path = data?.path ?? []
-    for (let k = 1; k < path.length; k++) {
-      const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
-      if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > Math.min(ax, bx) && at.x < Math.max(ax, bx))
-        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay }
-    }
-  }
-  return undefined
+  if (Object.keys(places).length || Object.keys(notes).length) await change({ kind: 'move', places, notes, ...wiring })
 }

@@ -1,77 +1,61 @@
-import type { NewBlock, SheetBlock, Wire } from '../protocol'
-import { change, freeName, useStudio } from '../store'
-import { blockOf, portOf } from './sheet_layout'
+import { ask, change, freeName, useStudio } from '../store'
 
-const MARK = 'armblocks-blocks'
 const SHIFT = 30
 
-interface Clip {
-  [MARK]: 1
-  blocks: NewBlock[]
-  wires: Wire[]
+/** What is selected on the sheet, as the text of a diagram file; nothing where that is nothing. */
+async function copied(): Promise<string | undefined> {
+  const { document, selection } = useStudio.getState()
+  const blocks = [...selection].filter((name) => document?.blocks[name])
+  const notes = [...selection].filter((name) => document?.notes[name])
+  if (!document || !(blocks.length || notes.length)) return undefined
+  return ask<string>({ kind: 'copy', document: document.state.document, inside: document.inside, blocks, notes })
 }
 
-/** What the fields of a block say, as an edit takes it: a robot by its name. */
-function typed(value: unknown): unknown {
-  return value && typeof value === 'object' && 'source' in value ? (value as { source: string }).source : value
-}
-
-function clip(blocks: SheetBlock[], wires: Wire[]): Clip {
-  const names = new Set(blocks.map(({ name }) => name))
-  return {
-    [MARK]: 1,
-    blocks: blocks.map(({ name, type, place, parameters }) => ({
-      name,
-      type,
-      place,
-      parameters: Object.fromEntries(Object.entries(parameters).map(([key, value]) => [key, typed(value)])),
-    })),
-    wires: wires.filter(({ source, target }) => names.has(blockOf(source)) && names.has(blockOf(target))),
-  }
-}
-
-/** Put blocks and the wires among them on the sheet, under names that are free. */
-function add({ blocks, wires }: Clip): void {
+/** Put what such a text holds on the sheet, under names that are free, and select it. */
+async function add(text: string): Promise<void> {
   const { document, select } = useStudio.getState()
-  if (!document || !blocks.length) return
+  if (!document) return
+  const { blocks = {}, layout = {} } = JSON.parse(text) as { blocks?: object; layout?: object }
+  const names: Record<string, string> = {}
   const taken = new Set(Object.keys(document.blocks))
-  const renamed = new Map<string, string>()
-  for (const { name } of blocks) {
-    const free = freeName(name, taken)
-    taken.add(free)
-    renamed.set(name, free)
-  }
-  const moved = (port: string) => `${renamed.get(blockOf(port))}/${portOf(port)}`
-  void change({
-    kind: 'add',
-    blocks: blocks.map((block) => ({
-      ...block,
-      name: renamed.get(block.name)!,
-      place: { ...block.place, x: block.place.x + SHIFT, y: block.place.y + SHIFT },
-    })),
-    wires: wires.map(({ source, target }) => ({ source: moved(source), target: moved(target) })),
-  }).then(() => select(renamed.values()))
+  for (const name of Object.keys(blocks)) taken.add((names[name] = freeName(name, taken)))
+  let note = Math.max(0, ...Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0))
+  for (const id of Object.keys(layout)) if (id.startsWith('/')) names[id] = `/${++note}`
+  if ((await change({ kind: 'paste', text, names, shift: SHIFT })) !== undefined) select(Object.values(names))
 }
 
-export function duplicate(blocks: SheetBlock[], wires: Wire[]): void {
-  add(clip(blocks, wires))
+export async function duplicate(): Promise<void> {
+  const text = await copied()
+  if (text) await add(text)
 }
 
-/** Blocks travel as text, so that they can be pasted into another window or a mail. */
-export async function copy(blocks: SheetBlock[], wires: Wire[]): Promise<void> {
-  if (blocks.length) await navigator.clipboard.writeText(JSON.stringify(clip(blocks, wires), null, 2))
+/** Blocks travel as the text of a diagram file, so that they can be pasted into another window or a mail. */
+export async function copy(): Promise<void> {
+  const text = await copied()
+  if (text) await navigator.clipboard.writeText(text)
 }
 
-export async function cut(blocks: SheetBlock[], wires: Wire[]): Promise<void> {
-  await copy(blocks, wires)
-  if (blocks.length) await change({ kind: 'remove', blocks: blocks.map(({ name }) => name) })
+export async function cut(): Promise<void> {
+  const { document, selection, select } = useStudio.getState()
+  await copy()
+  const blocks = [...selection].filter((name) => document?.blocks[name])
+  const notes = [...selection].filter((name) => document?.notes[name])
+  if (!blocks.length && !notes.length) return
+  await change({ kind: 'remove', blocks, notes })
+  select([])
 }
 
 export async function paste(): Promise<void> {
+  const text = await navigator.clipboard.readText()
+  if (isDiagram(text)) await add(text)
+}
+
+/** Whether a text says that it is a diagram; anything else on the clipboard is not for the sheet. */
+function isDiagram(text: string): boolean {
   try {
-    const found: unknown = JSON.parse(await navigator.clipboard.readText())
-    if (found && typeof found === 'object' && MARK in found) add(found as Clip)
+    const found: unknown = JSON.parse(text)
+    return typeof found === 'object' && found !== null && 'format' in found && 'blocks' in found
   } catch {
-    // Something else lies on the clipboard: nothing to paste here.
+    return false
   }
 }

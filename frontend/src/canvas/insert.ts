@@ -1,6 +1,9 @@
 import type { Place, Wire } from '../protocol'
 import { change, freeName, useStudio } from '../store'
 
+/** What is dragged out of the library: the type of a block. */
+export const BLOCK_TYPE = 'application/x-armblocks-block'
+
 /** px: where blocks may stand. */
 export const GRID = 5
 

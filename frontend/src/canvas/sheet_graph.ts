@@ -87,7 +87,7 @@ export class SheetGraph {
     return made
   }
 
-  edges(wires: Wire[], routed: Map<string, RoutedNet>, kinds: Record<string, WireKind>, level: string, chosen: ReadonlySet<string>): WireEdgeType[] {
+  edges(wires: Wire[], routed: Map<string, RoutedNet>, kinds: Record<string, WireKind>, level: string, chosen: ReadonlySet<string>, into: string | null): WireEdgeType[] {
     const dotted = new Set<string>()
     const made = wires.map((wire) => {
       const net = routed.get(wire.source)
@@ -99,7 +99,7 @@ export class SheetGraph {
       const rank = kind.bus ? 3 : Math.min(kind.shape.length, 2)
       const label = `${wire.source} to ${wire.target}${kind.shape.length ? `, ${kind.shape.join(' × ')}` : ''}${kind.unit ? `, ${kind.unit}` : ''}`
       const selected = chosen.has(key)
-      return this.wires.get(key, [path, dots, net, rank, label, selected, wire], () => ({
+      return this.wires.get(key, [path, dots, net, rank, label, selected, wire, key === into], () => ({
         id: key,
         type: 'wire',
         source: blockOf(wire.source),
@@ -107,6 +107,7 @@ export class SheetGraph {
         target: blockOf(wire.target),
         targetHandle: portOf(wire.target),
         selected,
+        className: key === into ? 'into' : '',
         ariaLabel: `wire from ${wire.source} to ${wire.target}`,
         data: { path, dots, rank, label, bent: Boolean(wire.bends?.length), way: () => (net ? wholeWay(net, key) : []) },
       }))

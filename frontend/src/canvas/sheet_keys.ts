@@ -60,7 +60,7 @@ export function useSheetKeys(
         const at = document.blocks[id]?.place ?? document.notes[id]
         if (at) to[id] = { x: at.x + arrow[0], y: at.y + arrow[1] }
       }
-      move(to)
+      void move(to)
     } else if (event.key === '>') show('connect')
     else if (event.key === '?') show('keys')
     else if (event.key === '"') addNote()

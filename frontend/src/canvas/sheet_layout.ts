@@ -52,9 +52,10 @@ export class SheetRoutes {
   private nets = new Map<string, string>()
   private obstacles = new Map<string, string>()
 
-  update(blocks: Record<string, SheetBlock>, wires: Wire[], places: Places): Map<string, RoutedNet> {
+  /** `loose`: a block that no wire goes around, because it is about to go into one. */
+  update(blocks: Record<string, SheetBlock>, wires: Wire[], places: Places, loose: string | null): Map<string, RoutedNet> {
     const nets = collect(blocks, wires, places)
-    const obstacles = new Map(Object.values(blocks).map((block) => [block.name, obstacle(block, places[block.name] ?? block.place)]))
+    const obstacles = new Map(Object.values(blocks).filter(({ name }) => name !== loose).map((block) => [block.name, obstacle(block, places[block.name] ?? block.place)]))
     const moved: Obstacle[] = []
     const keys = new Map<string, string>()
     for (const [name, box] of obstacles) {

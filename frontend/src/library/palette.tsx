@@ -1,6 +1,7 @@
 import { CloseButton, ScrollArea, TextInput } from '@mantine/core'
 import { IconChevronRight, IconSearch } from '@tabler/icons-react'
 import { memo, useMemo, useState } from 'react'
+import { BLOCK_TYPE } from '../canvas/insert'
 import type { BlockType } from '../protocol'
 import { useStudio } from '../store'
 import { matching } from './search'
@@ -66,7 +67,7 @@ const Kind = memo(function Kind({ kind }: { kind: BlockType }) {
       title={kind.summary}
       data-type={kind.type}
       onDragStart={(event) => {
-        event.dataTransfer.setData('application/x-armblocks-block', kind.type)
+        event.dataTransfer.setData(BLOCK_TYPE, kind.type)
         event.dataTransfer.effectAllowed = 'copy'
       }}
     >

@@ -13,7 +13,7 @@ from armblocks import blocks as kinds
 from armblocks.diagram import Block
 from armblocks.report.camera import Camera
 from armblocks.report.face_marks import Room, least_room, sign_marks, words
-from armblocks.report.face_symbols import sign_of, value_text
+from armblocks.report.face_symbols import sign_of, stated_text, value_text
 from armblocks.report.numbers import axis_number
 from armblocks.report.picture import Curve, Disc, Group, Mark, Polyline, Rectangle, Text
 from armblocks.report.sink_faces import Trend, display, scope, xy_graph
@@ -24,6 +24,7 @@ from armblocks.report.structure_faces import (
     control_ports,
     is_subsystem,
     lever_marks,
+    mask_width,
     oval,
     port_number,
     stop_marks,
@@ -88,7 +89,7 @@ def face_width(block: Block) -> float:
     if shape is not FaceShape.CARD or isinstance(block, kinds.Display):
         return width
     if is_subsystem(block):
-        return 44.0
+        return mask_width(block)
     if _draws_itself(block):
         return 0.62 * width
     return least_room(sign_of(block))[0]
@@ -129,7 +130,7 @@ def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False
     """The drawing inside the block, but that of a subsystem and of a switch, which depends on its ports."""
     match block:
         case kinds.Gain() | kinds.SliderGain():
-            return _gain(block.gain, room, flipped=flipped)
+            return _gain(block, room, flipped=flipped)
         case kinds.Sum() | kinds.BusCreator() | kinds.BusSelector() | kinds.BusAssignment():
             return []
         case kinds.Inport() | kinds.Outport():
@@ -220,11 +221,12 @@ def _powered(gain: object) -> str:
     return text if len(text) <= 6 else ""
 
 
-def _gain(gain: object, room: Room, *, flipped: bool) -> list[Mark]:
-    text = value_text(gain)
+def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) -> list[Mark]:
+    """The formula or the value, as much of both as the triangle holds; else the letter of every gain."""
+    most = 0.56 * room.width
+    wishes = (stated_text(block, "gain"), value_text(block.gain), _powered(block.gain))
+    text = next((wish for wish in wishes if wish and text_width(wish, 9.5) <= most), "K")
     size = 12.0 if text_width(text, 12.0) < 0.52 * room.width else 9.5
-    if text_width(text, size) > 0.56 * room.width:
-        text = _powered(gain) or "K"
     share = 0.64 if flipped else 0.36
     return [Text(room.x + share * room.width, room.middle[1] + 0.36 * size, text, size, Tone.INK, "middle")]
 

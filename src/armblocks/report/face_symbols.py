@@ -55,6 +55,8 @@ class Graph:
     points: tuple[tuple[float, float], ...]
 
 
+_LONGEST_FORMULA = 16
+"""Characters of a formula that a face shows in the place of its value."""
 Sign: TypeAlias = Words | Lines | Title | Fraction | Graph
 
 
@@ -130,6 +132,12 @@ def value_text(value: object) -> str:
     if array.ndim == 1 and array.size <= 4:
         return "[" + " ".join(axis_number(float(f"{float(v):.3g}")) for v in array) + "]"
     return "×".join(str(n) for n in array.shape) + (" vector" if array.ndim == 1 else "")
+
+
+def stated_text(block: Block, name: str) -> str:
+    """What somebody has written for a parameter: its formula where that is short, else its value."""
+    text = dict(block.formulas).get(name, "")
+    return text if 0 < len(text) <= _LONGEST_FORMULA else value_text(block.parameter_value(name))
 
 
 def polynomial(name: str, coefficients: object, letter: str = "s", *, delays: bool = False) -> str:
@@ -234,7 +242,7 @@ SIGNS: dict[str, Sign | Callable[[Any], Sign]] = {
     "BandLimitedWhiteNoise": _graph(*((k / 15, v) for k, v in enumerate(_NOISE))),
     "Chirp": _swing(1.2, 1.6),
     "Clock": Words("t"),
-    "Constant": lambda block: Words(value_text(block.value)),
+    "Constant": lambda block: Words(stated_text(block, "value")),
     "CounterFreeRunning": _stairs((0.0, 0.33, 0.67, 1.0, 0.0)),
     "CounterLimited": _stairs((0.0, 0.5, 1.0, 0.0, 0.5, 1.0)),
     "DigitalClock": _stairs((0.0, 0.25, 0.5, 0.75, 1.0)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from armblocks import blocks as kinds
 from armblocks.diagram import Block, Diagram
 from armblocks.report.face_marks import Room, words
@@ -24,6 +26,10 @@ _CONDITIONAL = (
 )
 _SYMBOL = 15.0
 """px: height of the symbols of controls."""
+_MASK_SIZE = 10.5
+_MASK_LINE = 84.0
+_MOST_MASK = 140.0
+"""px: type size of what a mask says, the length that begins another line, and the longest line."""
 Stroke = list[tuple[float, float]]
 _RISING: Stroke = [(0, 1), (0.5, 1), (0.5, 0), (1, 0)]
 _FALLING: Stroke = [(0, 0), (0.5, 0), (0.5, 1), (1, 1)]
@@ -66,16 +72,43 @@ def bus_bar(block: Block, x: float, y: float, width: float, height: float, flipp
 
 
 def subsystem_marks(block: Block, room: Room, tops: tuple[tuple[str, float], ...]) -> list[Mark]:
-    """A small diagram, or a mask's name; above it the symbols of its controls under their ports (name, x)."""
+    """A small diagram, or what a mask says; above, symbols of its controls under their ports (name, x)."""
     down = CONTROL_ROOM if tops else 0.0
     below = Room(room.x, room.y + down, room.width, room.height - down)
     inner: object = block.parameter_value("diagram")
-    marks = (
-        words(below, inner.name, size=10.5) if isinstance(inner, Diagram) and inner.mask else _sheet(below)
-    )
+    marks = _lines(below, mask_text(inner)) if isinstance(inner, Diagram) and inner.mask else _sheet(below)
     for name, x in tops:
         marks += _control(block, name, x, room.y + 5.0)
     return marks
+
+
+def mask_width(block: Block) -> float:
+    """px that a subsystem's drawing needs between the names of its ports."""
+    inner: object = block.parameter_value("diagram")
+    if not (isinstance(inner, Diagram) and inner.mask):
+        return 44.0
+    widest = max(text_width(line, _MASK_SIZE) for line in mask_text(inner))
+    return min(max(widest + 12, 44.0), _MOST_MASK)
+
+
+def mask_text(diagram: Diagram) -> tuple[str, ...]:
+    """The lines on the face of a masked subsystem: its name, broken where words end if it is long."""
+    lines = [""]
+    for word in diagram.name.replace("_", " ").split():
+        together = f"{lines[-1]} {word}".strip()
+        if lines[-1] and text_width(together, _MASK_SIZE) > _MASK_LINE:
+            lines.append(word)
+        else:
+            lines[-1] = together
+    return tuple(lines)
+
+
+def _lines(room: Room, texts: Sequence[str]) -> list[Mark]:
+    """Lines in the middle of a room, each in a type that fits."""
+    height = _MASK_SIZE * 1.3
+    top = room.middle[1] - height * len(texts) / 2
+    rows = [Room(room.x, top + k * height, room.width, height) for k in range(len(texts))]
+    return [mark for row, text in zip(rows, texts) for mark in words(row, text, size=_MASK_SIZE)]
 
 
 def _sheet(room: Room) -> list[Mark]:

@@ -8,8 +8,10 @@ from dataclasses import replace
 from armblocks.diagram import Diagram
 from armblocks.studio import messages as say
 from armblocks.studio.aspects import Aspect, changed_aspects
+from armblocks.studio.clipping import ReadDiagram
+from armblocks.studio.edit_messages import Edit, summary
 from armblocks.studio.edited import Edited, Outcome
-from armblocks.studio.edits import Edit, applied, summary
+from armblocks.studio.edits import applied
 from armblocks.studio.nesting import check_own, inside, with_inside
 from armblocks.studio.parameter_values import ResolveRobot
 from armblocks.studio.placing import arranged
@@ -20,9 +22,17 @@ class Document(Edited[Diagram]):
 
     noun = "drawing"
 
-    def __init__(self, diagram: Diagram, resolve_robot: ResolveRobot, *, version: int = 0) -> None:
+    def __init__(
+        self,
+        diagram: Diagram,
+        resolve_robot: ResolveRobot,
+        *,
+        version: int = 0,
+        read_diagram: ReadDiagram | None = None,
+    ) -> None:
         super().__init__(diagram, version=version)
         self._resolve_robot = resolve_robot
+        self._read_diagram = read_diagram
 
     @property
     def diagram(self) -> Diagram:
@@ -51,7 +61,8 @@ class Document(Edited[Diagram]):
         check_own(self.diagram, request.inside)
         sheet = inside(self.diagram, request.inside)
         if isinstance(request, say.Change):
-            title, after = summary(request.edit), applied(request.edit, sheet, self._resolve_robot)
+            title = summary(request.edit)
+            after = applied(request.edit, sheet, self._resolve_robot, self._read_diagram)
         else:
             title, after = "arrange", arranged(sheet)
         return Outcome(title, with_inside(self.diagram, request.inside, after))

@@ -1,4 +1,4 @@
-"""What a person does to a diagram, as data: each edit is a pure function from one diagram to the next.
+"""What edits do: each is a pure function from one diagram to the next.
 
 A drawing in progress is a :class:`~armblocks.diagram.Diagram` that nobody has checked: inputs may be open and
 widths may disagree; that is told beside the blocks, it does not forbid the edit. What an edit does refuse is
@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import Any
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import (
@@ -30,10 +28,33 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
-from armblocks.diagram.names import check_block_name, folded
+from armblocks.diagram.names import folded
 from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.report.diagram_layout import standing_box
-from armblocks.studio.nesting import grouped, unlinked, with_block
+from armblocks.studio.clipping import ReadDiagram, pasted, reader
+from armblocks.studio.edit_messages import (
+    AddBlocks,
+    BendWires,
+    BreakLink,
+    Connect,
+    Describe,
+    Edit,
+    GroupBlocks,
+    KeepTuned,
+    LogSignal,
+    MoveBlocks,
+    NewBlock,
+    PasteBlocks,
+    Place,
+    RemoveBlocks,
+    Rename,
+    SetNotes,
+    SetParameters,
+    SetSettings,
+    SheetNote,
+    Wire,
+)
+from armblocks.studio.nesting import check_free, grouped, unlinked, with_block
 from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
 from armblocks.studio.placing import placed
 from armblocks.studio.typed_settings import with_settings
@@ -44,199 +65,21 @@ MOST_BLOCKS = 20_000
 """Blocks that one sheet may hold in the editor."""
 
 
-Px = Annotated[float, Field(ge=-1e7, le=1e7)]
-"""A place on the sheet; further out nothing could be drawn exactly."""
-Size = Annotated[float, Field(gt=0, le=1e5)]
-
-
-class Message(BaseModel):
-    """A value that travels between page and server: unknown members are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Place(Message):
-    """Where a block stands: top left corner and, if not its own, its size in px."""
-
-    x: Px
-    y: Px
-    width: Size | None = None
-    height: Size | None = None
-    flipped: bool = False
-    rotation: Literal[0, 90, 180, 270] = 0
-    """Degrees clockwise."""
-
-
-class SheetNote(Message):
-    """Words on the sheet: their top left corner in px."""
-
-    x: Px
-    y: Px
-    text: Annotated[str, Field(max_length=10_000)]
-
-
-class NewBlock(Message):
-    """A block to be put on the sheet. ``parameters`` states those that are not at their default."""
-
-    name: str
-    type: str
-    parameters: dict[str, Any] = Field(default_factory=dict[str, Any])
-    place: Place
-
-
-class Wire(Message):
-    """A wire between two ports, written ``block/port``.
-
-    ``bends``: the way that somebody has drawn, see :func:`armblocks.report.wire_routing.bent`.
-    """
-
-    source: str
-    target: str
-    bends: tuple[Px, ...] = ()
-
-
-class AddBlocks(Message):
-    """Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
-
-    ``instead``: wires that give way, as where a block is dropped on one.
-    """
-
-    kind: Literal["add"] = "add"
-    blocks: list[NewBlock]
-    wires: list[Wire] = Field(default_factory=list[Wire])
-    instead: list[Wire] = Field(default_factory=list[Wire])
-
-
-class RemoveBlocks(Message):
-    """Take blocks, wires and notes off the sheet; the wires of the blocks go with them."""
-
-    kind: Literal["remove"] = "remove"
-    blocks: list[str] = Field(default_factory=list[str])
-    wires: list[Wire] = Field(default_factory=list[Wire])
-    notes: list[str] = Field(default_factory=list[str])
-
-
-class Connect(Message):
-    """Draw a wire. With ``replace`` the input's present wire gives way."""
-
-    kind: Literal["connect"] = "connect"
-    wire: Wire
-    replace: bool = False
-
-
-class MoveBlocks(Message):
-    """Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
-
-    Ways that are drawn between blocks that move alike move with them.
-    """
-
-    kind: Literal["move"] = "move"
-    places: dict[str, Place] = Field(default_factory=dict[str, Place])
-    notes: dict[str, SheetNote] = Field(default_factory=dict[str, SheetNote])
-
-
-class BendWires(Message):
-    """Lead wires along the bends that they have here; without any the way is chosen again."""
-
-    kind: Literal["bend"] = "bend"
-    wires: list[Wire]
-
-
-class SetNotes(Message):
-    """Write notes, or change what they say."""
-
-    kind: Literal["notes"] = "notes"
-    notes: dict[Annotated[str, Field(pattern=r"^/\S+$", max_length=100)], SheetNote]
-
-
-class Rename(Message):
-    """Give a block another name; its wires and its place go with it."""
-
-    kind: Literal["rename"] = "rename"
-    block: str
-    name: str
-
-
-class SetParameters(Message):
-    """Change parameters of one block. Wires to ports that thereby vanish are removed."""
-
-    kind: Literal["parameters"] = "parameters"
-    block: str
-    values: dict[str, Any]
-
-
-class LogSignal(Message):
-    """Log an output ``block/port``, so that it is seen without a Scope; or log it no longer."""
-
-    kind: Literal["log"] = "log"
-    port: str
-    logged: bool
-
-
-class KeepTuned(Message):
-    """Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them."""
-
-    kind: Literal["keep_tuned"] = "keep_tuned"
-    values: dict[str, Any]
-
-
-class GroupBlocks(Message):
-    """Put blocks into a subsystem of their own; its ports are the wires that are cut thereby."""
-
-    kind: Literal["group"] = "group"
-    blocks: list[str]
-    name: str
-
-
-class BreakLink(Message):
-    """Make a block that is linked to a library a copy of one's own, which may be changed inside."""
-
-    kind: Literal["break_link"] = "break_link"
-    block: str
-
-
-class SetSettings(Message):
-    """Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks."""
-
-    kind: Literal["settings"] = "settings"
-    values: dict[str, float | str | None]
-
-
-class Describe(Message):
-    """Change the model's one-line description."""
-
-    kind: Literal["describe"] = "describe"
-    text: Annotated[str, Field(max_length=2000)]
-
-
-Edit = Annotated[
-    AddBlocks
-    | RemoveBlocks
-    | Connect
-    | MoveBlocks
-    | BendWires
-    | SetNotes
-    | Rename
-    | SetParameters
-    | KeepTuned
-    | LogSignal
-    | GroupBlocks
-    | BreakLink
-    | SetSettings
-    | Describe,
-    Field(discriminator="kind"),
-]
-"""Everything that can be done to a drawing, and so everything that can be undone."""
-
-
-def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+def applied(
+    edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot, read_diagram: ReadDiagram | None = None
+) -> Diagram:
     """The diagram after an edit; the one given stays as it is. ``resolve_robot`` finds the robots it names.
 
+    ``read_diagram`` reads what was copied; without it only what needs no files of a project can be pasted.
     Raises ``DiagramError``, ``UnknownNameError`` or ``InputError`` for an edit that cannot be carried out.
     """
     match edit:
         case AddBlocks():
             return _add(edit, diagram, resolve_robot)
+        case PasteBlocks():
+            copied = (read_diagram or reader(resolve_robot))(edit.text, "what was copied")
+            _check_room(diagram, len(copied.blocks))
+            return pasted(diagram, copied, edit.names, edit.shift)
         case RemoveBlocks():
             return _remove(edit, diagram)
         case Connect():
@@ -267,64 +110,13 @@ def applied(edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagra
             return dataclasses.replace(diagram, description=edit.text)
 
 
-def summary(edit: Edit) -> str:
-    """The edit in a few words, for the menu entry "Undo …"."""
-    match edit:
-        case AddBlocks():
-            return f"add {_listed([block.name for block in edit.blocks])}"
-        case RemoveBlocks(blocks=blocks, wires=wires, notes=notes):
-            if blocks:
-                return f"delete {_listed(blocks)}"
-            return f"delete {_counted(len(wires), 'wire') if wires else _counted(len(notes), 'note')}"
-        case Connect():
-            return f"connect {edit.wire.source} to {edit.wire.target}"
-        case MoveBlocks():
-            if edit.places:
-                return f"move {_listed(list(edit.places))}"
-            return f"move {_counted(len(edit.notes), 'note')}"
-        case BendWires():
-            return f"bend {_counted(len(edit.wires), 'wire')}"
-        case SetNotes():
-            return f"write {_counted(len(edit.notes), 'note')}"
-        case Rename():
-            return f"rename {edit.block}"
-        case SetParameters():
-            return f"change {edit.block}"
-        case KeepTuned():
-            return f"keep {_counted(len(edit.values), 'tuned value')}"
-        case LogSignal():
-            return f"{'log' if edit.logged else 'stop logging'} {edit.port}"
-        case GroupBlocks():
-            return f"group {_counted(len(edit.blocks), 'block')}"
-        case BreakLink():
-            return f"break the link of {edit.block}"
-        case SetSettings():
-            return "change the settings"
-        case Describe():
-            return "change the description"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else _counted(len(names), "block")
-
-
-def _counted(count: int, thing: str) -> str:
-    return f"{count} {thing}{'' if count == 1 else 's'}"
-
-
 def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
     where = f"diagram '{diagram.name}'"
     blocks, layout = dict(diagram.blocks), dict(diagram.layout)
-    if len(blocks) + len(edit.blocks) > MOST_BLOCKS:
-        raise DiagramError(
-            f"the sheet would hold {len(blocks) + len(edit.blocks)} blocks",
-            where=where,
-            allowed=f"at most {MOST_BLOCKS}",
-            fix="group some of them into subsystems",
-        )
+    _check_room(diagram, len(edit.blocks))
     taken = {folded(name): name for name in blocks}
     for new in edit.blocks:
-        _check_free(new.name, taken, where)
+        check_free(new.name, taken, where)
         taken[folded(new.name)] = new.name
         blocks[new.name] = _made(new, diagram.mask_values, resolve_robot)
         layout[new.name] = _placement(new.place)
@@ -334,15 +126,13 @@ def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diag
     return _connect(edit.wires, added, replace=False)
 
 
-def _check_free(name: str, taken: Mapping[str, str], where: str) -> None:
-    check_block_name(name, where)
-    other = taken.get(folded(name))
-    if other is not None:
+def _check_room(diagram: Diagram, more: int) -> None:
+    if len(diagram.blocks) + more > MOST_BLOCKS:
         raise DiagramError(
-            f"a block is already named '{other}'",
-            where=where,
-            allowed="every name once, however it is capitalised",
-            fix="choose another name",
+            f"the sheet would hold {len(diagram.blocks) + more} blocks",
+            where=f"diagram '{diagram.name}'",
+            allowed=f"at most {MOST_BLOCKS}",
+            fix="group some of them into subsystems",
         )
 
 
@@ -459,8 +249,8 @@ def _move(edit: MoveBlocks, diagram: Diagram) -> Diagram:
         if shift is not None and shift == shifts.get(wire.target.block):
             flat = _leaves_sideways(wire, diagram)
             bends[wire] = tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(values))
-    moved = dataclasses.replace(diagram, layout=layout, bends=bends)
-    return _note(edit.notes, moved, known=True)
+    moved = _note(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
+    return _connect(edit.wires, _remove(RemoveBlocks(wires=edit.instead), moved), replace=False)
 
 
 def _leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
@@ -493,7 +283,7 @@ def _placement(place: Place) -> Placement:
 def _rename(edit: Rename, diagram: Diagram) -> Diagram:
     _known(edit.block, diagram)
     taken = {folded(name): name for name in diagram.blocks if name != edit.block}
-    _check_free(edit.name, taken, f"diagram '{diagram.name}'")
+    check_free(edit.name, taken, f"diagram '{diagram.name}'")
 
     def renamed(name: str) -> str:
         return edit.name if name == edit.block else name

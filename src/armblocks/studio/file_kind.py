@@ -106,7 +106,7 @@ class DiagramKind(FileKind[Diagram, Document]):
 
     def edited(self, value: Diagram, version: int = 0) -> Document:
         """A drawing."""
-        return Document(value, self._resolve_robot, version=version)
+        return Document(value, self._resolve_robot, version=version, read_diagram=self.from_text)
 
     def from_file(self, data: bytes, place: Path) -> Diagram:
         """The diagram, every block with a place; it may link to libraries of the project."""
@@ -130,7 +130,7 @@ class DiagramKind(FileKind[Diagram, Document]):
         return replace(value, name=place.stem)
 
     def from_text(self, text: str, where: str) -> Diagram:
-        """A drawing of the journal."""
+        """A drawing of the journal, or what was copied of one."""
         return formats.diagram_from_bytes(
             text.encode(),
             where,

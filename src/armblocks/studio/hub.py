@@ -25,6 +25,7 @@ from armblocks.report.diagram_file import drawing_bytes
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check
+from armblocks.studio.clipping import clipped
 from armblocks.studio.file_kind import Performed
 from armblocks.studio.nesting import inside, linked_part, with_robot
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
@@ -151,6 +152,9 @@ class Hub:
                 return {"files": self.folder.files(), "recent": self._recent()}
             case say.AskOutline():
                 return outline(self.documents[request.document].document.diagram)
+            case say.Copy():
+                level = inside(self.documents[request.document].document.diagram, request.inside)
+                return clipped(level, request.blocks, request.notes, self.resolve_robot, self.folder.root)
             case say.Find():
                 return find(self.documents[request.document].document.diagram, request.text)
             case say.TypedValue():

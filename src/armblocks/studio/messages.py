@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from armblocks.studio.alteration import Alteration
-from armblocks.studio.edits import Edit, Message, Place, SheetNote, Wire
+from armblocks.studio.edit_messages import Edit, Message, Place, SheetNote, Wire
 from armblocks.studio.robot_messages import (
     Opening,
     Readings,
@@ -365,6 +365,16 @@ class AskOutline(Message):
     document: str
 
 
+class Copy(Message):
+    """Ask for blocks and notes of a sheet as text, which :class:`PasteBlocks` puts on a sheet again."""
+
+    kind: Literal["copy"] = "copy"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    blocks: list[str]
+    notes: list[str] = Field(default_factory=list[str])
+
+
 class Find(Message):
     """Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`."""
 
@@ -493,6 +503,7 @@ Request = Annotated[
     | Ping
     | Files
     | AskOutline
+    | Copy
     | Find
     | Close
     | Recover

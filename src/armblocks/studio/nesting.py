@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from armblocks.diagram import (
@@ -128,6 +128,19 @@ def _same_file(one: Robot, other: Robot) -> bool:
     return bool(one.source) and Path(one.source).resolve() == Path(other.source).resolve()
 
 
+def check_free(name: str, taken: Mapping[str, str], where: str) -> None:
+    """Raise ``DiagramError`` for what cannot be the name of a new block; ``taken``: names by folded ones."""
+    check_block_name(name, where)
+    other = taken.get(folded(name))
+    if other is not None:
+        raise DiagramError(
+            f"a block is already named '{other}'",
+            where=where,
+            allowed="every name once, however it is capitalised",
+            fix="choose another name",
+        )
+
+
 def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
     """The diagram with some of its blocks inside a new subsystem; no signal changes by it.
 
@@ -138,14 +151,7 @@ def grouped(names: Sequence[str], name: str, diagram: Diagram) -> Diagram:
     group = {entry: diagram.block(entry) for entry in names}
     if not group:
         raise DiagramError("no blocks were chosen", where=where, allowed="one or more", fix="select some")
-    check_block_name(name, where)
-    if any(folded(other) == folded(name) for other in diagram.blocks if other not in group):
-        raise DiagramError(
-            f"a block is already named '{name}'",
-            where=where,
-            allowed="a name that is free",
-            fix="choose another",
-        )
+    check_free(name, {folded(other): other for other in diagram.blocks if other not in group}, where)
     entering = sorted(
         {w.source for w in diagram.connections if w.target.block in group and w.source.block not in group}
     )

@@ -12,7 +12,7 @@ from starlette.websockets import WebSocketDisconnect
 from armblocks.studio.run_record import Said
 
 if TYPE_CHECKING:
-    from armblocks.studio.edits import Message
+    from armblocks.studio.edit_messages import Message
 
 GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
 """What sending to a page raises that has left."""

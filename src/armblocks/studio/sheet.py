@@ -16,7 +16,8 @@ from armblocks.report.diagram_drawing import block_marks
 from armblocks.report.diagram_layout import Box, drawn_blocks, standing_box
 from armblocks.report.picture import Picture
 from armblocks.report.svg import svg_marks
-from armblocks.studio.edits import DEFAULT_ROBOT, Place, SheetNote, Wire
+from armblocks.studio.edit_messages import Place, SheetNote, Wire
+from armblocks.studio.edits import DEFAULT_ROBOT
 from armblocks.studio.messages import BlockType, ParameterRule, PortSpot, Sheet, SheetBlock, SheetChange
 from armblocks.studio.parameter_values import parameter_json
 

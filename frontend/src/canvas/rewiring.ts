@@ -1,0 +1,63 @@
+import type { SheetBlock, Wire } from '../protocol'
+import { blockOf, wireKey } from './sheet_layout'
+import type { WireEdgeType } from './wire_edge'
+
+/** Blocks taken out of their wires and put into others: what becomes of the wires of a sheet. */
+
+/** px from a wire at which a block that is dropped goes into it. */
+const INTO_WIRE = 12
+
+/** Whether a block can stand in a wire. */
+const passes = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
+
+/** Whether a block has no wire, so that it goes into one that it is dropped on. */
+export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
+  return passes(block) && !wires.some(({ source, target }) => blockOf(source) === block.name || blockOf(target) === block.name)
+}
+
+/** The wires without those between some blocks and all others; where that is one block with one input and one output they close behind it. */
+export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
+  const names = new Set(blocks.map(({ name }) => name))
+  const within = ({ source, target }: Wire) => names.has(blockOf(source)) === names.has(blockOf(target))
+  const left = wires.filter(within)
+  const [block] = blocks
+  if (blocks.length !== 1 || !block || block.inputs.length !== 1 || block.outputs.length !== 1) return left
+  const cut = wires.filter((wire) => !within(wire))
+  const driver = cut.find(({ target }) => names.has(blockOf(target)))
+  if (!driver) return left
+  const driven = cut.filter(({ source }) => names.has(blockOf(source)))
+  return [...left, ...driven.map(({ target }) => ({ source: driver.source, target }))]
+}
+
+/** The wires with a block in one of them, by its first input and its first output. */
+export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
+  const [input, output] = [block.inputs[0], block.outputs[0]]
+  if (!input || !output) return wires
+  const others = wires.filter((other) => wireKey(other) !== wireKey(wire))
+  return [...others, { source: wire.source, target: `${block.name}/${input.name}` }, { source: `${block.name}/${output.name}`, target: wire.target }]
+}
+
+/** What an edit says that makes one list of wires of another. */
+export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead: Wire[] } {
+  const [old, next] = [new Set(before.map(wireKey)), new Set(after.map(wireKey))]
+  return { wires: after.filter((wire) => !old.has(wireKey(wire))), instead: before.filter((wire) => !next.has(wireKey(wire))) }
+}
+
+/** The wire whose level piece passes under a point, and the height of that piece. */
+export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[]): { wire: Wire; y: number } | undefined {
+  for (const { source, sourceHandle, target, targetHandle, data } of edges) {
+    const path = data?.path ?? []
+    for (let k = 1; k < path.length; k++) {
+      const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
+      if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > Math.min(ax, bx) && at.x < Math.max(ax, bx))
+        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay }
+    }
+  }
+  return undefined
+}
+
+/** Where a block stands so that a wire runs straight into its first input. */
+export function levelled(block: SheetBlock, at: { x: number; y: number }, y: number): { x: number; y: number } {
+  const input = block.inputs[0]
+  return input && input.dy === 0 ? { x: at.x, y: y - input.y } : at
+}

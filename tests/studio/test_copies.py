@@ -1,0 +1,136 @@
+"""What is copied and pasted is the same, whatever it is: the text on the clipboard is a diagram file."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_studio_hub import Told, talk
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS, Gain
+from armblocks.diagram import Diagram, Note, diagram_difference, formula, mask_parameter
+from armblocks.errors import DiagramError, FormatError, InputError
+from armblocks.formats import diagram_from_bytes, load_diagram, load_robot
+from armblocks.studio.clipping import clipped
+from armblocks.studio.document import Document
+from armblocks.studio.edit_messages import BendWires, MoveBlocks, PasteBlocks, Place, RemoveBlocks, Wire
+from armblocks.studio.placing import placed
+
+EXAMPLES = ("kr180model", "puma560_servos", "puma560_payload_drop", "dc_motor_sampled_pid")
+
+
+def copy(diagram: Diagram, *names: str, notes: tuple[str, ...] = ()) -> str:
+    return clipped(diagram, names, notes, load_robot)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_all_that_is_copied_and_pasted_elsewhere_is_the_same(name: str) -> None:
+    there = placed(load_diagram(name, BLOCKS))
+    document = Document(Diagram(name=there.name, blocks={}, mask=there.mask), load_robot)
+    document.edit(PasteBlocks(text=copy(there, *there.blocks, notes=tuple(there.notes))))
+    here = document.diagram
+    bare = dataclasses.replace(there, settings=here.settings, description="")
+    assert not diagram_difference(bare, here)
+    assert (here.layout, here.bends, here.notes) == (there.layout, there.bends, there.notes)
+    document.undo()
+    assert document.diagram.blocks == {}
+
+
+def test_duplicates_keep_what_is_inside_links_and_led_wires() -> None:
+    document = Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
+    wire = next(wire for wire in document.diagram.connections if wire.target.block == "servo 2")
+    source, target = wire.source.block, wire.target.block
+    led = Wire(source=str(wire.source), target=str(wire.target), bends=(200.0, 50.0, 300.0))
+    document.edit(BendWires(wires=[led]))
+    names = {source: "a", target: "b"}
+    document.edit(PasteBlocks(text=copy(document.diagram, *names), names=names, shift=30.0))
+    after = document.diagram
+    assert after.blocks["b"] == after.blocks[target]
+    assert after.layout["b"].x == after.layout[target].x + 30
+    (copied,) = (wire for wire in after.bends if wire.source.block == "a")
+    assert after.bends[copied] == (230.0, 80.0, 330.0)
+
+
+def test_a_formula_stays_one_only_where_its_names_are_known() -> None:
+    masked = Diagram(
+        name="there",
+        blocks={"gain": Gain(gain=formula("2*k"))},
+        mask=(mask_parameter("k", 3.0),),
+        mask_values={"k": 5.0},
+    )
+    text = copy(placed(masked), "gain")
+    plain = Document(Diagram(name="here", blocks={}), load_robot)
+    plain.edit(PasteBlocks(text=text))
+    assert plain.diagram.blocks["gain"] == Gain(gain=10.0)
+    own = Document(Diagram(name="here", blocks={}, mask=(mask_parameter("k", 1.5),)), load_robot)
+    own.edit(PasteBlocks(text=text))
+    assert dict(own.diagram.blocks["gain"].formulas) == {"gain": "2*k"}
+    assert own.diagram.blocks["gain"].parameter_value("gain") == 3.0
+
+
+def test_names_that_are_taken_and_texts_that_are_no_diagram_are_refused() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    noted = dataclasses.replace(document.diagram, notes={"/1": Note(x=0, y=0, text="a")})
+    with pytest.raises(DiagramError, match="a block is already named 'PID'"):
+        document.edit(PasteBlocks(text=copy(document.diagram, "PID")))
+    document = Document(noted, load_robot)
+    with pytest.raises(DiagramError, match="a note of this name is already there"):
+        document.edit(PasteBlocks(text=copy(noted, notes=("/1",))))
+    document.edit(PasteBlocks(text=copy(noted, notes=("/1",)), names={"/1": "/2"}, shift=5.0))
+    assert document.diagram.notes["/2"] == Note(x=5, y=5, text="a")
+    with pytest.raises(FormatError, match="what was copied"):
+        document.edit(PasteBlocks(text="[1, 2]"))
+
+
+def test_the_text_is_a_diagram_file() -> None:
+    diagram = placed(load_diagram("kr180model", BLOCKS))
+    read = diagram_from_bytes(
+        copy(diagram, "jtraj", "rne").encode(), "mail.json", BLOCKS, load_robot, draft=True
+    )
+    assert set(read.blocks) == {"jtraj", "rne"}
+
+
+def test_nothing_outside_of_the_project_is_read_by_pasting(tmp_path: Path) -> None:
+    (tmp_path / "project").mkdir()
+    ab.save_library({"Servo": ab.load_library("joint_servos")["JointServo"]}, tmp_path / "outside.json")
+    text = copy(placed(load_diagram("puma560_servos", BLOCKS)), "servo 1")
+    assert '"joint_servos#JointServo"' in text
+
+    async def talking(hub: Any, ask: Any, told: Told) -> None:
+        key = await ask("open", example="puma560_servos")
+        same = await ask("copy", document=key, blocks=["servo 1"])
+        assert same == text
+        edit = {"kind": "paste", "names": {"servo 1": "another"}}
+        await ask("change", document=key, edit={**edit, "text": same})
+        outside = same.replace("joint_servos#JointServo", "../outside.json#Servo")
+        with pytest.raises(InputError, match="lies outside of the project folder"):
+            await ask("change", document=key, edit={**edit, "text": outside, "names": {"servo 1": "third"}})
+
+    talk(tmp_path / "project", talking)
+
+
+def test_a_block_is_put_into_a_wire_and_taken_out_of_it_as_one_step() -> None:
+    document = Document(placed(load_diagram("van_der_pol_pid", BLOCKS)), load_robot)
+    before = document.diagram
+    document.edit(PasteBlocks(text=copy(before, "damping"), names={"damping": "free"}))
+    alone = document.diagram
+    place = Place(x=500, y=400)
+    through = [Wire(source="x2/y", target="free/u"), Wire(source="free/y", target="x1/u")]
+    direct = [Wire(source="x2/y", target="x1/u")]
+    document.edit(MoveBlocks(places={"free": place}, wires=through, instead=direct))
+    assert document.undo_title == "insert free"
+    inserted = {str(wire) for wire in document.diagram.connections}
+    assert {"x2/y -> free/u", "free/y -> x1/u"} <= inserted
+    assert "x2/y -> x1/u" not in inserted
+    document.edit(MoveBlocks(places={"free": place}, wires=direct, instead=through))
+    assert document.undo_title == "disconnect free"
+    assert document.diagram.connections == before.connections
+    document.undo()
+    document.undo()
+    assert document.diagram == alone
+    document.edit(RemoveBlocks(blocks=["free"]))
+    with pytest.raises(DiagramError, match="there is no wire free/y -> x1/u"):
+        document.edit(MoveBlocks(places={}, instead=through[1:]))
