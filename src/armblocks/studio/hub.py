@@ -75,6 +75,7 @@ class Hub:
         self.records: dict[str, RunRecord] = {}
         self.workers = Workers()
         self._watching: list[asyncio.Task[None]] = []
+        self._telling: set[asyncio.Task[None]] = set()
 
     def prepare(self) -> None:
         """Look after the files from now on."""
@@ -214,19 +215,27 @@ class Hub:
             drawn = drawn.model_copy(update={"linked": list(linked), "link": link})
         await page.tell(say.Opened(state=found.state(), inside=list(path), sheet=drawn, run=run))
         if fresh and run is not None:
-            await self._tell_run(page, run)
+            self._tell_run_later(page, run, 0)
         await self._tell_documents()
         self._check_later(found)
         self.workers.prepare(after=PAGE_SECONDS)
         return found.key
 
+    def _tell_run_later(self, page: Page, run: str, said: int) -> None:
+        """Tell a page what a run has said but for the first ``said``, as fast as it listens: one that has
+        just come, or that is behind. Until it has caught up it gets nothing else of the run.
+        """
+        page.hears[run] = said
+        telling = asyncio.get_running_loop().create_task(self._tell_run(page, run))
+        self._telling.add(telling)
+        telling.add_done_callback(self._telling.discard)
+
     async def _tell_run(self, page: Page, run: str) -> None:
-        """Tell a page that has just come what a run has said so far, and from then on what it says."""
         record = self.records[run]
-        page.hears[run] = 0
         while page.hears[run] < len(record) and self.records.get(run) is record and page in self.pages:
             page.hears[run] += 1
             await page.send(record[page.hears[run] - 1])
+            await page.room()
         del page.hears[run]
 
     async def _change(self, request: Performed | say.Reload) -> int:
@@ -409,8 +418,11 @@ class Hub:
         async def tell(event: say.Message | bytes) -> None:
             said = event if isinstance(event, bytes) else event.model_dump_json()
             record.append(said)
-            pages = [page for page in self.pages if found.key in page.shows and key not in page.hears]
-            await asyncio.gather(*(page.send(said) for page in pages))
+            for page in [page for page in self.pages if found.key in page.shows and key not in page.hears]:
+                if page.behind:
+                    self._tell_run_later(page, key, len(record) - 1)
+                else:
+                    await page.send(said)
 
         worker = await self.workers.take()
         for other in list(self.runs.values()):
@@ -440,8 +452,8 @@ class Hub:
 
     def close(self) -> None:
         """End every run, and leave the documents so that nothing is lost."""
-        for watching in self._watching:
-            watching.cancel()
+        for task in (*self._watching, *self._telling):
+            task.cancel()
         self.documents.end()
         self.robots.robots.end()
         for run in self.runs.values():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from starlette.websockets import WebSocketDisconnect
 
+from armblocks.studio.outbox import Outbox
 from armblocks.studio.run_record import Said
 
 if TYPE_CHECKING:
@@ -30,10 +31,22 @@ class Page:
 
     send_text: SendText
     send_bytes: SendBytes
+    outbox: Outbox | None = None
+    """Through which both send, where the page may be slower than what is sent."""
     shows: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     """Documents that it shows, and the path of the sheet that it looks at."""
     hears: dict[str, int] = field(default_factory=dict[str, int])
     """Runs that it is told from their beginning, and how far: until then it gets nothing else of them."""
+
+    @property
+    def behind(self) -> bool:
+        """Whether it has so much to come that it should not get more of a run yet."""
+        return self.outbox is not None and self.outbox.behind
+
+    async def room(self) -> None:
+        """Return when it is not behind."""
+        if self.outbox is not None:
+            await self.outbox.room()
 
     async def tell(self, event: Message) -> None:
         """Send an event; a page that is gone is nobody's trouble."""

@@ -25,6 +25,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.studio.guard import Guard, Keys
+from armblocks.studio.outbox import Outbox
 from armblocks.studio.page import NoRequestError, Page
 from armblocks.studio.project_folder import ProjectFolder
 
@@ -157,17 +158,32 @@ class Answers:
     async def talk(self, socket: WebSocket) -> None:
         """The websocket of a page, for as long as it is there."""
         await socket.accept()
-        hub, page = await self.hub.here(), Page(socket.send_text, socket.send_bytes)
+        outbox = Outbox(socket.send_text, socket.send_bytes)
+        hub, page = await self.hub.here(), Page(outbox.put, outbox.put, outbox)
+        sending = asyncio.create_task(outbox.empty())
         await hub.welcome(page)
         try:
-            while True:
-                await hub.answer(page, await socket.receive_text())
+            while (text := await _received(socket, sending)) is not None:
+                await hub.answer(page, text)
         except (NoRequestError, KeyError):
             await socket.close(1008, "this is no request of the studio")
         except WebSocketDisconnect:
             pass
         finally:
             hub.leave(page)
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+
+
+async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | None:
+    """What the page says next; ``None`` where nothing can be sent to it any more."""
+    receiving = asyncio.create_task(socket.receive_text())
+    try:
+        await asyncio.wait((receiving, sending), return_when=asyncio.FIRST_COMPLETED)
+        return receiving.result() if receiving.done() else None
+    finally:
+        if not receiving.done():
+            receiving.cancel()
 
 
 def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:

@@ -1,0 +1,114 @@
+"""A page that does not listen keeps nobody waiting, takes no memory without end, and loses nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armblocks.studio import outbox as outbox_module
+from armblocks.studio.hub import Hub
+from armblocks.studio.outbox import Outbox
+from armblocks.studio.page import Page
+from armblocks.studio.project_folder import ProjectFolder
+
+PATIENCE_SECONDS = 60.0
+
+
+class Listener:
+    """A page at the other end of an outbox, which listens only while it is let."""
+
+    def __init__(self) -> None:
+        self.listens = asyncio.Event()
+        self.heard: list[str | bytes] = []
+        self.news = asyncio.Event()
+        self.outbox = Outbox(self._hear, self._hear)
+        self.page = Page(self.outbox.put, self.outbox.put, self.outbox)
+        self.sending = asyncio.create_task(self.outbox.empty())
+
+    async def _hear(self, said: str | bytes) -> None:
+        await self.listens.wait()
+        self.heard.append(said)
+        self.news.set()
+
+    async def until(self, kind: str, **members: Any) -> dict[str, Any]:
+        async with asyncio.timeout(PATIENCE_SECONDS):
+            while True:
+                self.news.clear()
+                for event in map(json.loads, (said for said in self.heard if isinstance(said, str))):
+                    if event["kind"] == kind and members.items() <= event.items():
+                        return event
+                await self.news.wait()
+
+    async def ask(self, hub: Hub, number: int, kind: str, **values: Any) -> Any:
+        await hub.answer(self.page, json.dumps({"number": number, "request": {"kind": kind, **values}}))
+        reply = await self.until("reply", number=number)
+        assert reply["fault"] is None
+        return reply["value"]
+
+
+def with_pages(folder: Path, going: Callable[[Hub, Listener, Listener], Awaitable[None]]) -> None:
+    async def whole() -> None:
+        hub, lively, frozen = Hub(ProjectFolder(folder)), Listener(), Listener()
+        lively.listens.set()
+        for listener in (lively, frozen):
+            await hub.welcome(listener.page)
+        try:
+            await going(hub, lively, frozen)
+        finally:
+            for listener in (lively, frozen):
+                hub.leave(listener.page)
+                listener.sending.cancel()
+            hub.close()
+
+    asyncio.run(whole())
+
+
+def of_runs(listener: Listener) -> list[str | bytes]:
+    return [said for said in listener.heard if isinstance(said, bytes) or '"kind":"run_' in said]
+
+
+def test_a_page_that_sleeps_during_a_run_keeps_nobody_waiting_and_hears_it_all_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(outbox_module, "BEHIND_BYTES", 20_000)
+
+    async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
+        document = await lively.ask(hub, 1, "open", example="falling_pendulum")
+        attach = {"number": 1, "request": {"kind": "attach", "document": document}}
+        await hub.answer(frozen.page, json.dumps(attach))
+        before = frozen.outbox._size  # pyright: ignore[reportPrivateUsage]
+        run = await lively.ask(hub, 2, "run", document=document)
+        await lively.until("run_progress", run=run, state="done")
+        await lively.ask(hub, 3, "arrange", document=document, key="1")  # and it can be edited
+        more = frozen.outbox._size - before  # pyright: ignore[reportPrivateUsage]
+        assert sum(map(len, of_runs(lively))) > 200_000
+        assert more < 50_000, "what is told of the run waits on the disk"
+        frozen.listens.set()
+        await frozen.until("run_progress", run=run, state="done")
+        assert of_runs(frozen) == of_runs(lively)
+
+    with_pages(tmp_path, going)
+
+
+def test_a_page_that_never_listens_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outbox_module, "MOST_BYTES", 1_000_000)
+
+    async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
+        document = await lively.ask(hub, 1, "open", example="kr180model")
+        for number in range(100):
+            await hub.answer(
+                frozen.page,
+                json.dumps({"number": number, "request": {"kind": "attach", "document": document}}),
+            )
+            if frozen.outbox.given_up:
+                break
+        assert frozen.outbox.given_up
+        assert frozen.outbox._size == 0  # pyright: ignore[reportPrivateUsage]
+        await lively.ask(hub, 2, "arrange", document=document, key="1")
+
+    with_pages(tmp_path, going)
