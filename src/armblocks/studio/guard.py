@@ -61,10 +61,16 @@ class Keys:
         self.session = session or secrets.token_urlsafe(32)
         self.cookie_name = f"armblocks-{port}"
         self._login: str | None = None
+        self._logins: list[str] = []
+
+    def secrets(self) -> tuple[str, ...]:
+        """All that must not be said to anybody else, also what is not good any more."""
+        return (self.token, self.session, *self._logins)
 
     def new_login(self) -> str:
         """A fresh one-time login; the one before it is void."""
         self._login = secrets.token_urlsafe(32)
+        self._logins.append(self._login)
         return self._login
 
     def spend_login(self, given: str) -> bool:

@@ -16,6 +16,7 @@ from armblocks.studio.guard import Keys
 from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.server import HubToCome, built_page, studio_app
 from armblocks.studio.state_folder import StateFolder
+from armblocks.studio.terminal_log import log_settings
 
 if TYPE_CHECKING:
     from armblocks.studio.hub import Hub
@@ -58,6 +59,7 @@ def serve(
     config = uvicorn.Config(
         app,
         log_level="warning",
+        log_config=log_settings(keys.secrets),
         access_log=False,  # its lines would hold the login link
         server_header=False,
         ws_max_size=MOST_MESSAGE_BYTES,

@@ -1,0 +1,98 @@
+"""The terminal of the studio says no key but the login link, and nothing of what files hold."""
+
+from __future__ import annotations
+
+import json
+import logging
+import logging.config
+import urllib.error
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from armblocks.studio.guard import Keys
+from armblocks.studio.terminal_log import log_settings
+from conftest import Studio
+
+CONTENT = "what-nobody-else-should-read"
+
+
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_: Any) -> None:
+        """What the login answers is looked at, not followed."""
+
+
+def status(address: str, headers: dict[str, str]) -> tuple[int, str]:
+    """Status and cookie of an answer."""
+    asked = urllib.request.Request(address, headers=headers)
+    try:
+        with urllib.request.build_opener(NoRedirect).open(asked, timeout=30) as answer:
+            return answer.status, answer.headers.get("set-cookie", "")
+    except urllib.error.HTTPError as refused:
+        with refused:
+            return refused.code, refused.headers.get("set-cookie", "")
+
+
+def test_the_terminal_shows_no_key_after_the_login_and_no_content(tmp_path: Path) -> None:
+    (tmp_path / "bad.json").write_text('{"blocks": {"' + CONTENT)
+    (tmp_path / "script.m").write_text(f"{CONTENT} = (1")
+    studio = Studio(tmp_path)
+    key = studio.link.partition("key=")[2]
+    code, cookie = status(studio.link, {})
+    assert code == 303
+    cookie = cookie.partition(";")[0]
+    session = cookie.partition("=")[2]
+    assert len(session) > 30
+    for path in ("login?key=" + key, "login?key=" + session, "?key=" + key, "nowhere/" + CONTENT):
+        assert status(studio.address + path, {"cookie": cookie})[0] in (200, 401, 404)
+    assert status(studio.address, {"cookie": cookie, "host": "evil.com"})[0] == 403
+    headers = {"cookie": cookie, "origin": studio.address.rstrip("/")}
+    address = studio.address.replace("http", "ws") + "ws"
+    with connect(address, additional_headers=headers, max_size=None) as page:
+        for number, path in enumerate(("bad.json", "script.m", CONTENT + ".json")):
+            page.send(json.dumps({"number": number, "request": {"kind": "open", "path": path}}))
+            while (said := json.loads(page.recv(timeout=60)))["kind"] != "reply":
+                pass
+            assert said["fault"]["what"]
+        page.send(json.dumps({"number": 9, "request": {"kind": CONTENT}}))
+        page.send(CONTENT)
+        with pytest.raises(ConnectionClosed):
+            while True:
+                page.recv(timeout=60)
+    assert studio.process.stdout is not None
+    output = studio.process.stdout
+    studio.process.terminate()
+    rest = output.read()
+    studio.process.wait(timeout=30)
+    output.close()
+    for secret in (key, session, CONTENT):
+        assert secret not in rest
+
+
+def test_what_breaks_is_said_with_its_place_and_without_words(capsys: pytest.CaptureFixture[str]) -> None:
+    keys = Keys(1)
+    login = keys.new_login()
+    keys.new_login()
+    root = logging.getLogger()
+    before, level = root.handlers[:], root.level
+    try:
+        logging.config.dictConfig(log_settings(keys.secrets))
+        try:
+            raise ValueError(CONTENT) from KeyError(CONTENT)
+        except ValueError:
+            logging.getLogger("armblocks.studio.hub").exception("a request met a defect")
+        logging.getLogger("uvicorn.error").warning("GET /login?key=%s %s %s", login, keys.session, keys.token)
+    finally:
+        root.handlers[:] = before
+        root.setLevel(level)
+    said = capsys.readouterr().err
+    assert "ERROR: a request met a defect" in said
+    assert f'File "{__file__}"' in said
+    assert "ValueError" in said
+    assert "WARNING: GET /login?key=… … …" in said
+    for secret in (CONTENT, *keys.secrets()):
+        assert secret not in said.replace("raise ValueError(CONTENT) from KeyError(CONTENT)", "")
