@@ -123,7 +123,7 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
         with pytest.raises(ArmblocksError, match="no blocks were chosen"):
             await ask("change", document=key, key="1", edit={"kind": "group", "blocks": [], "name": "s"})
         group = {"kind": "group", "blocks": ["error"], "name": "pid"}
-        with pytest.raises(ArmblocksError, match="a block is already named 'pid'"):
+        with pytest.raises(ArmblocksError, match="a block is already named 'PID'"):
             await ask("change", document=key, key="2", edit=group)
         await ask("change", document=key, key="3", edit={**group, "name": "part"})
         await ask("look", document=key, inside=["part"])
