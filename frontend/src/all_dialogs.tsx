@@ -6,6 +6,7 @@ import { RecoveryDialog } from './documents/recovery_dialog'
 import { SaveDialog } from './documents/save_dialog'
 import { Tour } from './documents/tour'
 import { BlockDialog } from './inspector/block_dialog'
+import { MaskDialog } from './inspector/mask_dialog'
 import { Find } from './library/find'
 import { QuickInsert } from './library/quick_insert'
 import { Configuration } from './run/configuration'
@@ -16,6 +17,7 @@ export function AllDialogs() {
   return (
     <>
       <BlockDialog />
+      <MaskDialog />
       <Configuration />
       <QuickInsert />
       <ConnectDialog />

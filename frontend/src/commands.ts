@@ -1,7 +1,7 @@
 import { align, distribute, flip, group, rotate, chosenBlocks } from './canvas/arranging'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
 import { addNote, sheetView } from './canvas/sheet_keys'
-import { openConfiguration, openTour, save, show } from './dialogs'
+import { openConfiguration, openMask, openTour, save, show } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
 import { startOrResume } from './run/top_bar'
 import { alter, ask, look, useStudio } from './store'
@@ -43,6 +43,7 @@ const LIST: Command[] = [
   { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
   { title: 'New diagram', run: () => void ask({ kind: 'new' }) },
   { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
+  { title: 'Edit the mask: parameters of the subsystem or the model', keys: 'Ctrl+M', onSheet: true, possible: () => !useStudio.getState().document?.linked.length, run: () => openMask(chosenBlocks().find(({ opens }) => opens)?.name) },
   { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
   { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
   { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: selected, run: () => void duplicate() },

@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { ask, useStudio } from './store'
 
 /** Every dialog that opens by itself; that of a block opens with `useStudio().edit`, and the tour has its own stops. */
-type Dialog = 'commands' | 'find' | 'keys' | 'insert' | 'connect' | 'configuration' | 'save_as' | 'open' | 'recovery'
+type Dialog = 'commands' | 'find' | 'keys' | 'insert' | 'connect' | 'configuration' | 'mask' | 'save_as' | 'open' | 'recovery'
 
 interface Dialogs {
   open: Dialog | null
@@ -10,12 +10,15 @@ interface Dialogs {
   times: number
   /** What is typed into the lists that are searched. */
   typed: string
+  /** The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the one whose sheet is on the screen. */
+  of: string
+  ofSheet: boolean
   /** Where a new block goes, in screen px; `null` is a free place. */
   at: { x: number; y: number } | null
 }
 
 /** Which dialog is open: known before the dialogs themselves, which come after the first picture of the page. */
-export const useDialogs = create<Dialogs>(() => ({ open: null, times: 0, typed: '', at: null }))
+export const useDialogs = create<Dialogs>(() => ({ open: null, times: 0, typed: '', of: '', ofSheet: false, at: null }))
 
 /** Open a dialog, or close the one that is open. */
 export function show(open: Dialog | null, typed = '', at: Dialogs['at'] = null): void {
@@ -31,6 +34,14 @@ export const openTour = (): void => useTour.setState({ stop: 0 })
 /** Configuration parameters are those of a document. */
 export function openConfiguration(): void {
   if (useStudio.getState().document) show('configuration')
+}
+
+/** The mask of a subsystem on the sheet; without one that of the sheet itself. */
+export function openMask(block?: string): void {
+  const { document } = useStudio.getState()
+  if (!document) return
+  useDialogs.setState({ of: block ?? document.inside.at(-1) ?? '', ofSheet: block === undefined })
+  show('mask')
 }
 
 /** The files of the project folder as they are now, and those used last. */

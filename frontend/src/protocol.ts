@@ -23,6 +23,7 @@ export interface Envelope {
     | Save
     | Ping
     | Files
+    | AskMask
     | AskOutline
     | Copy
     | Find
@@ -108,6 +109,7 @@ export interface Change {
     | SetNotes
     | Rename
     | SetParameters
+    | SetMask
     | KeepTuned
     | LogSignal
     | GroupBlocks
@@ -252,6 +254,37 @@ export interface SetParameters {
   };
 }
 /**
+ * Declare the parameters of a subsystem, or of the sheet itself where no block is named, in this order.
+ *
+ * ``name`` is what its face says; empty leaves that as it is.
+ */
+export interface SetMask {
+  kind: "mask";
+  block?: string;
+  name?: string;
+  /**
+   * @maxItems 200
+   */
+  parameters: MaskParameter[];
+}
+/**
+ * A parameter that a diagram declares. ``default`` as it is typed; ``was``: the name that it had before.
+ *
+ * ``minimum``, ``above`` and ``maximum`` bound its numbers, ``choices`` are what a choice may be.
+ */
+export interface MaskParameter {
+  name: string;
+  was?: string;
+  kind?: "number" | "array" | "integer" | "boolean" | "choice" | "string" | "robot";
+  default: unknown;
+  unit?: string;
+  doc?: string;
+  minimum?: number | null;
+  above?: number | null;
+  maximum?: number | null;
+  choices?: string[];
+}
+/**
  * Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them.
  */
 export interface KeepTuned {
@@ -367,6 +400,15 @@ export interface Ping {
  */
 export interface Files {
   kind: "files";
+}
+/**
+ * Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it.
+ */
+export interface AskMask {
+  kind: "ask_mask";
+  document: string;
+  inside?: string[];
+  block?: string;
 }
 /**
  * Ask for the tree of sheets, an :class:`Outline`.
@@ -719,7 +761,7 @@ export interface ServerMessage {
     | RunProgress
     | RobotShown
     | RobotOpened;
-  values?: Opening | RobotTables | Readings | Outline | Found | null;
+  values?: Opening | RobotTables | Readings | Outline | Found | SetMask | null;
 }
 /**
  * The answer to a request: ``fault`` where it was refused.

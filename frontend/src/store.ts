@@ -320,6 +320,12 @@ export async function change(edit: Edit): Promise<unknown> {
   return version
 }
 
+/** Carry out an edit of the sheet at a path of subsystems; a refusal is thrown to who asks. */
+export async function attempt(edit: Edit, inside: string[]): Promise<void> {
+  const { document } = useStudio.getState()
+  if (document) await line.ask({ kind: 'change', ...alteration(document), inside, edit })
+}
+
 /** Take the last step back, do it again, or lay the blocks of this sheet out anew. */
 export function alter(kind: 'undo' | 'redo' | 'arrange'): void {
   const { document } = useStudio.getState()

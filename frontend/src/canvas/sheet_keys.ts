@@ -79,8 +79,9 @@ export function useSheetKeys(
     const ours = focused === window.document.body || sheet.current?.contains(focused)
     if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return
     const command = commandOf(event, true)
-    if (command) command.run()
-    else if (event.ctrlKey || event.metaKey || event.altKey || !plain(event)) return
+    if (command) {
+      if (command.possible?.() ?? true) command.run()
+    } else if (event.ctrlKey || event.metaKey || event.altKey || !plain(event)) return
     event.preventDefault()
     event.stopPropagation()
   }

@@ -3,6 +3,7 @@ import { useEffect, useMemo, useState } from 'react'
 import { Refusal } from '../connection'
 import type { ParameterRule, SheetBlock } from '../protocol'
 import { change, line, look, useStudio } from '../store'
+import { openMask } from '../dialogs'
 import { valueText } from './value_text'
 
 const CHECK_DELAY_MS = 200
@@ -81,16 +82,16 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
           {rules.length === 0 && <Text size="sm">This block has no parameters.</Text>}
           <Group justify="flex-end" gap="xs">
             {block.opens && (
-              <Button
-                variant="subtle"
-                mr="auto"
-                onClick={() => {
-                  onClose()
-                  look([...(useStudio.getState().document?.inside ?? []), block.name])
-                }}
-              >
-                Look under the mask
-              </Button>
+              <Group gap={0} mr="auto">
+                <Button variant="subtle" px="xs" onClick={() => (onClose(), look([...(useStudio.getState().document?.inside ?? []), block.name]))}>
+                  Look under the mask
+                </Button>
+                {!block.link && (
+                  <Button variant="subtle" px="xs" onClick={() => (onClose(), openMask(block.name))}>
+                    Edit the mask
+                  </Button>
+                )}
+              </Group>
             )}
             <Button variant="default" onClick={onClose}>
               Cancel

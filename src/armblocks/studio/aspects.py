@@ -34,7 +34,10 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
     for note in before.notes.keys() | after.notes.keys():
         if before.notes.get(note) != after.notes.get(note):
             found.add((*path, "/", note))
-    for of_whole in ("name", "description", "settings", "extras"):
+    for name in before.mask_values.keys() | after.mask_values.keys():
+        if before.mask_values.get(name) != after.mask_values.get(name):
+            found.add((*path, "/", f"mask parameter {name}"))
+    for of_whole in ("name", "description", "settings", "extras", "mask"):
         if getattr(before, of_whole) != getattr(after, of_whole):
             found.add((*path, "/", of_whole))
     return found

@@ -144,6 +144,36 @@ class SetParameters(Message):
     values: dict[str, Any]
 
 
+class MaskParameter(Message):
+    """A parameter that a diagram declares. ``default`` as it is typed; ``was``: the name that it had before.
+
+    ``minimum``, ``above`` and ``maximum`` bound its numbers, ``choices`` are what a choice may be.
+    """
+
+    name: Annotated[str, Field(max_length=100)]
+    was: str = ""
+    kind: Literal["number", "array", "integer", "boolean", "choice", "string", "robot"] = "number"
+    default: Any
+    unit: Annotated[str, Field(max_length=40)] = ""
+    doc: Annotated[str, Field(max_length=2000)] = ""
+    minimum: float | None = None
+    above: float | None = None
+    maximum: float | None = None
+    choices: list[str] = Field(default_factory=list[str])
+
+
+class SetMask(Message):
+    """Declare the parameters of a subsystem, or of the sheet itself where no block is named, in this order.
+
+    ``name`` is what its face says; empty leaves that as it is.
+    """
+
+    kind: Literal["mask"] = "mask"
+    block: str = ""
+    name: Annotated[str, Field(max_length=100)] = ""
+    parameters: Annotated[list[MaskParameter], Field(max_length=200)]
+
+
 class LogSignal(Message):
     """Log an output ``block/port``, so that it is seen without a Scope; or log it no longer."""
 
@@ -198,6 +228,7 @@ Edit = Annotated[
     | SetNotes
     | Rename
     | SetParameters
+    | SetMask
     | KeepTuned
     | LogSignal
     | GroupBlocks
@@ -237,6 +268,8 @@ def summary(edit: Edit) -> str:
             return f"rename {edit.block}"
         case SetParameters():
             return f"change {edit.block}"
+        case SetMask():
+            return f"mask {edit.block}" if edit.block else "mask the model"
         case KeepTuned():
             return f"keep {_counted(len(edit.values), 'tuned value')}"
         case LogSignal():

@@ -48,12 +48,14 @@ from armblocks.studio.edit_messages import (
     Place,
     RemoveBlocks,
     Rename,
+    SetMask,
     SetNotes,
     SetParameters,
     SetSettings,
     SheetNote,
     Wire,
 )
+from armblocks.studio.mask_edits import with_mask
 from armblocks.studio.nesting import check_free, grouped, unlinked, with_block
 from armblocks.studio.parameter_values import ResolveRobot, parameter_value, tuned_value
 from armblocks.studio.placing import placed
@@ -94,6 +96,8 @@ def applied(
             return _rename(edit, diagram)
         case SetParameters():
             return _set_parameters(edit, diagram, resolve_robot)
+        case SetMask():
+            return with_mask(edit, diagram, resolve_robot)
         case KeepTuned():
             return with_parameters(
                 diagram, {path: tuned_value(value, path) for path, value in edit.values.items()}

@@ -27,6 +27,7 @@ from armblocks.studio import messages as say
 from armblocks.studio.check import check
 from armblocks.studio.clipping import clipped
 from armblocks.studio.file_kind import Performed
+from armblocks.studio.mask_edits import mask_of
 from armblocks.studio.nesting import inside, linked_part, with_robot
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 from armblocks.studio.outline import find, outline
@@ -153,6 +154,10 @@ class Hub:
                 return {"files": self.folder.files(), "recent": self._recent()}
             case say.AskOutline():
                 return outline(self.documents[request.document].document.diagram)
+            case say.AskMask():
+                path = [*request.inside, request.block] if request.block else request.inside
+                found = mask_of(inside(self.documents[request.document].document.diagram, path))
+                return found.model_copy(update={"block": request.block})
             case say.Copy():
                 level = inside(self.documents[request.document].document.diagram, request.inside)
                 return clipped(level, request.blocks, request.notes, self.resolve_robot, self.folder.root)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from armblocks.studio.alteration import Alteration
-from armblocks.studio.edit_messages import Edit, Message, Place, SheetNote, Wire
+from armblocks.studio.edit_messages import Edit, Message, Place, SetMask, SheetNote, Wire
 from armblocks.studio.robot_messages import (
     Opening,
     Readings,
@@ -375,6 +375,15 @@ class Copy(Message):
     notes: list[str] = Field(default_factory=list[str])
 
 
+class AskMask(Message):
+    """Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it."""
+
+    kind: Literal["ask_mask"] = "ask_mask"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    block: str = ""
+
+
 class Find(Message):
     """Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`."""
 
@@ -502,6 +511,7 @@ Request = Annotated[
     | Save
     | Ping
     | Files
+    | AskMask
     | AskOutline
     | Copy
     | Find
@@ -662,5 +672,5 @@ class ServerMessage(Message):
     """Only for the page's types: everything that the server sends as text."""
 
     event: Event
-    values: Opening | RobotTables | Readings | Outline | Found | None = None
+    values: Opening | RobotTables | Readings | Outline | Found | SetMask | None = None
     """Some of what replies carry as their value."""
