@@ -1,10 +1,13 @@
-import { createTheme } from '@mantine/core'
+import { Alert, createTheme, Modal } from '@mantine/core'
 
 /** Colours, type and corners of the component library, as everywhere in armblocks. */
 export const theme = createTheme({
   fontFamily: 'var(--font)',
   fontFamilyMonospace: 'var(--mono)',
   colors: {
+    // The greys of the component library are neutral: ours lean to warm in the light, to blue in the dark.
+    gray: ['#f6f4f1', '#f1eeea', '#e9e5e0', '#ddd7d0', '#cfc9c1', '#a39c92', '#7d756b', '#635d55', '#45403a', '#23211e'],
+    dark: ['#e8ebf0', '#c9d0da', '#a3adba', '#7d8794', '#3d4652', '#2a313b', '#222831', '#1b2028', '#151a20', '#12151a'],
     accent: ['#fff1e6', '#ffe0c7', '#ffc08f', '#ff9a4d', '#f07d24', '#d9650d', '#c25603', '#b04a00', '#8f3c00', '#702f00'],
   },
   respectReducedMotion: true,
@@ -12,8 +15,22 @@ export const theme = createTheme({
   primaryShade: { light: 7, dark: 3 },
   autoContrast: true,
   defaultRadius: 'sm',
+<<<<<<< HEAD
   // The page never scrolls; to forbid it anyway would style the whole of it anew for each dialog.
   // The colours of titles and labels on their own tint are too pale to read.
   components: { Modal: { defaultProps: { lockScroll: false } }, Alert: { styles: { title: { color: 'var(--ink)' } } } },
+=======
+  components: {
+    // The colours of titles and labels on their own tint are too pale to read; the tints are those of every message.
+    Alert: Alert.extend({
+      styles: { title: { color: 'var(--ink)' } },
+      vars: (_theme, { color }) => {
+        const kind = color === 'red' ? 'error' : color === 'blue' || color === 'gray' ? 'muted' : 'warning'
+        return { root: { '--alert-bg': kind === 'muted' ? 'var(--sunken)' : `var(--${kind}-wash)`, '--alert-color': `var(--${kind})` } }
+      },
+    }),
+    Modal: Modal.extend({ defaultProps: { closeButtonProps: { 'aria-label': 'Close' } } }),
+  },
+>>>>>>> 67d6227 (Dark buttons can be read; dialogs keep their buttons in sight, are named and closed for all; the sheet fits beside its tools and names stand clear of wires)
   fontSizes: { xs: '11px', sm: '12px', md: '13px', lg: '15px', xl: '18px' },
 })

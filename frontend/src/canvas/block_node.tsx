@@ -4,7 +4,7 @@ import { Handle, Position, type Node, type NodeProps } from '@xyflow/react'
 import { memo, useState } from 'react'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
 import { change } from '../store'
-import { standing } from './sheet_layout'
+import { nameSide } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
 
@@ -58,7 +58,7 @@ function Port({ spot, output, faulty }: { spot: PortSpot; output: boolean; fault
   )
 }
 
-/** The block's name below it; a double click edits it in place. */
+/** The block's name; a double click edits it in place. */
 function Name({ block }: { block: SheetBlock }) {
   const [editing, setEditing] = useState(false)
   const done = (name: string) => {
@@ -68,7 +68,7 @@ function Name({ block }: { block: SheetBlock }) {
   if (!editing)
     return (
       <div
-        className={standing(block) ? 'name beside' : 'name'}
+        className={`name ${nameSide(block)}`}
         onDoubleClick={(event) => {
           event.stopPropagation()
           setEditing(true)
@@ -79,7 +79,7 @@ function Name({ block }: { block: SheetBlock }) {
     )
   return (
     <input
-      className={standing(block) ? 'name nodrag beside' : 'name nodrag'}
+      className={`name nodrag ${nameSide(block)}`}
       aria-label={`Name of ${block.name}`}
       autoFocus
       defaultValue={block.name}

@@ -5,7 +5,6 @@ import {
   BackgroundVariant,
   ConnectionLineType,
   Controls,
-  MiniMap,
   ReactFlow,
   ReactFlowProvider,
   useReactFlow,
@@ -21,10 +20,11 @@ import { ArrangeBar } from './arrange_bar'
 import { BlockNode } from './block_node'
 import { BLOCK_TYPE, GRID, insertBlock } from './insert'
 import { NoteNode } from './note_node'
+import { Overview } from './overview'
 import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from './rewiring'
 import { SheetGraph, type SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
-import { SheetRoutes, wireKey, type Places } from './sheet_layout'
+import { FIT, SheetRoutes, wireKey, type Places } from './sheet_layout'
 import { Welcome } from './welcome'
 import { useBending, WireEdge, type WireEdgeType } from './wire_edge'
 
@@ -209,7 +209,7 @@ function Sheet() {
     let timer = 0
     const sized = new ResizeObserver(() => {
       clearTimeout(timer)
-      timer = window.setTimeout(() => void flow.fitView({ padding: 0.08, maxZoom: 1.25 }), SETTLE_MS)
+      timer = window.setTimeout(() => void flow.fitView(FIT), SETTLE_MS)
     })
     const leave = () => {
       clearTimeout(timer)
@@ -267,13 +267,13 @@ function Sheet() {
         minZoom={0.1}
         maxZoom={4}
         fitView
-        fitViewOptions={{ padding: 0.08, maxZoom: 1.25 }}
+        fitViewOptions={FIT}
         aria-label="Diagram"
       >
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
-        {!empty && <Controls showInteractive={false} />}
+        {!empty && <Controls showInteractive={false} fitViewOptions={FIT} />}
         <WireValues />
-        {Object.keys(blocks).length > 40 && <MiniMap pannable zoomable />}
+        {Object.keys(blocks).length > 40 && <Overview blocks={blocks} />}
       </ReactFlow>
       <ArrangeBar />
       {empty && level === '' && <Welcome />}

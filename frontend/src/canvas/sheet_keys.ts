@@ -7,7 +7,7 @@ import { chosenBlocks } from './arranging'
 import { move, openBlock } from './canvas'
 import { editNote, writeNote } from './note_node'
 import type { SheetNode } from './sheet_graph'
-import { wireKey, type Places } from './sheet_layout'
+import { FIT, wireKey, type Places } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
 const NUDGE = 5
@@ -91,7 +91,7 @@ export function useSheetKeys(
     return () => removeEventListener('keydown', onKeyDown)
   })
   useEffect(() => {
-    sheetView.fit = () => void flow.fitView({ duration: 150 })
+    sheetView.fit = () => void flow.fitView({ ...FIT, duration: 150 })
     sheetView.middle = () => {
       const box = sheet.current!.getBoundingClientRect()
       return flow.screenToFlowPosition({ x: box.x + box.width / 2, y: box.y + box.height / 2 })

@@ -1,3 +1,4 @@
+import type { FitViewOptions } from '@xyflow/react'
 import type { SheetBlock, Wire } from '../protocol'
 import { route, type Net, type Obstacle, type RoutedNet, type WireEnd } from './router'
 
@@ -21,20 +22,28 @@ export function nameWidth(name: string): number {
 /** Blocks by name, at the places where they are drawn now (which a drag may have changed). */
 export type Places = Record<string, { x: number; y: number }>
 
-/** Whether signals run through a block from top to bottom: its name then stands beside it. */
-export const standing = ({ place }: SheetBlock): boolean => (place.rotation ?? 0) % 180 !== 0
+/** Where a block's name stands: where no wire leaves, as in the drawings of reports. */
+export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'beside' | 'above' {
+  if ((place.rotation ?? 0) % 180 !== 0) return 'beside' // signals run from top to bottom
+  return inputs.some(({ y }) => y >= height) ? 'above' : 'below' // wires enter a round sum from below
+}
+
+/** How the sheet is fitted into its panel: nothing of it lies under the buttons at the left, and the lowest names are seen. */
+export const FIT: FitViewOptions = { padding: { top: '16px', right: '24px', bottom: '32px', left: '56px' }, maxZoom: 1.25 }
 
 function obstacle(block: SheetBlock, at: { x: number; y: number }): Obstacle {
   const width = nameWidth(block.name)
-  const label = standing(block)
-    ? ([at.x + block.width + 5, at.y + block.height / 2 - 8, width, NAME_ROOM - 4] as const)
-    : ([at.x + (block.width - width) / 2, at.y + block.height + 2, width, NAME_ROOM - 4] as const)
+  const labels = {
+    beside: [at.x + block.width + 5, at.y + block.height / 2 - 8, width, NAME_ROOM - 4],
+    above: [at.x + 0.78 * block.width, at.y - NAME_SIZE - 2, width, NAME_SIZE + 3],
+    below: [at.x + (block.width - width) / 2, at.y + block.height + 2, width, NAME_ROOM - 4],
+  } as const
   return {
     x: at.x,
     y: at.y,
     width: block.width,
     height: block.height,
-    label,
+    label: labels[nameSide(block)],
   }
 }
 

@@ -10,7 +10,7 @@ export function OpenDialog() {
   const opened = useDialogs((s) => s.open === 'open')
   const times = useDialogs((s) => s.times)
   return (
-    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Open" size="lg">
+    <Modal opened={opened} onClose={() => show(null)} title="Open" size="lg">
       <Choice key={times} />
     </Modal>
   )

@@ -22,7 +22,7 @@ export function RecoveryDialog() {
     if (!recoveries.length && useDialogs.getState().open === 'recovery') show(null)
   }, [recoveries, offered])
   return (
-    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Work that was not saved" size="lg">
+    <Modal opened={opened} onClose={() => show(null)} title="Work that was not saved" size="lg">
       <Stack gap="sm">
         <Text size="sm" c="dimmed">
           The studio ended before these were saved; its journal has kept them. No file has been changed. What you leave for later

@@ -11,7 +11,7 @@ export function SaveDialog() {
   const opened = useDialogs((s) => s.open === 'save_as')
   const times = useDialogs((s) => s.times)
   return (
-    <Modal closeButtonProps={{ 'aria-label': 'Close' }} opened={opened} onClose={() => show(null)} title="Save as" size="md">
+    <Modal opened={opened} onClose={() => show(null)} title="Save as" size="md">
       <SaveAs key={times} />
     </Modal>
   )

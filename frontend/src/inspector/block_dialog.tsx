@@ -80,7 +80,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
             />
           ))}
           {rules.length === 0 && <Text size="sm">This block has no parameters.</Text>}
-          <Group justify="flex-end" gap="xs">
+          <Group justify="flex-end" gap="xs" className="dialog-actions">
             {block.opens && (
               <Group gap={0} mr="auto">
                 <Button variant="subtle" px="xs" onClick={() => (onClose(), look([...(useStudio.getState().document?.inside ?? []), block.name]))}>

@@ -35,7 +35,7 @@ export function PickList({ opened, onClose, label, placeholder, list, typed, onT
     onPick(index)
   }
   return (
-    <Modal opened={opened} onClose={onClose} withCloseButton={false} size="md" padding="xs" yOffset="16vh" title={undefined}>
+    <Modal opened={opened} onClose={onClose} withCloseButton={false} size="md" padding="xs" yOffset="16vh" attributes={{ content: { 'aria-label': label } }}>
       <TextInput
         aria-label={label}
         placeholder={placeholder}

@@ -34,7 +34,7 @@ export default function RobotView() {
     }
     // What the server says of the block is said anew when its robot changes, also where its name stays.
   }, [document, inside, block, said])
-  if (!block) return <p className="empty">The model has no robot: add a Robot Plot to see its arm here.</p>
+  if (!block) return <p className="empty">This sheet has no robot: add a Robot Plot to see its arm here.</p>
   if (!shown || !document) return <p className="empty">Loading the robot …</p>
   return <RunStage document={document} inside={inside} block={block} {...shown} />
 }

@@ -11,7 +11,7 @@ export function Configuration() {
   const opened = useDialogs((s) => s.open === 'configuration')
   const close = () => show(null)
   return (
-    <Modal opened={opened} onClose={close} closeButtonProps={{ 'aria-label': 'Close' }} title={<b>Configuration parameters</b>} size="md">
+    <Modal opened={opened} onClose={close} title={<b>Configuration parameters</b>} size="md">
       {opened && <Form onClose={close} />}
     </Modal>
   )
@@ -88,7 +88,7 @@ function Form({ onClose }: { onClose: () => void }) {
             {run.reason}
           </Alert>
         )}
-        <Group justify="flex-end" gap="xs">
+        <Group justify="flex-end" gap="xs" className="dialog-actions">
           <Button variant="default" onClick={onClose}>
             Cancel
           </Button>

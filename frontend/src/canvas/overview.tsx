@@ -1,0 +1,22 @@
+import { MiniMap, useStore, type ReactFlowState } from '@xyflow/react'
+import { useCallback, useMemo } from 'react'
+import type { SheetBlock } from '../protocol'
+
+/** A small map of a large sheet, as long as some of the sheet is out of sight. */
+export function Overview({ blocks }: { blocks: Record<string, SheetBlock> }) {
+  const [left, top, right, low] = useMemo(() => {
+    const all = Object.values(blocks)
+    return [
+      Math.min(...all.map(({ place }) => place.x)),
+      Math.min(...all.map(({ place }) => place.y)),
+      Math.max(...all.map(({ place, width }) => place.x + width)),
+      Math.max(...all.map(({ place, height }) => place.y + height)),
+    ]
+  }, [blocks])
+  const beyond = useCallback(
+    ({ transform: [x, y, zoom], width, height }: ReactFlowState) =>
+      left * zoom + x < 0 || top * zoom + y < 0 || right * zoom + x > width || low * zoom + y > height,
+    [left, top, right, low],
+  )
+  return useStore(beyond) && <MiniMap pannable zoomable ariaLabel="Map of the sheet" style={{ width: 160, height: 110 }} />
+}
