@@ -182,5 +182,17 @@ def test_copied_blocks_travel_as_text(page: Page) -> None:
     expect(block(page, "speed 2")).to_be_visible()
 
 
-def test_axe_finds_nothing_serious(page: Page) -> None:
-    axe(page)
+def test_axe_finds_nothing_serious_in_the_light_and_in_the_dark(page: Page) -> None:
+    dialog = page.get_by_role("dialog")
+    for theme in ("light", "dark"):
+        page.emulate_media(color_scheme=theme)
+        expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", theme)
+        axe(page)
+        for opens in ("Control+k", "?", "Enter"):
+            block(page, "jtraj").focus()
+            page.keyboard.press(opens)
+            expect(dialog).to_be_visible()
+            axe(page)
+            page.keyboard.press("Escape")
+            expect(dialog).to_be_hidden()
+            expect(block(page, "jtraj")).to_be_focused()  # who worked with the keys goes on where they were

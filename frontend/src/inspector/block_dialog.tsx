@@ -19,6 +19,13 @@ export function BlockDialog() {
 
 function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) {
   const kind = useStudio((s) => s.library.get(block.type))
+  const [before] = useState(() => document.activeElement)
+  useEffect(
+    () => () => {
+      if (before instanceof HTMLElement) before.focus({ preventScroll: true })
+    },
+    [before],
+  )
   const rules = useMemo(() => [...(kind?.parameters ?? []), ...block.mask], [block, kind])
   const start = useMemo(
     () => Object.fromEntries(rules.map((rule) => [rule.name, block.formulas[rule.name] ?? valueText(valueOf(block, rule))])),
