@@ -1,4 +1,4 @@
-import { Alert, createTheme, Modal } from '@mantine/core'
+import { Alert, createTheme, Menu, Modal } from '@mantine/core'
 
 /** Colours, type and corners of the component library, as everywhere in armblocks. */
 export const theme = createTheme({
@@ -29,6 +29,8 @@ export const theme = createTheme({
         return { root: { '--alert-bg': kind === 'muted' ? 'var(--sunken)' : `var(--${kind}-wash)`, '--alert-color': `var(--${kind})` } }
       },
     }),
+    // A stop for the focus before the first entry is no entry; the arrows find the entries without it.
+    Menu: Menu.extend({ defaultProps: { withInitialFocusPlaceholder: false } }),
     Modal: Modal.extend({ defaultProps: { closeButtonProps: { 'aria-label': 'Close' } } }),
   },
 >>>>>>> 67d6227 (Dark buttons can be read; dialogs keep their buttons in sight, are named and closed for all; the sheet fits beside its tools and names stand clear of wires)
