@@ -15,11 +15,6 @@ export const theme = createTheme({
   primaryShade: { light: 7, dark: 3 },
   autoContrast: true,
   defaultRadius: 'sm',
-<<<<<<< HEAD
-  // The page never scrolls; to forbid it anyway would style the whole of it anew for each dialog.
-  // The colours of titles and labels on their own tint are too pale to read.
-  components: { Modal: { defaultProps: { lockScroll: false } }, Alert: { styles: { title: { color: 'var(--ink)' } } } },
-=======
   components: {
     // The colours of titles and labels on their own tint are too pale to read; the tints are those of every message.
     Alert: Alert.extend({
@@ -31,8 +26,8 @@ export const theme = createTheme({
     }),
     // A stop for the focus before the first entry is no entry; the arrows find the entries without it.
     Menu: Menu.extend({ defaultProps: { withInitialFocusPlaceholder: false } }),
-    Modal: Modal.extend({ defaultProps: { closeButtonProps: { 'aria-label': 'Close' } } }),
+    // The page never scrolls; to forbid it anyway would style the whole of it anew for each dialog.
+    Modal: Modal.extend({ defaultProps: { closeButtonProps: { 'aria-label': 'Close' }, lockScroll: false } }),
   },
->>>>>>> 67d6227 (Dark buttons can be read; dialogs keep their buttons in sight, are named and closed for all; the sheet fits beside its tools and names stand clear of wires)
   fontSizes: { xs: '11px', sm: '12px', md: '13px', lg: '15px', xl: '18px' },
 })
