@@ -9,7 +9,7 @@ export function Shortcuts() {
   const opened = useDialogs((s) => s.open === 'keys')
   const called = commands().flatMap(({ keys, title }): [string, string][] => (keys ? [[keys, title]] : []))
   return (
-    <Modal opened={opened} onClose={() => show(null)} title="Keys" size="lg">
+    <Modal opened={opened} onClose={() => show(null)} title={<b>Keys</b>} size="lg">
       <Table className="keys" aria-label="Keys">
         {[{ place: 'Commands', keys: called }, ...KEYS].map(({ place, keys }) => (
           <Fragment key={place}>

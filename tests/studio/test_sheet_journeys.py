@@ -317,6 +317,45 @@ def test_the_sheet_is_exported_and_the_run_reported(sheet: Page) -> None:
     report.close()
 
 
+def picture(page: Page, title: str) -> str:
+    """What the picture of a scope shows, as SVG."""
+    page.get_by_role("button", name=f"Export {title}").click()
+    with page.expect_download() as waiting:
+        page.get_by_role("menuitem", name="Picture as SVG").click()
+    expect(page.get_by_role("menu")).to_be_hidden()
+    return Path(waiting.value.path()).read_text()
+
+
+def test_the_values_of_one_scope_are_zoomed_moved_and_shown_whole_again(sheet: Page) -> None:
+    sheet.keyboard.press("Control+Enter")
+    expect(sheet.locator(".run-state")).to_contain_text("done", ignore_case=True)
+    axis = sheet.locator(".chart .values-axis").first
+    title = sheet.locator(".chart figcaption b").first.inner_text()
+    shown_whole = sheet.get_by_role("button", name=f"Show all values of {title}")
+    expect(shown_whole).to_have_count(0)
+    whole = picture(sheet, title)
+    x, y = middle(axis)
+    sheet.mouse.move(x, y)
+    sheet.mouse.wheel(0, -100)
+    expect(shown_whole).to_be_visible()
+    zoomed = picture(sheet, title)
+    sheet.mouse.move(x, y)
+    sheet.mouse.down()
+    sheet.mouse.move(x, y + 12, steps=3)
+    sheet.mouse.up()
+    moved = picture(sheet, title)
+    assert len({whole, zoomed, moved}) == 3
+    expect(sheet.get_by_role("button", name="Show the whole run")).to_be_disabled()  # the time is as it was
+    shown_whole.click()
+    expect(shown_whole).to_have_count(0)
+    assert picture(sheet, title) == whole
+    sheet.mouse.move(x, y)
+    sheet.mouse.wheel(0, 100)
+    expect(shown_whole).to_be_visible()
+    axis.dblclick()
+    expect(shown_whole).to_have_count(0)
+
+
 DROPS = """async () => {
     // Each kind is taken from its own entry in the library and let go on the sheet.
     const entries = [...document.querySelectorAll('.palette .kind')]

@@ -55,7 +55,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
           </Text>
         </Group>
       }
-      size="md"
+      size={block.opens ? 580 : 'md'}
     >
       <form
         onSubmit={(event) => {

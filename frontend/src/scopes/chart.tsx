@@ -1,10 +1,10 @@
 import { ActionIcon, Menu } from '@mantine/core'
-import { IconDownload } from '@tabler/icons-react'
+import { IconArrowsVertical, IconDownload } from '@tabler/icons-react'
 import { useRef, useState } from 'react'
 import { useRuns } from '../run/runs'
 import { saveCsv, savePng, saveSvg } from './export'
 import { MeasureTable } from './measure_table'
-import { Plot, type PlotHandle } from './plot'
+import { Plot, type PlotHandle, type Values } from './plot'
 import type { Trace } from './trace'
 import { useWindow } from './window'
 import { XyPlot } from './xy_plot'
@@ -12,6 +12,7 @@ import { XyPlot } from './xy_plot'
 /** A plot with its title, its legend (a click hides a trace), its exports, and the measures beside it. */
 export function Chart({ title, traces, path = false, band }: { title: string; traces: Trace[]; path?: boolean; band?: number }) {
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
+  const [values, setValues] = useState<Values | null>(null)
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
   const stride = useRuns((s) => s.runs.at(-1)?.stride ?? 1)
   const handle = useRef<PlotHandle>(null)
@@ -39,6 +40,11 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
               </button>
             ))}
         </span>
+        {values && (
+          <ActionIcon className="all-values" variant="light" color="accent" size="xs" aria-label={`Show all values of ${title}`} title="Show all values" onClick={() => setValues(null)}>
+            <IconArrowsVertical size={13} />
+          </ActionIcon>
+        )}
         <Menu position="bottom-end" shadow="md">
           <Menu.Target>
             <ActionIcon className="more" variant="subtle" color="gray" size="xs" aria-label={`Export ${title}`}>
@@ -53,7 +59,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
         </Menu>
       </figcaption>
       <div className="with-measures">
-        {path ? <XyPlot traces={traces} title={title} handle={handle} /> : <Plot traces={traces} hidden={hidden} title={title} handle={handle} {...(band === undefined ? {} : { band })} />}
+        {path ? <XyPlot traces={traces} title={title} handle={handle} /> : <Plot traces={traces} hidden={hidden} title={title} handle={handle} values={values} onValues={setValues} {...(band === undefined ? {} : { band })} />}
         {measured && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
       </div>
     </figure>

@@ -29,7 +29,12 @@ interface Props {
   handle?: React.RefObject<PlotHandle | null>
   /** A band about zero: the tolerance of a difference. */
   band?: number
+  /** The values that are seen, in the unit of the signals; `null` is all of them. */
+  values: Values | null
+  onValues: (values: Values | null) => void
 }
+
+export type Values = [low: number, high: number]
 
 /** Unit and factor of the vertical axis: shared by all traces, or none. */
 function axisReading(traces: Trace[], drawn: Drawn): Reading {
@@ -62,8 +67,10 @@ function scaled(drawn: Drawn, factor: number): Drawn {
 }
 
 /** Traces over time. All such plots share zoom, measuring cursors and the instant that is shown. */
-export function Plot({ traces, hidden, title, handle, band }: Props) {
+export function Plot({ traces, hidden, title, handle, band, values, onValues }: Props) {
   const box = useRef<HTMLDivElement>(null)
+  const held = useRef({ values, onValues })
+  held.current = { values, onValues }
   const scheme = useComputedColorScheme('light')
   const shown = traces.filter(({ key }) => !hidden.has(key))
   const identity = shown.map(({ key, tone, dash }) => `${key} ${tone} ${dash.join()}`).join('\n')
@@ -71,6 +78,7 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
     const element = box.current
     if (!element) return
     let unit = ''
+    let factor = 1
     let drawn: Drawn = [new Float64Array(0)]
     const axis = { stroke: colour('muted'), grid: { stroke: colour('grid'), width: 1 }, ticks: { stroke: colour('grid'), width: 1 }, font: FONT, labelFont: FONT, labelSize: 16, labelGap: 0 }
     const plot = new uPlot(
@@ -100,7 +108,7 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
       [[], ...shown.map(() => [])] as uPlot.AlignedData,
       element,
     )
-    const leave = listen(plot)
+    const leave = [listen(plot), listenAtValues(plot, (next) => held.current.onValues(next && [next[0] / factor, next[1] / factor]))]
     let known: Extremes | undefined
     let returns = 0
     let seen = ''
@@ -110,7 +118,7 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
       frameHandle = requestAnimationFrame(frame)
       const [from, to] = shownWindow()
       const width = Math.max(Math.floor(plot.bbox.width / devicePixelRatio), 10)
-      const now = `${samples.version} ${from} ${to} ${width} ${useUnits.getState().radians}`
+      const now = `${samples.version} ${from} ${to} ${width} ${useUnits.getState().radians} ${String(held.current.values)}`
       const marks = `${useCursor.getState().time} ${String(useWindow.getState().cursors)} ${useRuns.getState().runs.at(-1)?.tunings.length}`
       if (now !== seen) {
         seen = now
@@ -121,12 +129,13 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
         returns = samples.returns
         const found = axisReading(shown, raw)
         unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
-        drawn = scaled(raw, found.factor)
-        const [low, high] = rangeOf(drawn, from, to)
+        factor = found.factor
+        drawn = scaled(raw, factor)
+        const [low, high] = held.current.values?.map((value) => value * factor) ?? rangeOf(drawn, from, to)
         plot.batch(() => {
           plot.setData(drawn as unknown as uPlot.AlignedData, false)
           plot.setScale('x', { min: from, max: to })
-          plot.setScale('y', { min: low, max: high })
+          plot.setScale('y', { min: low!, max: high! })
         })
       } else if (marks !== lines) plot.redraw(false, false)
       lines = marks
@@ -153,7 +162,7 @@ export function Plot({ traces, hidden, title, handle, band }: Props) {
     return () => {
       cancelAnimationFrame(frameHandle)
       sized.disconnect()
-      leave()
+      for (const one of leave) one()
       plot.destroy()
     }
     // eslint-disable-next-line react-hooks/exhaustive-deps
@@ -237,6 +246,49 @@ function listen(plot: uPlot): () => void {
     over.removeEventListener('wheel', wheel)
     over.removeEventListener('pointerdown', down)
     over.removeEventListener('pointermove', hover)
+  }
+}
+
+const ZOOM = 1.25
+
+/** On the axis of values the wheel zooms about the pointer, dragging moves, and a double click shows all values. */
+function listenAtValues(plot: uPlot, show: (values: Values | null) => void): () => void {
+  const axis = plot.root.querySelectorAll<HTMLElement>('.u-axis')[1]
+  if (!axis) return () => {}
+  axis.classList.add('values-axis')
+  axis.title = 'Wheel: zoom the values. Drag: move them. Double click: show all.'
+  const seen = (): Values => [plot.scales['y']?.min ?? 0, plot.scales['y']?.max ?? 1]
+  const valueOf = (event: MouseEvent) => plot.posToVal(event.clientY - plot.over.getBoundingClientRect().top, 'y')
+  const wheel = (event: WheelEvent) => {
+    event.preventDefault()
+    const by = event.deltaY > 0 ? ZOOM : 1 / ZOOM
+    const about = valueOf(event)
+    show(seen().map((end) => about + by * (end - about)) as Values)
+  }
+  const down = (event: PointerEvent) => {
+    if (event.button !== 0) return
+    const begun = seen()
+    const start = event.clientY
+    axis.setPointerCapture(event.pointerId)
+    const move = (moved: PointerEvent) => {
+      const by = ((moved.clientY - start) / plot.over.clientHeight) * (begun[1] - begun[0])
+      if (Math.abs(moved.clientY - start) >= CLICK_PX) show([begun[0] + by, begun[1] + by])
+    }
+    const up = () => {
+      axis.removeEventListener('pointermove', move)
+      axis.removeEventListener('pointerup', up)
+    }
+    axis.addEventListener('pointermove', move)
+    axis.addEventListener('pointerup', up)
+  }
+  const all = () => show(null)
+  axis.addEventListener('wheel', wheel, { passive: false })
+  axis.addEventListener('pointerdown', down)
+  axis.addEventListener('dblclick', all)
+  return () => {
+    axis.removeEventListener('wheel', wheel)
+    axis.removeEventListener('pointerdown', down)
+    axis.removeEventListener('dblclick', all)
   }
 }
 
