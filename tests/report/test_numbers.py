@@ -31,6 +31,7 @@ def test_a_step_exists_for_every_number(rough: float) -> None:
     ("value", "text"),
     [
         (0.0, "0"),
+        (-0.0, "0"),
         (-1.25, "−1.25"),
         (1e-7, "1e−7"),
         (123456.0, "123\u202f456"),

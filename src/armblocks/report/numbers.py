@@ -68,7 +68,7 @@ def axis_number(value: float, digits: int = 6) -> str:
     """A tick label: up to ``digits`` significant digits, no trailing zeros, thin groups for long numbers."""
     if not math.isfinite(value):
         return "not a number" if math.isnan(value) else ("∞" if value > 0 else MINUS + "∞")
-    text = f"{value:.{digits}g}"
+    text = f"{value + 0.0:.{digits}g}"  # of -0.0 the sign is dropped
     if "e" in text:
         mantissa, exponent = text.split("e")
         return f"{mantissa}e{int(exponent)}".replace("-", MINUS)
