@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from block_evaluation import evaluate
-from scipy.interpolate import RegularGridInterpolator
+from scipy.interpolate import CubicSpline, RegularGridInterpolator
 
 import armblocks as ab
 from armblocks.blocks import (
@@ -20,6 +20,7 @@ from armblocks.blocks import (
     Prelookup,
 )
 from armblocks.blocks.long_tables import SHORT
+from armblocks.blocks.splines import spline_slopes
 from armblocks.diagram import trace_diagram
 from armblocks.errors import DiagramError, InputError
 
@@ -156,3 +157,105 @@ def operations_of_large_tables(n: int) -> int:
 def test_long_tables_are_searched_and_not_named_point_by_point() -> None:
     short, long = operations_of_large_tables(1_000), operations_of_large_tables(10_000)
     assert long - short < 0.05 * (10_000 - 1_000)
+
+
+@pytest.mark.parametrize("beyond", ["clip", "linear"])
+@pytest.mark.parametrize("zero_crossing", [True, False])
+def test_a_long_spline_is_that_of_scipy(beyond: str, zero_crossing: bool) -> None:
+    kind: dict[str, Any] = {"method": "cubic", "extrapolation": beyond, "zero_crossing": zero_crossing}
+    for count in (SHORT + 1, 100):
+        x = np.cumsum(RANDOM.uniform(0.02, 0.1, count))
+        y = RANDOM.normal(size=count)
+        u = np.concatenate([RANDOM.uniform(x[0] - 0.1, x[-1] + 0.1, 60), x])
+        spline = CubicSpline(x, y)
+        inside = np.clip(u, x[0], x[-1])
+        expected = spline(inside)
+        if beyond == "linear":
+            expected = expected + np.where(u < x[0], spline(x[0], 1), spline(x[-1], 1)) * (u - inside)
+        found = evaluate(LookupTable1D(positions=x, table=y, **kind), u)["y"]
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-11)
+        np.testing.assert_array_equal(found[60:], y)
+
+
+def test_a_large_spline_surface_is_that_of_scipy() -> None:
+    axes = [np.cumsum(RANDOM.uniform(0.2, 1, n)) for n in (18, 4)]
+    table = RANDOM.normal(size=(18, 4))
+    points = [RANDOM.uniform(axis[0], axis[-1], 6) for axis in axes]
+    expected = [
+        float(CubicSpline(axes[1], CubicSpline(axes[0], table, axis=0)(a))(b)) for a, b in zip(*points)
+    ]
+    kind: dict[str, Any] = {"table": table, "method": "cubic"}
+    surface = LookupTable2D(positions1=axes[0], positions2=axes[1], **kind)
+    np.testing.assert_allclose(evaluate(surface, *points)["y"], expected, rtol=1e-10, atol=1e-11)
+    block = LookupTableND(positions=np.concatenate(axes), **kind)
+    np.testing.assert_allclose(evaluate(block, *points)["y"], expected, rtol=1e-10, atol=1e-11)
+
+
+@pytest.mark.parametrize("outside", ["hold", "linear", "zero"])
+def test_a_long_smooth_course_is_that_of_scipy(outside: str) -> None:
+    values = np.column_stack([Y, 2 * Y])
+    builder = ab.DiagramBuilder(
+        "smooth", settings=ab.SimulationOptions(stop_time=X[-1] + 1, sample_time=0.01)
+    )
+    builder.add("course", FromTable(times=X, values=values, method="cubic", outside=outside))
+    result = ab.simulate(builder.build())
+    t, spline = result.time, CubicSpline(X, values)
+    inside = np.clip(t, X[0], X[-1])
+    expected = spline(inside)
+    if outside == "linear":
+        rates = np.where(t[:, None] < X[0], spline(X[0], 1), spline(X[-1], 1))
+        expected = expected + rates * (t - inside)[:, None]
+    if outside == "zero":
+        expected[(t < X[0]) | (t > X[-1])] = 0.0
+    np.testing.assert_allclose(result["course"], expected, rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 40, 700])
+@pytest.mark.parametrize("spacing", ["even", "random", "geometric"])
+def test_slopes_of_splines_are_those_of_scipy(count: int, spacing: str) -> None:
+    x = {
+        "even": np.linspace(0, 10, count),
+        "random": np.cumsum(np.random.default_rng(count).uniform(0.01, 1, count)),
+        "geometric": np.geomspace(1, 1e6, count),
+    }[spacing]
+    y = np.random.default_rng(count + 1).normal(size=(count, 2))
+    expected = np.tile(np.diff(y, axis=0) / np.diff(x), (2, 1)) if count == 2 else CubicSpline(x, y)(x, 1)
+    scale = np.abs(expected).max(axis=0)
+    np.testing.assert_allclose(spline_slopes(x.tolist(), y) / scale, expected / scale, rtol=0, atol=1e-12)
+
+
+def test_a_long_spline_is_tuned_while_it_runs_and_nothing_is_compiled_anew() -> None:
+    builder = ab.DiagramBuilder("tuned", settings=ab.SimulationOptions(stop_time=4.0, sample_time=0.1))
+    builder.add("curve", LookupTable1D(positions=X, table=Y, method="cubic"), builder.add("time", Clock()))
+    run = ab.begin(builder.build())
+    compiled = run.simulation.compiled
+    run.advance(1.0)
+    run.set("curve.table", -Y)
+    run.advance(2.0)
+    run.set("curve.positions", X + 0.5)
+    run.advance()
+    assert run.simulation.compiled is compiled
+    done = run.result()
+    for first, last, x, y in ((0.0, 1.0, X, Y), (1.0, 2.0, X, -Y), (2.0, 4.1, X + 0.5, -Y)):
+        part = (done.time > first + 0.05) & (done.time < last - 0.05)
+        expected = CubicSpline(x, y)(np.clip(done.time[part], x[0], x[-1]))
+        np.testing.assert_allclose(done["curve"][part], expected, rtol=1e-9, atol=1e-12)
+
+
+def test_what_a_mask_makes_of_a_long_spline_is_never_stale() -> None:
+    builder = ab.DiagramBuilder("masked", settings=ab.SimulationOptions(stop_time=3.0, sample_time=0.1))
+    builder.parameter("k", 1.0)
+    values = f"k*[{', '.join(map(repr, Y.tolist()))}]"
+    curve = LookupTable1D(positions=X, table=Y, method="cubic").with_parameters(table=ab.formula(values))
+    builder.add("curve", curve, builder.add("time", Clock()))
+    diagram = builder.build()
+    for k in (1.0, -3.0):
+        result = ab.simulate(diagram, parameters={"k": k})
+        expected = CubicSpline(X, k * Y)(np.clip(result.time, X[0], X[-1]))
+        np.testing.assert_allclose(result["curve"], expected, rtol=1e-9, atol=1e-11)
+    run = ab.begin(diagram)
+    run.set("k", 2.0)
+    run.advance()
+    np.testing.assert_allclose(run.result()["curve"], expected * -2 / 3, rtol=1e-9, atol=1e-11)
+    with pytest.raises(InputError, match=r"'curve\.table', which belongs to the structure, follows from 'k'"):
+        ab.sensitivity(diagram, "k", "curve")

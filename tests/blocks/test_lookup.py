@@ -21,7 +21,7 @@ from armblocks.blocks import (
     Prelookup,
     Pulse,
 )
-from armblocks.blocks.interpolation import spline_slopes
+from armblocks.blocks.splines import spline_slopes
 from armblocks.errors import DiagramError, InputError
 
 RANDOM = np.random.default_rng(22)

@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from armblocks.report.numbers import axis_number, nice_step, nice_ticks, si_prefix, table_number
+from armblocks.report.page_tables import value_cell
 from armblocks.report.text_width import shorten, text_width
 
 
@@ -63,3 +65,8 @@ def test_text_is_cut_where_it_would_be_too_wide() -> None:
     cut = shorten("a very long name of a block", 10, 60)
     assert cut.endswith("…") and text_width(cut, 10) <= 60
     assert text_width("機械", 10) == 20.0
+
+
+def test_of_long_arrays_a_report_gives_the_range() -> None:
+    assert value_cell(np.linspace(-1.5, 2.5, 1000)) == "1000 numbers, −1.5 … 2.5"
+    assert value_cell(np.array([1.0, 2.0])).count("<td") == 2

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_not
-from numpy.typing import NDArray
 
+from armblocks.blocks.splines import spline_slopes
 from armblocks.equations import Shape, flatten
 
 METHODS = ("linear", "nearest", "flat", "cubic")
@@ -55,7 +55,7 @@ def weights(
     fixed = [float(point) for point in points]  # a spline through positions that move is not offered
     weighted = _cubic_weights(inside, fixed)
     if extrapolation == "linear":
-        slopes = spline_slopes(fixed)
+        slopes = spline_slopes(fixed, np.eye(len(fixed)))
         for k in range(len(points)):
             rate = if_else(u < points[0], float(slopes[0, k]), float(slopes[-1, k]))
             weighted[k] = weighted[k] + rate * (u - inside)
@@ -106,33 +106,6 @@ def contract(table: SX, shape: Shape, weights_by_axis: Sequence[Sequence[SX]]) -
     return entries[0]
 
 
-def spline_slopes(points: Sequence[float]) -> NDArray[np.float64]:
-    """The (n, n) matrix that gives a cubic spline's slopes at the break points from its values there.
-
-    Not-a-knot at both ends, as MATLAB's ``spline``; three points give the parabola, two the line.
-    de Boor, A Practical Guide to Splines, 2001, chapter IV.
-    """
-    x = np.asarray(points, dtype=np.float64)
-    n, h = len(x), np.diff(x)
-    chord = (np.eye(n)[1:] - np.eye(n)[:-1]) / h[:, None]
-    if n == 2:
-        return np.vstack([chord, chord])
-    left, right = np.zeros((n, n)), np.zeros((n, n))
-    for i in range(1, n - 1):
-        left[i, i - 1 : i + 2] = h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1]
-        right[i] = 3.0 * (h[i] * chord[i - 1] + h[i - 1] * chord[i])
-    if n == 3:
-        left[0, :2] = left[2, 1:] = 1.0
-        right[0], right[2] = 2.0 * chord[0], 2.0 * chord[1]
-        return np.linalg.solve(left, right).astype(np.float64)
-    first, last = x[2] - x[0], x[-1] - x[-3]
-    left[0, :2] = h[1], first
-    right[0] = ((h[0] + 2.0 * first) * h[1] * chord[0] + h[0] ** 2 * chord[1]) / first
-    left[-1, -2:] = last, h[-2]
-    right[-1] = ((h[-1] + 2.0 * last) * h[-2] * chord[-1] + h[-1] ** 2 * chord[-2]) / last
-    return np.linalg.solve(left, right).astype(np.float64)
-
-
 def _cubic_weights(u: SX, points: Sequence[float]) -> list[SX]:
     """Hermite's cubic on each interval, between values and slopes at its ends."""
     values = [SX(0.0) for _ in points]
@@ -145,7 +118,7 @@ def _cubic_weights(u: SX, points: Sequence[float]) -> list[SX]:
         values[k + 1] = values[k + 1] + if_else(inside, s * s * (1.0 + 2.0 * r), 0.0)
         slopes[k] = slopes[k] + if_else(inside, h * s * r * r, 0.0)
         slopes[k + 1] = slopes[k + 1] - if_else(inside, h * s * s * r, 0.0)
-    matrix = spline_slopes(points)
+    matrix = spline_slopes(points, np.eye(len(points)))
     return [
         values[k] + sum((slopes[i] * float(matrix[i, k]) for i in range(len(points))), SX(0.0))
         for k in range(len(points))

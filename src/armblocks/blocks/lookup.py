@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,13 +13,12 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, METHODS
-from armblocks.blocks.long_tables import is_long, with_positions
+from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, numbers_of, rising, table_axes
+from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, numbers_of, rising
 from armblocks.diagram import (
     Block,
     Guard,
-    Parameter,
     Port,
     Shapes,
     Signals,
@@ -62,17 +62,17 @@ class LookupTable1D(BlockWithAxes):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
 
-    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        return with_positions(self, self._is_long(), "positions")
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._axes(p).value(p["table"], shape_of(self.table), x, u)}
+        return {"y": self._value(x, u, p)}
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
 
-    def _axes(self, p: Signals | None = None) -> Axes:
-        return table_axes(self, {"u": "positions"}, p if self._is_long() else None)
+    def _along(self) -> Mapping[str, list[float]]:
+        return {"u": numbers_of(self, "positions")}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {"u": p["positions"]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,18 +109,17 @@ class LookupTable2D(BlockWithAxes):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
 
-    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        return with_positions(self, self._is_long(), "positions1", "positions2")
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._axes(p).value(p["table"], shape_of(self.table), x, u)}
+        return {"y": self._value(x, u, p)}
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
 
-    def _axes(self, p: Signals | None = None) -> Axes:
-        named = {"u1": "positions1", "u2": "positions2"}
-        return table_axes(self, named, p if self._is_long() else None)
+    def _along(self) -> Mapping[str, list[float]]:
+        return {"u1": numbers_of(self, "positions1"), "u2": numbers_of(self, "positions2")}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {"u1": p["positions1"], "u2": p["positions2"]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +159,7 @@ class LookupTableND(BlockWithAxes):
                 allowed=f"{sum(shape)}: {' + '.join(map(str, shape))}",
                 fix="give the positions of every axis, one axis after the other",
             )
-        for k, along in enumerate(self._points(), 1):
+        for k, along in enumerate(self._along().values(), 1):
             rising("LookupTableND", f"axis {k} of positions", along, shape[k - 1])
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -169,31 +168,24 @@ class LookupTableND(BlockWithAxes):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
 
-    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        return with_positions(self, self._is_long(), "positions")
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": self._axes(p).value(p["table"], shape_of(self.table), x, u)}
+        return {"y": self._value(x, u, p)}
 
     def _is_long(self) -> bool:
         return is_long(shape_of(self.table), self.method)
 
-    def _points(self) -> list[list[float]]:
+    def _along(self) -> Mapping[str, list[float]]:
         points = numbers_of(self, "positions")
-        return [points[part] for part in self._parts()]
+        return {port: points[part] for port, part in self._parts().items()}
 
-    def _parts(self) -> list[slice]:
-        """Where the positions of each axis stand."""
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {port: p["positions"][part] for port, part in self._parts().items()}
+
+    def _parts(self) -> dict[str, slice]:
+        """Where the positions along each input stand."""
         ends = np.cumsum(shape_of(self.table)).tolist()
-        return [slice(start, end) for start, end in zip([0, *ends], ends)]
-
-    def _axes(self, p: Signals | None = None) -> Axes:
-        points: list[list[float]] | list[SX] = self._points()
-        if p and self._is_long():
-            points = [p["positions"][part] for part in self._parts()]
         ports = (port.name for port in self.input_ports())
-        found = {port: axis(along, self.method, self.extrapolation) for port, along in zip(ports, points)}
-        return Axes(found, self.zero_crossing)
+        return {port: slice(start, end) for port, start, end in zip(ports, [0, *ends], ends)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,12 +11,11 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, cells, contract
-from armblocks.blocks.long_tables import is_long, with_positions
+from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
-from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, by_element, numbers_of, read, rising
+from armblocks.blocks.table_axes import BlockWithAxes, by_element, numbers_of, read, rising
 from armblocks.diagram import (
     Block,
-    Parameter,
     Port,
     Shapes,
     Signals,
@@ -61,9 +61,6 @@ class Prelookup(BlockWithAxes):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"k": inputs["u"], "f": inputs["u"]}
 
-    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        return with_positions(self, self._is_long(), "positions")
-
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         points = p["positions"] if self._is_long() else SX(numbers_of(self, "positions"))
         cell = self._axes(p).cell("u", x, u)
@@ -90,9 +87,15 @@ class Prelookup(BlockWithAxes):
             return read_entry(points, place)
         return sum((if_else(place == float(k), points[k], 0.0) for k in range(points.numel())), SX(0.0))
 
-    def _axes(self, p: Signals | None = None) -> Axes:
-        points = p["positions"] if p and self._is_long() else numbers_of(self, "positions")
-        return Axes({"u": axis(points, "linear", self.extrapolation)}, self.zero_crossing)
+    def _along(self) -> Mapping[str, list[float]]:
+        return {"u": numbers_of(self, "positions")}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {"u": p["positions"]}
+
+    @property
+    def _method(self) -> str:
+        return "linear"
 
 
 @dataclass(frozen=True, kw_only=True)

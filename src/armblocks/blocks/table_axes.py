@@ -16,13 +16,17 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, reshape, vertcat
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.interpolation import borders, contract, weights
+from armblocks.blocks.long_tables import inputs_with, is_spline
+from armblocks.blocks.splines import spline_corners, with_slopes
 from armblocks.blocks.switching import JUST
-from armblocks.diagram import Block, Guard, Shapes, Signals, State
+from armblocks.diagram import Block, Guard, Parameter, Shapes, Signals, State, shape_of
 from armblocks.equations import Shape, flatten, last_at_or_below, read_entry
 from armblocks.errors import InputError
+
+Array = NDArray[np.float64]
 
 
 def rising(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
@@ -104,13 +108,10 @@ class ShortAxis:
         return weights(u, self.points, self.method, self.extrapolation, cell)
 
     def to_next(self, u: SX, cell: SX) -> SX:
-        return self._beyond([*self.borders, math.inf], u, cell)
+        return _beyond([*self.borders, math.inf], u, cell)
 
     def to_last(self, u: SX, cell: SX) -> SX:
-        return self._beyond([-math.inf, *self.borders], u, cell)
-
-    def _beyond(self, ends: Sequence[float | SX], u: SX, cell: SX) -> SX:
-        return sum((if_else(cell == float(k), u - end, 0.0) for k, end in enumerate(ends)), SX(0.0))
+        return _beyond([-math.inf, *self.borders], u, cell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +167,39 @@ class LongAxis:
         if self.method == "nearest":
             return (read_entry(self.points, k) + read_entry(self.points, k + 1.0)) / 2.0
         return read_entry(self.points, k if self._held else k + 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SplineAxis:
+    """An axis of a long cubic spline, whose table has values and slopes in turn."""
+
+    points: SX
+    extrapolation: str
+
+    @property
+    def has_borders(self) -> bool:
+        return self.extrapolation == "clip"
+
+    def cell(self, u: SX) -> SX:
+        return (u >= self._ends[0]) + (u >= self._ends[1])
+
+    def to_next(self, u: SX, cell: SX) -> SX:
+        return _beyond([*self._ends, math.inf], u, cell)
+
+    def to_last(self, u: SX, cell: SX) -> SX:
+        return _beyond([-math.inf, *self._ends], u, cell)
+
+    def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
+        """Index and weight of the values and slopes that count in a cell."""
+        return spline_corners(u, self.points, cell, straight=not self.has_borders)
+
+    @property
+    def _ends(self) -> list[SX]:
+        return [self.points[0], self.points[self.points.numel() - 1]]
+
+
+def _beyond(ends: Sequence[float | SX], u: SX, cell: SX) -> SX:
+    return sum((if_else(cell == float(k), u - end, 0.0) for k, end in enumerate(ends)), SX(0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +259,7 @@ class Axes:
         """What a table of this shape gives, by element."""
         cells = {port: x[f"cell{k}"] for port, k, _ in self._moving()}
         for port, axis in self.axes.items():
-            if isinstance(axis, LongAxis) and port not in cells:
+            if not isinstance(axis, ShortAxis) and port not in cells:
                 cells[port] = by_element([u[port]], axis.cell)
         entries = flatten(table, shape)
 
@@ -234,7 +268,7 @@ class Axes:
             corners = list[list[tuple[SX, SX]]]()
             weights_by_axis = list[list[SX]]()
             for port, axis in self.axes.items():
-                if isinstance(axis, LongAxis):
+                if isinstance(axis, LongAxis | SplineAxis):
                     corners.append(axis.corners(positions[port], known[port]))
                 elif isinstance(axis, ShortAxis):
                     weights_by_axis.append(axis.weights(positions[port], known.get(port)))
@@ -258,30 +292,14 @@ def axis(points: SX | Sequence[float | SX], method: str, extrapolation: str) -> 
     return ShortAxis(points, method, extrapolation)
 
 
-def table_axes(block: Block, named: Mapping[str, str], p: Signals | None) -> Axes:
-    """The axes of a block by input port; ``named`` says which parameter has the positions of each.
-
-    With ``p`` they are read by index.
-    """
-    method, extrapolation, located = (
-        block.parameter_value(name) for name in ("method", "extrapolation", "zero_crossing")
-    )
-    found = {
-        port: axis(p[name] if p else numbers_of(block, name), str(method), str(extrapolation))
-        for port, name in named.items()
-    }
-    return Axes(found, bool(located))
-
-
 def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) -> SX:
     """The weighted sum of those entries of a flat table that lie at the corners of a cell, read by index."""
     strides = [math.prod(shape[k + 1 :]) for k in range(len(shape))]
     found = SX(0.0)
     for corner in itertools.product(*corners):
         index = sum((float(stride) * place for stride, (place, _) in zip(strides, corner)), SX(0.0))
-        found = found + math.prod((weight for _, weight in corner), start=SX(1.0)) * read_entry(
-            entries, index
-        )
+        weight = math.prod((weight for _, weight in corner), start=SX(1.0))
+        found = found + weight * read_entry(entries, index)
     return found
 
 
@@ -304,6 +322,59 @@ class BlockWithAxes(Block):
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return self._axes(p).resets(x, u, e)
 
+    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
+        return inputs_with(self, self._is_long(), "table", *self._positions())
+
+    def parameters_behind_inputs(self) -> tuple[str, ...]:
+        return ("table", *self._positions()) if is_spline(self, self._is_long()) else ()
+
+    @property
+    def knots(self) -> Array:
+        """Of a long cubic spline the positions, axis after axis."""
+        return np.concatenate([np.asarray(points) for points in self._along().values()])
+
+    @property
+    def spline(self) -> Array:
+        """Of a long cubic spline the values and slopes, see :func:`.splines.with_slopes`."""
+        axes = tuple(tuple(points) for points in self._along().values())
+        return with_slopes(axes, self.parameter_value("table"))
+
+    @classmethod
+    def _positions(cls) -> tuple[str, ...]:
+        """The parameters that hold positions."""
+        return tuple(rule.name for rule in cls.parameters() if rule.name.startswith("positions"))
+
+    def _along(self) -> Mapping[str, list[float]]:
+        """The positions along the axis of each input."""
+        raise NotImplementedError
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        """The same as inputs of the run."""
+        raise NotImplementedError
+
+    def _is_long(self) -> bool:
+        """Whether the table is read by index."""
+        raise NotImplementedError
+
+    @property
+    def _method(self) -> str:
+        return str(self.parameter_value("method"))
+
     def _axes(self, p: Signals | None = None) -> Axes:
         """The axis of each input; with the parameters of the run where they hold the positions."""
-        raise NotImplementedError
+        extrapolation = str(self.parameter_value("extrapolation"))
+        found = dict[str, Axis]()
+        if p and is_spline(self, self._is_long()):
+            first = 0
+            for port, points in self._along().items():
+                found[port] = SplineAxis(p["knots"][first : first + len(points)], extrapolation)
+                first += len(points)
+        else:
+            along = self._read_along(p) if p and self._is_long() else self._along()
+            found = {port: axis(points, self._method, extrapolation) for port, points in along.items()}
+        return Axes(found, bool(self.parameter_value("zero_crossing")))
+
+    def _value(self, x: Signals, u: Signals, p: Signals) -> SX:
+        """What the table gives, by element."""
+        table = "spline" if is_spline(self, self._is_long()) else "table"
+        return self._axes(p).value(p[table], shape_of(self.parameter_value(table)), x, u)

@@ -8,11 +8,12 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_not, mtimes, sin, vertcat
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.blocks.interpolation import weights
-from armblocks.blocks.long_tables import interval_of, is_long, line, with_positions
+from armblocks.blocks.long_tables import inputs_with, interval_of, is_long, is_spline, line
+from armblocks.blocks.splines import spline_corners, with_slopes
 from armblocks.blocks.table_axes import rising
 from armblocks.diagram import (
     Block,
@@ -26,6 +27,8 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.equations import last_at_or_below, read_entry
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +141,10 @@ class FromTable(Block):
         return {"y": shape_of(self.values)[1:]}
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        return with_positions(self, self._is_long(), "times")
+        return inputs_with(self, self._is_long(), "values", "times")
+
+    def parameters_behind_inputs(self) -> tuple[str, ...]:
+        return ("times", "values") if is_spline(self, self._is_long()) else ()
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self._is_long():
@@ -152,7 +158,7 @@ class FromTable(Block):
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
         if self._is_long():
-            return (p["times"],)
+            return (p["knots" if self.method == "cubic" else "times"],)
         return tuple(SX(time) for time in self._times())
 
     def _is_long(self) -> bool:
@@ -160,7 +166,9 @@ class FromTable(Block):
 
     def _read(self, t: SX, p: Signals) -> SX:
         """The course, from the two rows around t."""
-        times, values = p["times"], p["values"].T  # row by row, as the vector of parameters has them
+        smooth = self.method == "cubic"
+        values = p["spline" if smooth else "values"].T  # row by row, as the vector of parameters has them
+        times = p["knots" if smooth else "times"]
         first, last = times[0], times[times.numel() - 1]
         width = values.shape[0] if len(shape_of(self.values)) == 2 else 1
 
@@ -169,10 +177,23 @@ class FromTable(Block):
 
         if self.method == "flat":
             course = row(fmax(last_at_or_below(times, t), 0.0))
+        elif smooth:
+            corners = spline_corners(t, times, None, straight=self.outside == "linear")
+            course = sum((weight * row(k) for k, weight in corners), SX(0.0))
         else:
             inside = t if self.outside == "linear" else fmin(fmax(t, first), last)
             course = line(inside, times, interval_of(t, times), row)
         return if_else(logic_and(t >= first, t <= last), course, 0.0) if self.outside == "zero" else course
+
+    @property
+    def knots(self) -> Array:
+        """Of a long cubic course its instants, s."""
+        return np.asarray(self._times())
+
+    @property
+    def spline(self) -> Array:
+        """Of a long cubic course the values and slopes, row by row."""
+        return with_slopes((tuple(self._times()),), self.values)
 
     def _times(self) -> list[float]:
         return [float(time) for time in np.ravel(cast("Any", self.times))]

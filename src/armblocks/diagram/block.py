@@ -119,6 +119,18 @@ class Block(ABC):
         reads by index."""
         return tuple(rule for rule in self.parameters() if rule.tunable)
 
+    def parameters_behind_inputs(self) -> tuple[str, ...]:
+        """Parameters that the equations know only by inputs of the run that follow from them.
+
+        Such an input is no parameter of the block but an attribute of the same name.
+        """
+        return ()
+
+    def structure_of_the_run(self) -> tuple[Parameter, ...]:
+        """The parameters that the equations are made with; others change without anything being traced."""
+        inputs, behind = self.inputs_of_the_run(), self.parameters_behind_inputs()
+        return tuple(rule for rule in self.parameters() if rule not in inputs and rule.name not in behind)
+
     @classmethod
     def type_name(cls) -> str:
         """The name of this kind of block in files: the class's own."""

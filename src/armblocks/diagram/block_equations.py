@@ -153,9 +153,7 @@ def block_equations(
     return _trace(
         _Structure(
             kind=type(block),
-            fixed=tuple(
-                block.parameter_value(rule.name) for rule in block.parameters() if rule not in inputs
-            ),
+            fixed=tuple(block.parameter_value(rule.name) for rule in block.structure_of_the_run()),
             tunable_shapes=tuple(shape_of(block.parameter_value(rule.name)) for rule in inputs),
             input_shapes=tuple(input_shapes.items()),
             period=period if clocked else 0.0,

@@ -128,13 +128,11 @@ def tuned_parameters(before: Diagram, after: Diagram) -> dict[str, Array] | None
             continue
         if type(other) is not type(block):
             return None
-        inputs = block.inputs_of_the_run()
-        for rule in block.parameters():
+        structure = [rule.name for rule in block.structure_of_the_run()]
+        if any(block.parameter_value(name) != other.parameter_value(name) for name in structure):
+            return None
+        for rule in block.inputs_of_the_run():
             old, new = block.parameter_value(rule.name), other.parameter_value(rule.name)
-            if rule not in inputs:
-                if old != new:
-                    return None
-                continue
             numbers: tuple[Array, Array] = (np.asarray(old), np.asarray(new))
             if numbers[0].shape != numbers[1].shape:
                 return None

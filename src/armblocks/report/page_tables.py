@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from armblocks.report.analysis import LimitFinding, LimitKind, MotionSummary, people_unit
 from armblocks.report.motion import Motion
-from armblocks.report.numbers import MINUS, table_number
+from armblocks.report.numbers import MINUS, axis_number, table_number
 from armblocks.report.style import trace_tone
 from armblocks.report.svg import escape
+
+MOST_NUMBERS = 64
+"""Of a longer array a report gives the range."""
 
 
 def limits_table(summary: MotionSummary) -> str:
@@ -146,9 +149,12 @@ def _span(low: float, high: float) -> str:
 
 
 def value_cell(value: NDArray[np.float64]) -> str:
-    """A scalar with nine digits, a vector as a row, a matrix (or a stack of them) as rows."""
+    """A scalar with nine digits, a vector as a row, matrices as rows; of many numbers the range."""
     if value.ndim == 0:
         return table_number(float(value), 9)
+    if value.size > MOST_NUMBERS:
+        low, high = (table_number(float(end), 7) for end in (value.min(), value.max()))
+        return f"{axis_number(value.size)} numbers, {low} … {high}"
     lines = value.reshape(-1, value.shape[-1]) if value.ndim > 1 else value[None]
     body = "".join(
         "<tr>" + "".join(_cell(table_number(float(v), 7)) for v in line) + "</tr>" for line in lines

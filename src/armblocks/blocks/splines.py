@@ -1,0 +1,111 @@
+"""Cubic splines through given points: how the slopes at the points follow from the values there.
+
+Not-a-knot at both ends, as MATLAB's ``spline``; three points give the parabola, two the line. de Boor, A
+Practical Guide to Splines, 2001, chapter IV.
+
+A long spline is read by index from a table in which every value is followed by its slope, along each axis:
+of a table ``(n, m)`` it is ``(2 n, 2 m)``. It is made of positions and values with numbers, before a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from casadi import SX, fmax, fmin, if_else
+from numpy.typing import NDArray
+
+from armblocks.blocks.long_tables import interval_of
+from armblocks.equations import read_entry
+
+Array = NDArray[np.float64]
+
+
+def spline_slopes(points: Sequence[float], values: Array) -> Array:
+    """The slopes at n >= 2 points, of values ``(n, …)`` there; the same shape."""
+    x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    h = np.diff(x)
+    chords = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
+    if len(x) == 2:
+        return np.concatenate([chords, chords])
+    lower, diagonal, upper = _diagonals(h)
+    found = _right_side(h, chords)
+    for k in range(1, len(x)):
+        factor = lower[k - 1] / diagonal[k - 1]
+        diagonal[k] -= factor * upper[k - 1]
+        found[k] -= factor * found[k - 1]
+    found[-1] /= diagonal[-1]
+    for k in range(len(x) - 2, -1, -1):
+        found[k] = (found[k] - upper[k] * found[k + 1]) / diagonal[k]
+    return found
+
+
+@lru_cache(maxsize=16)
+def with_slopes(axes: tuple[tuple[float, ...], ...], table: object) -> Array:
+    """The table of a long spline: each value followed by its slope, along each of the axes given."""
+    found = np.asarray(table, dtype=np.float64)
+    for k, points in enumerate(axes):
+        values = np.moveaxis(found, k, 0)
+        pairs = np.stack([values, spline_slopes(points, values)], axis=1)
+        found = np.moveaxis(pairs.reshape(2 * len(points), *values.shape[1:]), 0, k)
+    return np.ascontiguousarray(found)
+
+
+def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> list[tuple[SX, SX]]:
+    """Index and weight of what counts at position u in the table of :func:`with_slopes`: Hermite's cubic.
+
+    ``cell``: 0 below the first point, 2 from the last on; beyond them the curve is held, or goes on
+    ``straight``.
+    """
+    n = points.numel()
+    first, last = points[0], points[n - 1]
+    if straight or cell is None:
+        inside = fmin(fmax(u, first), last)
+    else:
+        inside = if_else(cell == 0.0, first, if_else(cell == 2.0, last, u))
+    k = interval_of(inside, points)
+    begin, end = read_entry(points, k), read_entry(points, k + 1.0)
+    h = end - begin
+    s = (inside - begin) / h
+    r = 1.0 - s
+    left, right = h * s * r * r, -h * s * s * r
+    if straight:
+        beyond = u - inside
+        left, right = left + if_else(u < first, beyond, 0.0), right + if_else(u > last, beyond, 0.0)
+    place = 2.0 * k
+    return [
+        (place, r * r * (1.0 + 2.0 * s)),
+        (place + 1.0, left),
+        (place + 2.0, s * s * (1.0 + 2.0 * r)),
+        (place + 3.0, right),
+    ]
+
+
+def _diagonals(h: Array) -> tuple[Array, Array, Array]:
+    """Lower, main and upper diagonal of the system for the slopes."""
+    n = len(h) + 1
+    lower, diagonal, upper = np.zeros(n - 1), np.zeros(n), np.zeros(n - 1)
+    before, after = h[:-1], h[1:]
+    lower[:-1], diagonal[1:-1], upper[1:] = after, 2.0 * (before + after), before
+    if n == 3:
+        diagonal[0] = upper[0] = lower[1] = diagonal[2] = 1.0
+    else:
+        diagonal[0], upper[0] = h[1], h[0] + h[1]
+        diagonal[-1], lower[-1] = h[-2], h[-1] + h[-2]
+    return lower, diagonal, upper
+
+
+def _right_side(h: Array, chords: Array) -> Array:
+    """The right side ``(n, …)`` of that system, by the slopes of the chords ``(n - 1, …)``."""
+    n = len(h) + 1
+    found = np.empty((n, *chords.shape[1:]))
+    before, after = (part.reshape(-1, *[1] * (chords.ndim - 1)) for part in (h[:-1], h[1:]))
+    found[1:-1] = 3.0 * (after * chords[:-1] + before * chords[1:])
+    if n == 3:
+        found[0], found[2] = 2.0 * chords[0], 2.0 * chords[1]
+        return found
+    first, last = h[0] + h[1], h[-1] + h[-2]
+    found[0] = ((h[0] + 2.0 * first) * h[1] * chords[0] + h[0] ** 2 * chords[1]) / first
+    found[-1] = ((h[-1] + 2.0 * last) * h[-2] * chords[-1] + h[-1] ** 2 * chords[-2]) / last
+    return found
