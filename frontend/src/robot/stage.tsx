@@ -1,7 +1,7 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { Environment, Grid, Lightformer } from '@react-three/drei'
 import { Canvas, useFrame, useThree } from '@react-three/fiber'
-import { useEffect, useRef, useState } from 'react'
+import { memo, useEffect, useRef, useState } from 'react'
 import { Arm, MATERIALS, useBodies } from './arm'
 import { ViewCamera, type CameraHandle } from './camera'
 import { Frames, JointAxes, Limits } from './overlays'
@@ -121,21 +121,18 @@ function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camer
   useDrawnWhenChanged(state)
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => invalidate(), [options, bodies, scheme, invalidate])
-  const three = useThree()
+  const gl = useThree((s) => s.gl)
+  const world = useThree((s) => s.scene)
+  const eye = useThree((s) => s.camera)
   useEffect(() => {
-    shot.current = { gl: three.gl, draw: () => three.gl.render(three.scene, three.camera) }
+    shot.current = { gl, draw: () => gl.render(world, eye) }
     return () => void (shot.current = null)
-  }, [three.gl, three.scene, three.camera, shot])
+  }, [gl, world, eye, shot])
   const overlay = { scene, poses, dark }
   return (
     <>
       <color attach="background" args={[colours.background]} />
-      <Environment resolution={64} environmentIntensity={dark ? 0.42 : 0.6}>
-        <color attach="background" args={[dark ? '#39424d' : '#b9b4ad']} />
-        <Lightformer form="rect" intensity={3.2} color="#fff6ec" position={[3, -4, 6]} scale={[6, 4, 1]} target={[0, 0, 0]} />
-        <Lightformer form="rect" intensity={1.2} color="#dfe8f5" position={[-6, 3, 3]} scale={[5, 6, 1]} target={[0, 0, 0]} />
-        <Lightformer form="rect" intensity={1.6} color="#ffffff" position={[0, 6, 4]} scale={[8, 1, 1]} target={[0, 0, 0]} />
-      </Environment>
+      <Surroundings dark={dark} />
       <directionalLight
         position={[1.9 * reach, -1.4 * reach, 3.4 * reach]}
         intensity={dark ? 1.9 : 2.1}
@@ -164,6 +161,18 @@ function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camer
     </>
   )
 }
+
+/** What is mirrored in the arm: made once for each colour scheme, for it costs more than many frames. */
+const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
+  return (
+    <Environment resolution={64} environmentIntensity={dark ? 0.42 : 0.6}>
+      <color attach="background" args={[dark ? '#39424d' : '#b9b4ad']} />
+      <Lightformer form="rect" intensity={3.2} color="#fff6ec" position={[3, -4, 6]} scale={[6, 4, 1]} target={[0, 0, 0]} />
+      <Lightformer form="rect" intensity={1.2} color="#dfe8f5" position={[-6, 3, 3]} scale={[5, 6, 1]} target={[0, 0, 0]} />
+      <Lightformer form="rect" intensity={1.6} color="#ffffff" position={[0, 6, 4]} scale={[8, 1, 1]} target={[0, 0, 0]} />
+    </Environment>
+  )
+})
 
 /** The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it has reached. */
 function useFloor(scene: RobotScene, poses: () => Poses | undefined, foot: number, extent: StageProps['extent'], whole: string | undefined): number {
