@@ -18,7 +18,7 @@ from armblocks.studio.workers import Worker, Workers
 
 def with_workers(going: Callable[[Workers], Awaitable[None]]) -> None:
     async def whole() -> None:
-        pool = Workers()
+        pool = Workers(pause=0.0)
         try:
             await going(pool)
         finally:

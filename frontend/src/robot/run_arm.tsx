@@ -1,4 +1,4 @@
-import { useCallback, useMemo } from 'react'
+import { useCallback, useMemo, useRef } from 'react'
 import { play, shownTime, useCursor } from '../run/cursor'
 import { samples } from '../samples'
 import { useStudio } from '../store'
@@ -23,7 +23,12 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
   const has = useStudio((s) => Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)))
   const poses = useCallback(() => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest, [path, scene.rows, rest])
-  const state = useCallback(() => `${samples.run} ${samples.version} ${shownTime()}`, [])
+  const drawn = useRef('')
+  const state = useCallback(() => {
+    // A run that has begun and says nothing yet moves no arm: its first samples are there before a picture would be.
+    if (samples.count || !samples.run) drawn.current = `${samples.run} ${samples.version} ${shownTime()}`
+    return drawn.current
+  }, [])
   const way = useCallback((): Way | undefined => {
     const found = poseSignal(path, scene.rows)
     const last = samples.indexAt(shownTime())

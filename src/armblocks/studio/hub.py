@@ -223,7 +223,8 @@ class Hub:
             self._tell_run_later(page, run, 0)
         await self._tell_documents()
         self._check_later(found)
-        self.workers.prepare(after=PAGE_SECONDS)
+        if fresh:
+            self.workers.prepare(after=PAGE_SECONDS)
         return found.key
 
     def _tell_run_later(self, page: Page, run: str, said: int) -> None:

@@ -84,6 +84,7 @@ def begun(job: Mapping[str, Any]) -> RunHistory:
         formats.load_robot,
         folder=folder,
         read_library=ProjectFolder(folder).read_library,
+        draft=True,  # what cannot run is refused when it is traced, and what was traced once needs no check
     )
     history = RunHistory(CompiledDiagram(diagram))
     for path, value in job["tuned"].items():

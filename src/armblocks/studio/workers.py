@@ -53,18 +53,25 @@ class Worker:
         self.pipe.close()
 
 
+PAUSE_SECONDS = 0.5
+"""A run that begins has the machine for itself for so long: then the next worker is made."""
+
+
 class Workers:
     """Gives out workers; while one runs, the next is made aside."""
 
-    def __init__(self) -> None:
+    def __init__(self, pause: float = PAUSE_SECONDS) -> None:
+        self._pause = pause
         self._next: asyncio.Task[Worker] | None = None
         self._later: asyncio.TimerHandle | None = None
 
     def prepare(self, after: float = 0.0) -> None:
         """Have a worker made, if none is, ``after`` so many seconds in which others may need the machine."""
-        if after > 0.0 and self._later is None:
+        if self._later is not None:
+            self._later.cancel()
+        if after > 0.0:
             self._later = asyncio.get_running_loop().call_later(after, self.prepare)
-        elif after == 0.0 and self._next is None:
+        elif self._next is None:
             self._next = asyncio.get_running_loop().create_task(asyncio.to_thread(Worker))
 
     async def take(self) -> Worker:
@@ -83,7 +90,7 @@ class Workers:
                     fix="close other programs, and run the model again",
                 ) from None
             if worker.process.is_alive():
-                self.prepare()
+                self.prepare(after=self._pause)
                 return worker
 
     def end(self) -> None:
