@@ -11,9 +11,11 @@ from typing import Any
 import pytest
 from crashed_disk import Disk, going
 
-from armblocks.errors import ArmblocksError, InputError
+from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
 from armblocks.studio import messages as say
+from armblocks.studio import open_files
+from armblocks.studio.document import Document
 from armblocks.studio.edit_messages import AddBlocks, Edit, MoveBlocks, NewBlock, Place, SetParameters
 from armblocks.studio.open_documents import OpenDocument, OpenDocuments
 
@@ -309,5 +311,138 @@ def test_a_disk_that_refuses_the_journal_keeps_nobody_from_drawing(
         assert found.state().journaled
         back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
         assert content(back) == content(found)
+
+    going(talking)
+
+
+def test_pages_are_told_when_the_disk_does_not_take_the_journal(
+    disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(open_files, "SYNC_SECONDS", 0.0)
+
+    async def talking() -> None:
+        documents = disk.documents()
+        told: list[bool] = []
+        hears = asyncio.Event()
+
+        async def tell(found: OpenDocument) -> None:
+            told.append(found.state().journaled)
+            hears.set()
+
+        watching = asyncio.create_task(documents.watch(tell))
+        found = documents.new()
+        await asyncio.sleep(0)
+
+        def refuse(_: int) -> None:
+            raise OSError(5, "Input/output error")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "fsync", refuse)
+            documents.perform(found, change("1", add("one")))
+            async with asyncio.timeout(30):
+                await hears.wait()
+        assert told == [False]
+        watching.cancel()
+
+    going(talking)
+
+
+def test_a_disk_that_refuses_a_save_leaves_the_drawing_and_the_journal(
+    disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        await documents.save(found, "a.json", overwrite=False)
+        documents.perform(found, change("1", add("one")))
+        old = disk.project.read("a.json")
+
+        def refuse(*_: object) -> None:
+            raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "replace", refuse)
+            with pytest.raises(FormatError, match=r"No space left on device.*free space"):
+                await documents.save(found, "", overwrite=False)
+        assert (found.document.dirty, found.disk) == (True, "same")
+        assert disk.project.read("a.json") == old
+        back = disk.as_after_a_crash(tmp_path / "second").documents().attach(found.key)
+        assert content(back) == content(found)
+        await documents.save(found, "", overwrite=False)
+        assert not found.document.dirty
+
+    going(talking)
+
+
+def test_a_journal_that_cannot_be_read_is_not_written_over(disk: Disk) -> None:
+    async def talking() -> None:
+        key = "0123456789abcdef"
+        disk.kept.journals.mkdir(parents=True)
+        journal = disk.kept.journals / f"{key}.diagram"
+        journal.write_bytes(b"nothing that is a journal")
+        documents = disk.documents()
+        with pytest.raises(FormatError, match="the journal holds no whole record"):
+            documents.attach(key)
+        assert journal.read_bytes() == b"nothing that is a journal"
+        assert [offer.document for offer in documents.recoveries()] == [key]
+
+    going(talking)
+
+
+def test_a_defect_in_the_middle_of_a_journal_leaves_what_was_before_it(
+    disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def talking() -> None:
+        documents = disk.documents()
+        found = documents.new()
+        for k in range(4):
+            documents.perform(found, change(str(k), add(f"b{k}")))
+        second = disk.as_after_a_crash(tmp_path / "second")
+        real = Document.outcome
+
+        def defect(self: Document, request: say.Change) -> Any:
+            if request.key == "2":
+                raise KeyError("something")
+            return real(self, request)
+
+        monkeypatch.setattr(Document, "outcome", defect)
+        after = second.documents()
+        (offer,) = after.recoveries()
+        assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
+        assert sorted(after.attach(found.key).document.diagram.blocks) == ["b0", "b1"]
+
+    going(talking)
+
+
+def test_a_file_that_is_deleted_or_renamed_is_told_and_what_it_held_is_kept(
+    disk: Disk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(open_files, "LOOK_SECONDS", 0.01)
+
+    async def talking() -> None:
+        documents = disk.documents()
+        told: asyncio.Queue[str] = asyncio.Queue()
+
+        async def tell(found: OpenDocument) -> None:
+            told.put_nowait(found.disk)
+
+        watching = asyncio.create_task(documents.watch(tell))
+        found = documents.new()
+        documents.perform(found, change("1", add("one")))
+        await documents.save(found, "a.json", overwrite=False)
+        place = disk.project.path("a.json")
+        async with asyncio.timeout(30):
+            place.rename(place.with_name("b.json"))
+            assert await told.get() == "gone"
+            assert found.document.dirty
+            crashed = disk.as_after_a_crash(tmp_path / "second").documents()
+            assert [(offer.path, offer.disk) for offer in crashed.recoveries()] == [("a.json", "gone")]
+            place.with_name("b.json").rename(place)
+            assert await told.get() == "same"
+            place.unlink()
+            assert await told.get() == "gone"
+            await documents.save(found, "", overwrite=False)
+        assert disk.project.exists("a.json")
+        watching.cancel()
 
     going(talking)

@@ -247,9 +247,9 @@ class _Replay(Generic[EditedT]):
             elif number > self._start and ("perform" in record or "replace" in record):
                 try:
                     self._step(record)
-                except (ArmblocksError, ValidationError) as error:
+                except Exception as error:  # also a defect: what was before it is given back
                     lost = sum(1 for later in records[place:] if "perform" in later)
-                    what = error.what if isinstance(error, ArmblocksError) else "it is not understood"
+                    what = error.what if isinstance(error, ArmblocksError) else _why(error)
                     found.missing = f"the last {lost} edits could not be repeated: {what}"
                     break
                 self._values[found.document.version] = found.document.value
@@ -279,6 +279,12 @@ class _Replay(Generic[EditedT]):
         else:
             found.document.saved = holds
         self._values[found.document.version] = found.document.value
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        return "it is not understood"
+    return f"armblocks has a defect ({type(error).__name__})"
 
 
 def _said(fingerprint: Fingerprint | None) -> dict[str, Any] | None:

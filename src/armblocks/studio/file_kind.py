@@ -130,8 +130,11 @@ class DiagramKind(FileKind[Diagram, Document]):
         return replace(value, name=place.stem)
 
     def from_text(self, text: str, where: str) -> Diagram:
-        """A drawing of the journal, or what was copied of one."""
-        return formats.diagram_from_bytes(
+        """A drawing of the journal, or what was copied of one.
+
+        The sheets of library blocks do not stand in the text: they are placed as where the file was opened.
+        """
+        read = formats.diagram_from_bytes(
             text.encode(),
             where,
             BLOCKS,
@@ -140,6 +143,7 @@ class DiagramKind(FileKind[Diagram, Document]):
             draft=True,
             read_library=self._folder.read_library,
         )
+        return placed(read)
 
     def to_text(self, value: Diagram) -> str:
         """The canonical document."""

@@ -78,6 +78,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """What an earlier server left behind, by key."""
         self._unread: dict[str, Path] = {}
         """Journals that could not be read, by what names them to pages."""
+        self._tell: Callable[[OpenedT], Awaitable[None]] | None = None
         self._look_for_journals()
 
     @abstractmethod
@@ -128,6 +129,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
             return self[key]
         if key in self._waiting:
             return self._restore(self._waiting.pop(key))
+        if key in self._unread:  # what it lacked may be there now; if not, this says what it is
+            return self._restore(self._reread(key))
         if path:
             found = self.open_path(path, key)
         else:
@@ -355,6 +358,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
                     await asyncio.to_thread(found.journal.sync)
                 except OSError:
                     found.journaled, found.behind = False, True
+                    if self._tell is not None:
+                        await self._tell(found)
 
         found.syncing = asyncio.get_running_loop().create_task(sync())
 
@@ -421,6 +426,12 @@ class OpenFiles(ABC, Generic[OpenedT]):
             missing="its journal cannot be read: open it to see why",
         )
 
+    def _reread(self, key: str) -> JournaledFile[Any]:
+        """A journal that could not be read before; raises ``ArmblocksError`` where it still cannot."""
+        found = journaled_file(self._unread[key], self.kind)
+        del self._unread[key]
+        return found
+
     def waits(self, key: str) -> bool:
         """Whether there is something to recover under this key."""
         return key in self._waiting or key in self._unread
@@ -436,11 +447,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
             self._waiting.pop(key, None)
             self._unread.pop(key, None)
             return None
-        if key in self._unread:  # what it lacked may be there now; if not, this says what it is
-            found = journaled_file(self._unread[key], self.kind)
-            del self._unread[key]
-        else:
-            found = self._waiting.pop(key)
+        found = self._reread(key) if key in self._unread else self._waiting.pop(key)
         opened = self._restore(found)
         if request.action == "keep_both":
             await self.save(opened, self._free_path(found), overwrite=False)
@@ -477,7 +484,10 @@ class OpenFiles(ABC, Generic[OpenedT]):
     # -- the disk --------------------------------------------------------------------------------------------
 
     async def watch(self, tell: Callable[[OpenedT], Awaitable[None]]) -> None:
-        """Look at the files again and again; ``tell`` is called for one whose file has changed."""
+        """Look at the files again and again; ``tell`` is called for one whose file has changed, and for one
+        whose journal the disk refuses.
+        """
+        self._tell = tell
         while True:
             await asyncio.sleep(LOOK_SECONDS)
             for found in self:

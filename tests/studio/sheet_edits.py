@@ -1,0 +1,146 @@
+"""Edits of every kind, made of what stands on a sheet, so that most of them can be carried out."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from typing import Any
+
+from armblocks.diagram import Diagram, DiagramBlock, ParameterKind
+from armblocks.formats import load_robot
+from armblocks.studio import edit_messages as do
+from armblocks.studio.clipping import clipped
+from armblocks.studio.document import Document
+
+TYPES = ("Gain", "Integrator", "Sum", "Scope", "Constant", "SineWave", "Mux")
+NEW_NAMES = tuple(f"new {k}" for k in range(12))
+
+
+class Sheet:
+    """One sheet of a drawing and a source of chance."""
+
+    def __init__(self, diagram: Diagram, chance: random.Random) -> None:
+        self.diagram = diagram
+        self.chance = chance
+        self.blocks = list(diagram.blocks)
+        self.outputs = [
+            f"{name}/{port.name}" for name, block in diagram.blocks.items() for port in block.output_ports()
+        ]
+        self.inputs = [
+            f"{name}/{port.name}" for name, block in diagram.blocks.items() for port in block.input_ports()
+        ]
+        self.wires = [do.Wire(source=str(c.source), target=str(c.target)) for c in diagram.connections]
+        self.insides = [name for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)]
+
+    def one(self, of: Any) -> Any:
+        return self.chance.choice(list(of) or ["nothing"])
+
+    def some(self, of: Any) -> list[Any]:
+        entries = list(of)
+        return self.chance.sample(entries, min(len(entries), self.chance.randint(1, 3)))
+
+    def place(self) -> do.Place:
+        return do.Place(
+            x=self.chance.randint(-500, 500),
+            y=float(self.chance.randint(-500, 500)),
+            flipped=self.chance.random() < 0.3,
+            rotation=self.one((0, 90, 180, 270)),
+        )
+
+    def wire(self) -> do.Wire:
+        return do.Wire(source=self.one(self.outputs), target=self.one(self.inputs))
+
+    def note(self) -> do.SheetNote:
+        return do.SheetNote(x=self.chance.random(), y=2.0, text=self.one(("a", "b\nc", "ä")))
+
+
+def add(s: Sheet) -> do.Edit:
+    name = s.one(NEW_NAMES)
+    return do.AddBlocks(blocks=[do.NewBlock(name=name, type=s.one(TYPES), place=s.place())])
+
+
+def paste(s: Sheet) -> do.Edit:
+    names = s.some(s.blocks)
+    called = {name: f"{name} copy {s.chance.randrange(100)}" for name in names}
+    return do.PasteBlocks(text=clipped(s.diagram, names, [], load_robot), names=called, shift=20.0)
+
+
+def remove(s: Sheet) -> do.Edit:
+    return s.one(
+        (
+            do.RemoveBlocks(blocks=[s.one(s.blocks)] if s.blocks else []),
+            do.RemoveBlocks(wires=[s.one(s.wires)] if s.wires else []),
+            do.RemoveBlocks(notes=s.some(s.diagram.notes)),
+        )
+    )
+
+
+def move(s: Sheet) -> do.Edit:
+    places = {name: s.place() for name in s.some(s.blocks)}
+    notes = {name: s.note() for name in s.diagram.notes}
+    return do.MoveBlocks(places=places, notes=notes, instead=s.some(s.wires)[: s.chance.randint(0, 1)])
+
+
+def bend(s: Sheet) -> do.Edit:
+    ways = [[], [10.0, 40.0, 90.0], [1.5]]
+    return do.BendWires(wires=[w.model_copy(update={"bends": tuple(s.one(ways))}) for w in s.some(s.wires)])
+
+
+def numbers(s: Sheet) -> list[str]:
+    """Parameters of the blocks of a sheet that are numbers, as ``block.parameter``."""
+    return [
+        f"{name}.{rule.name}"
+        for name, block in s.diagram.blocks.items()
+        for rule in block.own_parameters()
+        if rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY)
+    ]
+
+
+def parameters(s: Sheet) -> do.Edit:
+    block, _, parameter = s.one(numbers(s)).rpartition(".")
+    return do.SetParameters(block=block, values={parameter: s.one((2.0, "2*pi", "k", "1/3"))})
+
+
+def mask(s: Sheet) -> do.Edit:
+    declared = [do.MaskParameter(name="k", default=s.one((1.0, "3*pi")), unit=s.one(("", "m")))]
+    return do.SetMask(block=s.one(["", *s.insides]), parameters=declared[: s.chance.randint(0, 3)])
+
+
+def keep_tuned(s: Sheet) -> do.Edit:
+    return do.KeepTuned(values={s.one(numbers(s)): s.chance.random()})
+
+
+MAKERS: dict[type[do.Edit], Callable[[Sheet], do.Edit]] = {
+    do.AddBlocks: add,
+    do.PasteBlocks: paste,
+    do.RemoveBlocks: remove,
+    do.Connect: lambda s: do.Connect(wire=s.wire(), replace=s.chance.random() < 0.5),
+    do.MoveBlocks: move,
+    do.BendWires: bend,
+    do.SetNotes: lambda s: do.SetNotes(notes={s.one(("/1", "/2")): s.note()}),
+    do.Rename: lambda s: do.Rename(block=s.one(s.blocks), name=s.one(NEW_NAMES)),
+    do.SetParameters: parameters,
+    do.SetMask: mask,
+    do.KeepTuned: keep_tuned,
+    do.LogSignal: lambda s: do.LogSignal(port=s.one(s.outputs), logged=s.chance.random() < 0.7),
+    do.GroupBlocks: lambda s: do.GroupBlocks(blocks=s.some(s.blocks), name=s.one(NEW_NAMES)),
+    do.BreakLink: lambda s: do.BreakLink(block=s.one(s.insides)),
+    do.SetSettings: lambda s: do.SetSettings(values={"stop_time": s.chance.random() + 0.1}),
+    do.Describe: lambda s: do.Describe(text=s.one(("words", "other words"))),
+}
+
+
+def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.Edit]:
+    """A sheet of the drawing, by its path, and an edit of it."""
+    path: list[str] = []
+    diagram = document.diagram
+    while True:
+        inner = {
+            name: block.diagram for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)
+        }
+        if not inner or chance.random() < 0.6:
+            break
+        name = chance.choice(sorted(inner))
+        path.append(name)
+        diagram = inner[name]
+    return path, MAKERS[chance.choice(list(MAKERS))](Sheet(diagram, chance))

@@ -1,0 +1,89 @@
+"""Any sequence of edits undone gives the same file, to the last byte: edits of every kind, on every sheet."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from crashed_disk import Disk, going
+from sheet_edits import MAKERS, random_edit
+
+from armblocks.errors import ArmblocksError
+from armblocks.formats import diagram_to_bytes, load_robot
+from armblocks.studio import messages as say
+from armblocks.studio.document import Document
+from armblocks.studio.edit_messages import Edit, summary
+
+BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
+SEEDS = 24
+LEAST = 3
+"""How often each kind of edit must have been carried out, or this would say nothing of it."""
+
+
+def content(document: Document) -> bytes:
+    return diagram_to_bytes(document.diagram, load_robot)
+
+
+def test_every_kind_of_edit_is_made() -> None:
+    assert set(MAKERS) == set(get_args(get_args(Edit)[0]))
+
+
+def test_all_is_undone_and_redone_and_comes_back_from_the_journal(tmp_path: Path) -> None:
+    done: Counter[type] = Counter()
+    inner = 0
+
+    async def talking() -> None:
+        nonlocal inner
+        for seed in range(SEEDS):
+            (tmp_path / str(seed) / "project").mkdir(parents=True)
+            disk, chance = Disk(tmp_path / str(seed)), random.Random(seed)
+            documents = disk.documents()
+            found = documents.open_shipped(BEGINNINGS[seed % len(BEGINNINGS)])
+            document = found.document
+            begin = content(document)
+            forms = [document.diagram]
+            for number in range(40):
+                path, edit = random_edit(document, chance)
+                request = say.Change(document="", key=f"{seed} {number}", inside=path, edit=edit)
+                try:
+                    documents.perform(found, request)
+                except ArmblocksError:
+                    assert document.diagram is forms[-1]
+                    continue
+                assert document.undo_title == summary(edit)
+                done[type(edit)] += 1
+                inner += bool(path)
+                forms.append(document.diagram)
+            end = content(document)
+            again = disk.as_after_a_crash(tmp_path / f"{seed} crashed").documents().attach(found.key)
+            for one in (document, again.document):
+                assert content(one) == end
+                for expected in reversed(forms[:-1]):
+                    one.undo()
+                    assert one.diagram == expected
+                assert one.undo_title == ""
+                assert content(one) == begin
+                for expected in forms[1:]:
+                    one.redo()
+                    assert one.diagram == expected
+                assert one.redo_title == ""
+                assert content(one) == end
+
+    going(talking)
+    for kind in MAKERS:
+        assert done[kind] >= LEAST, (kind, done)
+    assert inner > SEEDS
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_makers_make_the_same_of_the_same_chance(seed: int, tmp_path: Path) -> None:
+    (tmp_path / "project").mkdir()
+
+    async def talking() -> None:
+        document = Disk(tmp_path).documents().open_shipped("puma560_servos").document
+        assert random_edit(document, random.Random(seed)) == random_edit(document, random.Random(seed))
+
+    going(talking)
