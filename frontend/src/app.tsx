@@ -1,6 +1,6 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps, type IDockviewPanelProps } from 'dockview-react'
-import { lazy, Suspense } from 'react'
+import { lazy, Suspense, useEffect, useState, type ComponentType, type FunctionComponent } from 'react'
 import { Canvas } from './canvas/canvas'
 import { later, useSettled, useWanted } from './later'
 import { Palette } from './library/palette'
@@ -24,18 +24,31 @@ function ScopesPanel() {
   return ran ? <Scopes /> : <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
 }
 
-const panels: Record<string, React.FunctionComponent<IDockviewPanelProps>> = {
+const panels: Record<string, FunctionComponent<IDockviewPanelProps>> = {
   library: Palette,
-  explorer: () => <Explorer />,
+  explorer: inFront(Explorer),
   canvas: Canvas,
   scopes: ScopesPanel,
-  tune: () => <TunePanel />,
-  signals: () => <SignalInspector />,
+  tune: inFront(TunePanel),
+  signals: inFront(SignalInspector),
   robot: () => (
     <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
       <RobotView />
     </Suspense>
   ),
+}
+
+/** A panel that is drawn from when it first comes to the front: what stands behind another costs nothing. */
+function inFront(Part: ComponentType): FunctionComponent<IDockviewPanelProps> {
+  return function Panel({ api }) {
+    const [seen, setSeen] = useState(api.isVisible)
+    useEffect(() => {
+      if (api.isVisible) setSeen(true)
+      const watch = api.onDidVisibilityChange(({ isVisible }) => isVisible && setSeen(true))
+      return () => watch.dispose()
+    }, [api])
+    return seen ? <Part /> : null
+  }
 }
 
 /** A tab with nothing to press inside it: the panels stay, and only their places change. */

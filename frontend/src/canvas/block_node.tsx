@@ -1,17 +1,12 @@
 import { Tooltip } from '@mantine/core'
 import { IconAlertCircleFilled, IconLink } from '@tabler/icons-react'
-import { Handle, Position, type Node, type NodeProps } from '@xyflow/react'
+import { Handle, type Node, type NodeProps } from '@xyflow/react'
 import { memo, useState } from 'react'
 import type { Finding, PortSpot, SheetBlock } from '../protocol'
 import { change } from '../store'
-import { nameSide } from './sheet_layout'
+import { nameSide, nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
-
-const side = ({ dx, dy }: PortSpot, output: boolean): Position => {
-  const [x, y] = output ? [dx, dy] : [-dx, -dy]
-  return x > 0 ? Position.Right : x < 0 ? Position.Left : y > 0 ? Position.Bottom : Position.Top
-}
 
 /** A block: the drawing that the server made of it, its ports, its name, and what is wrong with it. */
 export const BlockNode = memo(function BlockNode({ data: { block, findings }, selected }: NodeProps<BlockNodeType>) {
@@ -52,7 +47,7 @@ function Port({ spot, output, faulty }: { spot: PortSpot; output: boolean; fault
       type={output ? 'source' : 'target'}
       position={side(spot, output)}
       className={faulty ? 'port faulty' : 'port'}
-      style={{ left: spot.x, top: spot.y, right: 'auto', bottom: 'auto', transform: 'translate(-50%, -50%)' }}
+      style={{ left: spot.x - PORT / 2, top: spot.y - PORT / 2, right: 'auto', bottom: 'auto', transform: 'none' }}
       title={`${spot.name}: ${spot.doc}${spot.unit && `, ${spot.unit}`}`}
     />
   )
@@ -68,7 +63,7 @@ function Name({ block }: { block: SheetBlock }) {
   if (!editing)
     return (
       <div
-        className={`name ${nameSide(block)}`}
+        className={`name ${nameSide(block)}${nameWidth(block.name) < WIDEST_NAME ? '' : ' long'}`}
         onDoubleClick={(event) => {
           event.stopPropagation()
           setEditing(true)

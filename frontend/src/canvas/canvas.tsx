@@ -9,6 +9,7 @@ import {
   ReactFlowProvider,
   useReactFlow,
   type Connection,
+  type EdgeChange,
   type NodeChange,
 } from '@xyflow/react'
 import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
@@ -25,12 +26,15 @@ import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from './rewirin
 import { SheetGraph, type SheetNode } from './sheet_graph'
 import { useSheetKeys } from './sheet_keys'
 import { FIT, SheetRoutes, wireKey, type Places } from './sheet_layout'
+import { useSteady } from './steady'
 import { Welcome } from './welcome'
 import { useBending, WireEdge, type WireEdgeType } from './wire_edge'
 
 const nodeTypes = { block: BlockNode, note: NoteNode }
 const edgeTypes = { wire: WireEdge }
 const SETTLE_MS = 120
+const SNAP: [number, number] = [GRID, GRID]
+const PANNING_BUTTONS = [1, 2]
 
 /** What the mouse holds: blocks that it takes out of their wires, and one without wires, which goes into a wire that it is dropped on. */
 const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
@@ -220,6 +224,24 @@ function Sheet() {
     return leave
   }, [flow])
 
+  const handlers = useSteady({
+    onNodesChange,
+    onEdgesChange: (changes: EdgeChange<WireEdgeType>[]) => {
+      const chosen = new Set(chosenWires)
+      for (const one of changes) {
+        if (one.type !== 'select') continue
+        if (one.selected) chosen.add(one.id)
+        else chosen.delete(one.id)
+      }
+      setChosenWires(chosen)
+    },
+    onNodeDragStart: takeHold,
+    onNodeDrag: carry,
+    onNodeDragStop: letGo,
+    onNodeDoubleClick: (_: unknown, node: SheetNode) => node.type === 'block' && openBlock(node.data.block),
+    onConnect: connect,
+  })
+  const chosenEdge = chosenWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   return (
     <div className="canvas" ref={sheet} onFocus={selectFocused} onDragOver={hover} onDragLeave={() => setInto(null)} onDrop={drop}>
@@ -234,21 +256,7 @@ function Sheet() {
         nodeTypes={nodeTypes}
         edgeTypes={edgeTypes}
         colorMode={scheme}
-        onNodesChange={onNodesChange}
-        onNodeDragStart={takeHold}
-        onNodeDrag={carry}
-        onNodeDragStop={letGo}
-        onNodeDoubleClick={(_, node) => node.type === 'block' && openBlock(node.data.block)}
-        onEdgesChange={(changes) => {
-          const chosen = new Set(chosenWires)
-          for (const one of changes) {
-            if (one.type !== 'select') continue
-            if (one.selected) chosen.add(one.id)
-            else chosen.delete(one.id)
-          }
-          setChosenWires(chosen)
-        }}
-        onConnect={connect}
+        {...handlers}
         onDoubleClick={(event) => {
           if ((event.target as Element).classList.contains('react-flow__pane')) show('insert', '', { x: event.clientX, y: event.clientY })
         }}
@@ -258,10 +266,10 @@ function Sheet() {
         deleteKeyCode={null}
         disableKeyboardA11y
         snapToGrid
-        snapGrid={[GRID, GRID]}
+        snapGrid={SNAP}
         selectionOnDrag
         selectionKeyCode={null}
-        panOnDrag={[1, 2]}
+        panOnDrag={PANNING_BUTTONS}
         panOnScroll
         zoomOnPinch
         minZoom={0.1}
@@ -272,7 +280,7 @@ function Sheet() {
       >
         <Background variant={BackgroundVariant.Dots} gap={20} size={1} />
         {!empty && <Controls showInteractive={false} fitViewOptions={FIT} />}
-        <WireValues />
+        <WireValues chosen={chosenEdge} />
         {Object.keys(blocks).length > 40 && <Overview blocks={blocks} />}
       </ReactFlow>
       <ArrangeBar />

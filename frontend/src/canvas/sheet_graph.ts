@@ -1,9 +1,10 @@
-import type { Finding, SheetBlock, SheetNote, Wire, WireKind } from '../protocol'
+import type { NodeHandle } from '@xyflow/react'
+import type { Finding, PortSpot, SheetBlock, SheetNote, Wire, WireKind } from '../protocol'
 import type { BlockNodeType } from './block_node'
 import { wholeWay } from './bends'
 import type { NoteNodeType } from './note_node'
 import type { Point, RoutedNet } from './router'
-import { blockOf, portOf, wireKey, type Places } from './sheet_layout'
+import { blockOf, PORT, portOf, side, wireKey, type Places } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
 export type SheetNode = BlockNodeType | NoteNodeType
@@ -33,11 +34,13 @@ class Kept<T> {
 
 /** The nodes and edges of one sheet, for React Flow. */
 export class SheetGraph {
-  /** Sizes that React Flow has measured. */
+  /** Sizes of notes, which React Flow has measured. */
   readonly measured = new Map<string, { width: number; height: number }>()
   private blocks = new Kept<BlockNodeType>()
   private notes = new Kept<NoteNodeType>()
   private wires = new Kept<WireEdgeType>()
+  private lastNodes: SheetNode[] = []
+  private lastEdges: WireEdgeType[] = []
 
   nodes(
     blocks: Record<string, SheetBlock>,
@@ -52,16 +55,17 @@ export class SheetGraph {
       const { name } = block
       const own = found.get(name) ?? NO_FINDINGS
       const [x, y] = [drag[name]?.x ?? block.place.x, drag[name]?.y ?? block.place.y]
-      const measured = this.measured.get(name)
       const selected = selection.has(name)
-      return this.blocks.get(name, [block, own === NO_FINDINGS ? '' : JSON.stringify(own), x, y, measured, selected], () => ({
+      return this.blocks.get(name, [block, own === NO_FINDINGS ? '' : JSON.stringify(own), x, y, selected], () => ({
         id: name,
         type: 'block',
         position: { x, y },
         selected,
         width: block.width,
         height: block.height,
-        measured: measured ?? { width: block.width, height: block.height },
+        // All is known, so nothing of a block need be measured on the screen.
+        measured: { width: block.width, height: block.height },
+        handles: [...block.inputs.map((spot) => port(spot, false)), ...block.outputs.map((spot) => port(spot, true))],
         ariaLabel: `${name}, ${block.title}`,
         data: { block, findings: own },
       }))
@@ -84,7 +88,7 @@ export class SheetGraph {
     }
     this.blocks.turn()
     this.notes.turn()
-    return made
+    return (this.lastNodes = unlessSame(this.lastNodes, made))
   }
 
   edges(wires: Wire[], routed: Map<string, RoutedNet>, kinds: Record<string, WireKind>, level: string, chosen: ReadonlySet<string>, into: string | null): WireEdgeType[] {
@@ -113,8 +117,23 @@ export class SheetGraph {
       }))
     })
     this.wires.turn()
-    return made
+    return (this.lastEdges = unlessSame(this.lastEdges, made))
   }
+}
+
+const port = (spot: PortSpot, output: boolean): NodeHandle => ({
+  id: spot.name,
+  type: output ? 'source' : 'target',
+  position: side(spot, output),
+  x: spot.x - PORT / 2,
+  y: spot.y - PORT / 2,
+  width: PORT,
+  height: PORT,
+})
+
+/** The list before, where the new one has the same things in it: then nobody is told of anything. */
+function unlessSame<T>(before: T[], now: T[]): T[] {
+  return before.length === now.length && now.every((one, k) => one === before[k]) ? before : now
 }
 
 /** What the check found, by the block of this sheet that it is in. */

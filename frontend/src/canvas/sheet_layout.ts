@@ -1,22 +1,39 @@
-import type { FitViewOptions } from '@xyflow/react'
-import type { SheetBlock, Wire } from '../protocol'
+import { Position, type FitViewOptions } from '@xyflow/react'
+import type { PortSpot, SheetBlock, Wire } from '../protocol'
 import { route, type Net, type Obstacle, type RoutedNet, type WireEnd } from './router'
 
 const NAME_SIZE = 11
+const NAME_FONT = `${NAME_SIZE}px 'Inter Variable', sans-serif`
 const NAME_ROOM = 20
+/** px: longer names are cut. */
+export const WIDEST_NAME = 168
+/** px: a port is so wide and high. */
+export const PORT = 9
 
 export const wireKey = (wire: Wire): string => `${wire.source} -> ${wire.target}`
 export const blockOf = (port: string): string => port.slice(0, port.lastIndexOf('/'))
 export const portOf = (port: string): string => port.slice(port.lastIndexOf('/') + 1)
 
+/** The side of a block at which a port is. */
+export function side({ dx, dy }: PortSpot, output: boolean): Position {
+  const [x, y] = output ? [dx, dy] : [-dx, -dy]
+  return x > 0 ? Position.Right : x < 0 ? Position.Left : y > 0 ? Position.Bottom : Position.Top
+}
+
 let ruler: CanvasRenderingContext2D | null | undefined
+const widths = new Map<string, number>()
 
 /** Width of a block's name, px. */
 export function nameWidth(name: string): number {
+  const known = widths.get(name)
+  if (known !== undefined) return known
   ruler ??= document.createElement('canvas').getContext('2d')
   if (!ruler) return 6 * name.length
-  ruler.font = `${NAME_SIZE}px 'Inter Variable', sans-serif`
-  return Math.min(ruler.measureText(name).width, 168)
+  ruler.font = NAME_FONT
+  const width = Math.min(ruler.measureText(name).width, WIDEST_NAME)
+  // Before the face of the page has come another one is measured.
+  if (document.fonts.check(NAME_FONT)) widths.set(name, width)
+  return width
 }
 
 /** Blocks by name, at the places where they are drawn now (which a drag may have changed). */

@@ -32,7 +32,7 @@ export const WireEdge = memo(function WireEdge({ id, data, selected, sourceX, so
   const line = svgPath(path)
   return (
     <g className={selected ? 'wire selected' : 'wire'}>
-      <BaseEdge id={id} path={line} className={`line rank${rank}`} markerEnd="url(#wire-head)" interactionWidth={14} />
+      <BaseEdge id={id} path={line} className={`line rank${rank}`} markerEnd="url(#wire-head)" interactionWidth={0} />
       {rank >= 2 && <path d={line} className={rank === 3 ? 'core wide' : 'core'} />}
       {rank === 3 && <path d={line} className="line rank0 inner" />}
       {data?.dots.map(([x, y]) => (

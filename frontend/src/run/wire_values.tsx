@@ -1,7 +1,8 @@
 import { ActionIcon, Tooltip } from '@mantine/core'
 import { IconAntennaBars5, IconPinned, IconPinnedOff, IconRoute } from '@tabler/icons-react'
-import { useEdges, useStore, ViewportPortal } from '@xyflow/react'
-import { useEffect, useRef, useState } from 'react'
+import { useStore } from '@xyflow/react'
+import { useEffect, useMemo, useRef, useState } from 'react'
+import { createPortal } from 'react-dom'
 import { create } from 'zustand'
 import type { Point } from '../canvas/router'
 import type { WireEdgeType } from '../canvas/wire_edge'
@@ -41,35 +42,35 @@ function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: Shee
   return Object.values(blocks).flatMap((block) => block.outputs.map((spot) => ({ ref: `${block.name}/${spot.name}`, block, spot })))
 }
 
-/** Values on the wires, marks of what is logged, and what can be done with the selected wire: on the sheet itself. */
-export function WireValues() {
+/** Values on the wires, marks of what is logged, and what can be done with the wire that is `chosen`: on the sheet itself. */
+export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const blocks = useStudio((s) => s.document!.blocks)
   const logged = useStudio((s) => s.document!.logged)
   const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
   const views = useStudio((s) => s.run?.views)
   const ran = useStudio((s) => s.run !== null)
   const { all, pinned } = useValues()
-  const edges = useEdges<WireEdgeType>()
+  const flow = useStore((s) => s.domNode)
+  // Looked for once: React Flow's own portal looks through the whole sheet at every change of it.
+  const portal = useMemo(() => flow?.querySelector('.react-flow__viewport-portal'), [flow])
   const zoom = useStore((s) => s.transform[2])
   const layer = useRef<HTMLDivElement>(null)
   const [hovered, setHovered] = useState('')
   useEffect(() => {
-    const sheet = layer.current?.closest('.react-flow')
-    if (!sheet) return
+    if (!flow) return
     const over = ({ target }: Event) => {
       const id = (target as Element).closest('.react-flow__edge')?.getAttribute('data-id')
       setHovered(id ? id.slice(0, id.indexOf(' -> ')) : '')
     }
-    sheet.addEventListener('pointerover', over)
-    return () => sheet.removeEventListener('pointerover', over)
-  }, [])
+    flow.addEventListener('pointerover', over)
+    return () => flow.removeEventListener('pointerover', over)
+  }, [flow])
   useWriting(layer)
   const found = outputs(blocks)
   const shown = ran ? found.filter(({ ref }) => all || ref === hovered || pinned.has(level + ref)) : []
   const displays = (views ?? []).filter(({ kind, block }) => kind === 'value' && block.startsWith(level) && blocks[block.slice(level.length)])
-  const chosen = edges.filter(({ selected }) => selected)
-  return (
-    <ViewportPortal>
+  if (!portal) return null
+  return createPortal(
       <div ref={layer} className="wire-values" style={{ '--legible': Math.min(Math.max(1 / zoom, 1), 2.5) } as React.CSSProperties}>
         {shown.map(({ ref, block, spot }) => (
           <span key={ref} className="wire-value numbers" data-path={level + ref} style={{ transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -6 : 6)}px, ${block.place.y + spot.y - 4}px) scale(var(--legible)) translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)` }} />
@@ -89,9 +90,9 @@ export function WireValues() {
               <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
             </span>
           ))}
-        {chosen.length === 1 && <WireTools edge={chosen[0]!} level={level} logged={logged} pinned={pinned} />}
-      </div>
-    </ViewportPortal>
+        {chosen && <WireTools edge={chosen} level={level} logged={logged} pinned={pinned} />}
+      </div>,
+    portal,
   )
 }
 
