@@ -5,7 +5,9 @@ import 'uplot/dist/uPlot.min.css'
 import { shownTime, useCursor } from '../run/cursor'
 import { useRuns } from '../run/runs'
 import { samples } from '../samples'
+import { useStudio } from '../store'
 import { aired, type Figure } from './figure'
+import { Growing } from './growing'
 import { digits, reading, useUnits, type Reading } from './quantity'
 import { extremes, within, type Drawn, type Extremes, type Trace } from './trace'
 import { pan, shownWindow, useWindow, zoomBy, zoomTo } from './window'
@@ -15,6 +17,8 @@ const GRIP_PX = 6
 const CLICK_PX = 3
 /** From so many samples in a pixel on only the least and the greatest are drawn. */
 const DENSE = 3
+/** While a run goes on, the part of its range that a vertical axis grows by beyond what is needed. */
+const ROOM = 0.25
 const colour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()
 
 /** What a plot shows now, for those beside it: measures and exports. */
@@ -45,18 +49,25 @@ function axisReading(traces: Trace[], drawn: Drawn): Reading {
   return reading(first.unit, largest)
 }
 
+/** What there is to draw; of each trace the rows before its end stay as they are while the run goes on. */
+interface ToDraw {
+  drawn: Drawn
+  ends?: number[]
+  extremes?: Extremes
+}
+
 /** What there is to draw in a window: raw samples while few, else the extremes of each pixel. */
-function drawnOf(traces: Trace[], from: number, to: number, width: number, before: Extremes | undefined): { drawn: Drawn; extremes?: Extremes } {
+function drawnOf(traces: Trace[], from: number, to: number, width: number, before: Extremes | undefined): ToDraw {
   const found = traces.map(({ read }) => read() ?? { time: new Float64Array(0), values: new Float64Array(0) })
   const parts = found.map((one) => within(one, from, to))
   if (parts.some(({ time }) => time.length > DENSE * width)) {
     const known = extremes(found, from, to, width, before)
-    return { drawn: known.drawn, extremes: known }
+    return { drawn: known.drawn, ends: known.ends, extremes: known }
   }
   const [first, ...others] = parts
   if (!first) return { drawn: [new Float64Array(0)] }
   if (others.every(({ time }) => time.buffer === first.time.buffer && time.length === first.time.length && time.byteOffset === first.time.byteOffset))
-    return { drawn: [first.time, ...parts.map(({ values }) => values)] }
+    return { drawn: [first.time, ...parts.map(({ values }) => values)], ends: parts.map(({ time }) => time.length) }
   return { drawn: uPlot.join(parts.map(({ time, values }) => [time, values] as uPlot.AlignedData)) as unknown as Drawn }
 }
 
@@ -109,36 +120,60 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       element,
     )
     const leave = [listen(plot), listenAtValues(plot, (next) => held.current.onValues(next && [next[0] / factor, next[1] / factor]))]
+    const growing = new Growing(
+      plot,
+      shown.map(({ tone, dash }) => ({ colour: colour(tone), dash })),
+    )
     let known: Extremes | undefined
-    let returns = 0
-    let seen = ''
+    let range: [number, number] = [0, 1]
+    let seen = 0
+    let whole = 0
+    let shape = ''
     let lines = ''
     let frameHandle = 0
     const frame = () => {
       frameHandle = requestAnimationFrame(frame)
+      if (!element.isConnected) return // behind another panel
       const [from, to] = shownWindow()
       const width = Math.max(Math.floor(plot.bbox.width / devicePixelRatio), 10)
-      const now = `${samples.version} ${from} ${to} ${width} ${useUnits.getState().radians} ${String(held.current.values)}`
+      const live = useStudio.getState().run?.state === 'running'
+      const { version, returns, run } = samples
+      const now = `${run} ${returns} ${from} ${to} ${width} ${plot.height} ${live} ${useUnits.getState().radians} ${String(held.current.values)}`
       const marks = `${useCursor.getState().time} ${String(useWindow.getState().cursors)} ${useRuns.getState().runs.at(-1)?.tunings.length}`
-      if (now !== seen) {
-        seen = now
-        // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
-        const made = drawnOf(shown, from, to, width, samples.returns === returns ? known : undefined)
-        const raw = made.drawn
-        known = made.extremes
-        returns = samples.returns
-        const found = axisReading(shown, raw)
-        unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
-        factor = found.factor
-        drawn = scaled(raw, factor)
-        const [low, high] = held.current.values?.map((value) => value * factor) ?? rangeOf(drawn, from, to)
-        plot.batch(() => {
-          plot.setData(drawn as unknown as uPlot.AlignedData, false)
-          plot.setScale('x', { min: from, max: to })
-          plot.setScale('y', { min: low!, max: high! })
-        })
-      } else if (marks !== lines) plot.redraw(false, false)
+      const same = now === shape
+      if (same && marks === lines && version === seen) return
+      if (same && version === whole) {
+        lines = marks
+        plot.redraw(false, false)
+        return
+      }
+      // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
+      const before = same ? known : undefined
+      const made = drawnOf(shown, from, to, width, before)
+      drawn = made.drawn
+      known = made.extremes
+      seen = version
+      const found = axisReading(shown, drawn)
+      const wanted = held.current.values
+      const needed: [number, number] = wanted ? [wanted[0] * found.factor, wanted[1] * found.factor] : rangeOf(drawn, found.factor, from, to)
+      const fits = live && same && needed[0] >= range[0] && needed[1] <= range[1]
+      const grown = fits && marks === lines && found.factor === factor && Boolean(made.extremes) === Boolean(before)
+      if (grown && made.ends) {
+        growing.grow(drawn, factor, made.ends)
+        return
+      }
+      range = fits ? range : live && same && found.factor === factor ? withRoom(needed, range) : needed
+      factor = found.factor
+      whole = version
+      shape = now
       lines = marks
+      unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
+      plot.batch(() => {
+        plot.setData(scaled(drawn, factor) as unknown as uPlot.AlignedData, false)
+        plot.setScale('x', { min: from, max: to })
+        plot.setScale('y', { min: range[0], max: range[1] })
+      })
+      if (made.ends) growing.shows(drawn, made.ends)
     }
     frame()
     if (handle)
@@ -146,7 +181,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
         figure: () => {
           const [min, max] = [plot.scales['y']?.min ?? 0, plot.scales['y']?.max ?? 1]
           const [from, to] = shownWindow()
-          const [x, ...columns] = drawn
+          const [x, ...columns] = scaled(drawn, factor)
           return {
             title,
             width: 760,
@@ -177,7 +212,7 @@ function tick(value: number, splits: number[]): string {
 }
 
 /** Least and greatest value that is seen, with air around them. */
-function rangeOf([time, ...columns]: Drawn, from: number, to: number): [number, number] {
+function rangeOf([time, ...columns]: Drawn, factor: number, from: number, to: number): [number, number] {
   let low = Infinity
   let high = -Infinity
   for (const column of columns)
@@ -187,7 +222,13 @@ function rangeOf([time, ...columns]: Drawn, from: number, to: number): [number, 
       if (value < low) low = value
       if (value > high) high = value
     }
-  return aired(low, high)
+  return aired(low * factor, high * factor)
+}
+
+/** A range that has become too small, with room to where it grows: each change of it draws all anew. */
+function withRoom([low, high]: [number, number], [before, after]: [number, number]): [number, number] {
+  const room = ROOM * (Math.max(high, after) - Math.min(low, before))
+  return [low < before ? low - room : before, high > after ? high + room : after]
 }
 
 /** Which measuring cursor is under the pointer. */

@@ -58,8 +58,9 @@ export interface Extremes {
   to: number
   width: number
   drawn: Drawn
-  /** Of each trace the row at which its last stretch begins: all before it stands. */
+  /** Of each trace the sample at which its last stretch begins, and the row of that stretch: all before them stands. */
   rows: number[]
+  ends: number[]
 }
 
 /**
@@ -71,15 +72,18 @@ export function extremes(traces: { time: Float64Array; values: Float64Array }[],
   const known = before && before.from === from && before.to === to && before.width === width && before.rows.length === traces.length ? before : undefined
   const time = known ? known.drawn[0] : new Float64Array(2 * width).map((_, k) => from + (Math.floor(k / 2) + (k % 2 ? 0.75 : 0.25)) * span)
   const rows: number[] = []
+  const ends: number[] = []
   const columns = traces.map(({ time: at, values }, trace) => {
     const column = known ? (known.drawn[trace + 1] as (number | undefined)[]) : new Array<number | undefined>(2 * width).fill(undefined)
     // One sample beyond each side, so that a line leaves the window where it should.
     let row = known ? known.rows[trace]! : Math.max(firstAfter(at, from) - 1, 0)
     let begin = row
+    let last = known ? known.ends[trace]! : 0
     const end = Math.min(firstAfter(at, to) + 1, at.length)
     while (row < end) {
       begin = row
       const k = Math.min(Math.max(Math.floor((at[row]! - from) / span), 0), width - 1)
+      last = 2 * k
       const until = k === width - 1 ? Infinity : from + (k + 1) * span
       let low = row
       let high = row
@@ -92,9 +96,10 @@ export function extremes(traces: { time: Float64Array; values: Float64Array }[],
       column[2 * k + 1] = values[Math.max(low, high)]
     }
     rows.push(begin)
+    ends.push(last)
     return column
   })
-  return { from, to, width, drawn: [time, ...columns], rows }
+  return { from, to, width, drawn: [time, ...columns], rows, ends }
 }
 
 /** Samples of a trace in a window of time, as they were recorded, with one beyond each side. */

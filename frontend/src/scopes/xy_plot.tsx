@@ -52,6 +52,7 @@ export function XyPlot({ traces, title, handle }: { traces: Trace[]; title: stri
     let frameHandle = 0
     const frame = () => {
       frameHandle = requestAnimationFrame(frame)
+      if (!box.isConnected) return // behind another panel
       const { clientWidth: width, clientHeight: height } = box
       const now = `${samples.version} ${shownTime()} ${width} ${height} ${useUnits.getState().radians}`
       if (now === seen || width < 40 || height < 40) return

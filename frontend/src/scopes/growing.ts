@@ -1,0 +1,79 @@
+import type uPlot from 'uplot'
+import type { Drawn } from './trace'
+
+/** How a trace is drawn: the colour as the canvas wants it, and CSS px. */
+export interface Stroke {
+  colour: string
+  dash: number[]
+}
+
+const WIDTH = 1.5
+
+/**
+ * Draws onto a plot what a run has added since: the cost of a frame is that of its new samples, and not that of all
+ * that stands there already. What it draws looks as uPlot draws it, which draws all anew wherever anything else changes.
+ */
+export class Growing {
+  /** Of each trace the row that was drawn last, and how far its dashes have come (px). */
+  private rows: number[] = []
+  private lengths: number[] = []
+
+  constructor(
+    private readonly plot: uPlot,
+    private readonly strokes: Stroke[],
+  ) {}
+
+  /** The plot shows all of this now. */
+  shows([, ...columns]: Drawn, ends: number[]): void {
+    this.rows = columns.map((column, k) => lastBefore(column, ends[k]!))
+    this.lengths = columns.map(() => 0)
+  }
+
+  /** Draw what came after; `ends` are the rows from which on nothing is certain yet. */
+  grow([time, ...columns]: Drawn, factor: number, ends: number[]): void {
+    const { ctx, bbox } = this.plot
+    const width = WIDTH * devicePixelRatio
+    ctx.save()
+    ctx.beginPath()
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
+    ctx.clip()
+    // Where uPlot puts lines that are not as wide as pixels are.
+    ctx.translate((width % 2) / 2, (width % 2) / 2)
+    ctx.lineWidth = width
+    ctx.lineJoin = 'round'
+    columns.forEach((column, k) => {
+      const from = this.rows[k]!
+      const to = lastBefore(column, ends[k]!)
+      if (to <= from) return
+      this.rows[k] = to
+      const { colour, dash } = this.strokes[k]!
+      ctx.strokeStyle = colour
+      ctx.setLineDash(dash)
+      ctx.lineDashOffset = this.lengths[k]!
+      ctx.beginPath()
+      let [lastX, lastY] = [NaN, NaN]
+      for (let row = Math.max(from, 0); row <= to; row++) {
+        const value = column[row]
+        if (typeof value !== 'number' || Number.isNaN(value)) continue
+        const x = Math.round(this.plot.valToPos(time[row]!, 'x', true))
+        const y = Math.round(this.plot.valToPos(value * factor, 'y', true))
+        if (Number.isNaN(lastX)) ctx.moveTo(x, y)
+        else {
+          ctx.lineTo(x, y)
+          if (dash.length) this.lengths[k]! += Math.hypot(x - lastX, y - lastY)
+        }
+        lastX = x
+        lastY = y
+      }
+      ctx.stroke()
+    })
+    ctx.restore()
+  }
+}
+
+/** The last row before `end` that has a value; -1 if none has. */
+function lastBefore(column: Drawn[number], end: number): number {
+  let row = Math.min(end, column.length) - 1
+  while (row >= 0 && typeof column[row] !== 'number') row--
+  return row
+}
