@@ -20,6 +20,7 @@ import type {
   WireKind,
 } from './protocol'
 import { attachAgain, leaveEditor, robotOpened, robotShown } from './robot/editor/desk'
+import { isFree } from './run/pace'
 import * as runs from './run/runs'
 import { samples } from './samples'
 
@@ -216,7 +217,8 @@ function receive(event: ServerEvent): void {
       break
     case 'run_progress':
       runs.progressed(event)
-      if (run?.run === event.run)
+      // How far it has come may wait; that it ended, or was paused, may not.
+      if (run?.run === event.run && (event.state !== run.state || event.fault || isFree(performance.now())))
         useStudio.setState({
           run: {
             ...run,

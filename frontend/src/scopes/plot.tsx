@@ -3,6 +3,7 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { shownTime, useCursor } from '../run/cursor'
+import { mayFollow } from '../run/pace'
 import { useRuns } from '../run/runs'
 import { samples } from '../samples'
 import { useStudio } from '../store'
@@ -18,7 +19,7 @@ const CLICK_PX = 3
 /** From so many samples in a pixel on only the least and the greatest are drawn. */
 const DENSE = 3
 /** While a run goes on, the part of its range that a vertical axis grows by beyond what is needed. */
-const ROOM = 0.25
+const ROOM = 0.15
 const colour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()
 
 /** What a plot shows now, for those beside it: measures and exports. */
@@ -131,7 +132,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
     let shape = ''
     let lines = ''
     let frameHandle = 0
-    const frame = () => {
+    const frame = (at: number) => {
       frameHandle = requestAnimationFrame(frame)
       if (!element.isConnected) return // behind another panel
       const [from, to] = shownWindow()
@@ -147,6 +148,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
         plot.redraw(false, false)
         return
       }
+      if (same && marks === lines && live && !mayFollow(at)) return
       // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
       const before = same ? known : undefined
       const made = drawnOf(shown, from, to, width, before)
@@ -175,7 +177,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       })
       if (made.ends) growing.shows(drawn, made.ends)
     }
-    frame()
+    frame(performance.now())
     if (handle)
       handle.current = {
         figure: () => {

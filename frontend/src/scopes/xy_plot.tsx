@@ -1,7 +1,9 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
 import { shownTime } from '../run/cursor'
+import { mayFollow } from '../run/pace'
 import { samples } from '../samples'
+import { useStudio } from '../store'
 import { aired, paint, type Figure } from './figure'
 import { reading, useUnits } from './quantity'
 import type { PlotHandle } from './plot'
@@ -50,18 +52,19 @@ export function XyPlot({ traces, title, handle }: { traces: Trace[]; title: stri
     if (!element || !box) return
     let seen = ''
     let frameHandle = 0
-    const frame = () => {
+    const frame = (at: number) => {
       frameHandle = requestAnimationFrame(frame)
       if (!box.isConnected) return // behind another panel
       const { clientWidth: width, clientHeight: height } = box
       const now = `${samples.version} ${shownTime()} ${width} ${height} ${useUnits.getState().radians}`
       if (now === seen || width < 40 || height < 40) return
+      if (useStudio.getState().run?.state === 'running' && !mayFollow(at)) return
       seen = now
       element.width = width * devicePixelRatio
       element.height = height * devicePixelRatio
       paint(figureOf(traces, '', width, height), element, devicePixelRatio)
     }
-    frame()
+    frame(performance.now())
     handle.current = { figure: () => figureOf(traces, title, 520, 480) }
     return () => cancelAnimationFrame(frameHandle)
   }, [traces, title, scheme, handle])
