@@ -1,4 +1,4 @@
-import { Alert, createTheme, Menu, Modal } from '@mantine/core'
+import { createTheme, type AlertProps, type MantineTheme } from '@mantine/core'
 
 /** Colours, type and corners of the component library, as everywhere in armblocks. */
 export const theme = createTheme({
@@ -8,6 +8,7 @@ export const theme = createTheme({
     // The greys of the component library are neutral: ours lean to warm in the light, to blue in the dark.
     gray: ['#f6f4f1', '#f1eeea', '#e9e5e0', '#ddd7d0', '#cfc9c1', '#a39c92', '#7d756b', '#635d55', '#45403a', '#23211e'],
     dark: ['#e8ebf0', '#c9d0da', '#a3adba', '#7d8794', '#3d4652', '#2a313b', '#222831', '#1b2028', '#151a20', '#12151a'],
+    red: ['#fbe9e7', '#f9d6d2', '#f6b7b0', '#ff9d8f', '#e0675c', '#cc453a', '#bf3328', '#b3261e', '#8f1e18', '#6d1712'],
     accent: ['#fff1e6', '#ffe0c7', '#ffc08f', '#ff9a4d', '#f07d24', '#d9650d', '#c25603', '#b04a00', '#8f3c00', '#702f00'],
   },
   respectReducedMotion: true,
@@ -17,17 +18,17 @@ export const theme = createTheme({
   defaultRadius: 'sm',
   components: {
     // The colours of titles and labels on their own tint are too pale to read; the tints are those of every message.
-    Alert: Alert.extend({
+    Alert: {
       styles: { title: { color: 'var(--ink)' } },
-      vars: (_theme, { color }) => {
+      vars: (_theme: MantineTheme, { color }: AlertProps) => {
         const kind = color === 'red' ? 'error' : color === 'blue' || color === 'gray' ? 'muted' : 'warning'
         return { root: { '--alert-bg': kind === 'muted' ? 'var(--sunken)' : `var(--${kind}-wash)`, '--alert-color': `var(--${kind})` } }
       },
-    }),
+    },
     // A stop for the focus before the first entry is no entry; the arrows find the entries without it.
-    Menu: Menu.extend({ defaultProps: { withInitialFocusPlaceholder: false } }),
+    Menu: { defaultProps: { withInitialFocusPlaceholder: false } },
     // The page never scrolls; to forbid it anyway would style the whole of it anew for each dialog.
-    Modal: Modal.extend({ defaultProps: { closeButtonProps: { 'aria-label': 'Close' }, lockScroll: false } }),
+    Modal: { defaultProps: { closeButtonProps: { 'aria-label': 'Close' }, lockScroll: false } },
   },
   fontSizes: { xs: '11px', sm: '12px', md: '13px', lg: '15px', xl: '18px' },
 })

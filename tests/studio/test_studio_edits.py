@@ -40,6 +40,7 @@ from armblocks.studio.edit_messages import (
 from armblocks.studio.edits import applied
 from armblocks.studio.nesting import inside
 from armblocks.studio.outline import find, outline
+from armblocks.studio.parameter_values import parameter_value
 from armblocks.studio.placing import placed
 from armblocks.studio.sheet import sheet
 
@@ -248,6 +249,23 @@ def test_there_is_an_end_to_undo_and_redo() -> None:
         empty().undo()
     with pytest.raises(ArmblocksError, match="there is nothing to redo"):
         empty().redo()
+
+
+@pytest.mark.parametrize(
+    ("typed", "matrix"),
+    [
+        ("-1", ((-1.0,),)),
+        ("[-1]", ((-1.0,),)),
+        ("[1 2]", ((1.0, 2.0),)),
+        ("[2*2; sqrt(9)]", ((4.0,), (3.0,))),
+        ("[1 2; 3 4]", ((1.0, 2.0), (3.0, 4.0))),
+    ],
+)
+def test_where_only_a_matrix_may_stand_rows_and_columns_are_what_is_typed(
+    typed: str, matrix: tuple[tuple[float, ...], ...]
+) -> None:
+    rule = next(rule for rule in BLOCKS["StateSpace"].parameters() if rule.name == "A")
+    assert parameter_value(rule, typed, "plant", load_robot) == matrix
 
 
 @pytest.mark.parametrize(

@@ -30,13 +30,13 @@ export function FileMenu() {
         <Menu.Item leftSection={<IconRobot size={15} />} onClick={() => void ask({ kind: 'robot_open' })}>
           New robot
         </Menu.Item>
-        <Menu.Item leftSection={<IconFolderOpen size={15} />} rightSection={<Kbd>Ctrl+O</Kbd>} onClick={() => show('open')}>
+        <Menu.Item leftSection={<IconFolderOpen size={15} />} rightSection={<Kbd size="xs">Ctrl+O</Kbd>} onClick={() => show('open')}>
           Open …
         </Menu.Item>
-        <Menu.Item leftSection={<IconDeviceFloppy size={15} />} rightSection={<Kbd>Ctrl+S</Kbd>} disabled={!document} onClick={() => void save()}>
+        <Menu.Item leftSection={<IconDeviceFloppy size={15} />} rightSection={<Kbd size="xs">Ctrl+S</Kbd>} disabled={!document} onClick={() => void save()}>
           Save
         </Menu.Item>
-        <Menu.Item leftSection={<IconDeviceFloppy size={15} />} rightSection={<Kbd>Ctrl+Shift+S</Kbd>} disabled={!document} onClick={() => show('save_as')}>
+        <Menu.Item leftSection={<IconDeviceFloppy size={15} />} rightSection={<Kbd size="xs">Ctrl+Shift+S</Kbd>} disabled={!document} onClick={() => show('save_as')}>
           Save as …
         </Menu.Item>
         {recoveries.length > 0 && (

@@ -50,7 +50,7 @@ function SaveAs() {
           label="File"
           description="A name in the project folder; folders are made: models/arm.json"
           data-autofocus
-          data={files}
+          data={files.filter((file) => file !== path)}
           limit={8}
           comboboxProps={{ withinPortal: true }}
           value={typed}

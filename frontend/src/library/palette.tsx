@@ -34,7 +34,7 @@ export function Palette() {
         onChange={(event) => setSought(event.currentTarget.value)}
       />
       <ScrollArea className="families" type="auto" scrollbarSize={7} offsetScrollbars="y">
-        {families.length === 0 && <p className="empty">No block matches “{sought}”.</p>}
+        {families.length === 0 && sought && <p className="empty">No block matches “{sought}”.</p>}
         {families.map(([family, kinds]) => {
           const shown = sought !== '' || open.has(family)
           return (

@@ -137,6 +137,11 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
 
   useFrame(() => {
     const now = controls.current
+    // As long as nobody has moved the view, it takes in whatever a run that goes on has reached.
+    if (!touched.current && !follow && toolAt(scratch.tool)) {
+      const { x, y } = scratch.tool.project(camera)
+      if (Math.max(Math.abs(x), Math.abs(y)) > 1) fit(new Vector3(...PRESETS.iso), false)
+    }
     if (!now || (!follow && !mounted.current) || !toolAt(scratch.tool)) return
     const { matrix, tool, last, eye, to } = scratch
     if (mounted.current) {

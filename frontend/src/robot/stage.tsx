@@ -252,8 +252,10 @@ function Ground({ height, reach, colours }: { height: number; reach: number; col
         sectionThickness={1.1}
         cellColor={colours.cell}
         sectionColor={colours.section}
-        fadeDistance={7 * reach}
-        fadeStrength={1.5}
+        // Around the arm, however far the camera is: from a narrow panel's distance all of it would have faded.
+        fadeFrom={0}
+        fadeDistance={6 * reach}
+        fadeStrength={1.2}
         infiniteGrid
       />
     </>

@@ -36,7 +36,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
                 <svg width="16" height="4" aria-hidden>
                   <line x1="0" x2="16" y1="2" y2="2" stroke={`var(--${tone})`} strokeWidth="2.5" strokeDasharray={dash.join(' ')} />
                 </svg>
-                {names[k]}
+                <span>{names[k]}</span>
               </button>
             ))}
         </span>

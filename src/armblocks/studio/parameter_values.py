@@ -44,7 +44,8 @@ def parameter_value(
             formula_value(rule, typed, scope, where)
             return ParameterFormula(typed.strip())
     if rule.kind in _NUMERIC:
-        typed = number_value(typed, place) if isinstance(typed, str) else _with_infinities(typed)
+        read = _matrix if rule.dimensions == (2,) else number_value
+        typed = read(typed, place) if isinstance(typed, str) else _with_infinities(typed)
         if rule.kind is ParameterKind.INTEGER and isinstance(typed, float) and typed.is_integer():
             typed = int(typed)
     return rule.check(typed, place)
@@ -63,6 +64,17 @@ def number_value(text: str, where: str) -> float | list[Any]:
         raise
     except InputError as error:  # what else a formula may hold would bury what is wrong
         raise InputError(error.what, where=where, allowed=_ALLOWED, fix="correct the formula") from None
+
+
+def _matrix(text: str, where: str) -> Any:
+    """The matrix that a text means where it can be nothing else: ``[1 2]`` is a row, ``[1; 2]`` a column."""
+    bare = text.strip()
+    inner = bare[1:-1]
+    if not (bare.startswith("[") and bare.endswith("]")) or "[" in inner:
+        value = number_value(text, where)
+        return value if isinstance(value, list) else [[value]]
+    rows = [number_value(f"[{row}]", where) for row in inner.split(";")]
+    return [row if isinstance(row, list) else [row] for row in rows]
 
 
 def tuned_value(typed: Any, where: str) -> Any:
