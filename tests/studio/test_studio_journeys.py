@@ -4,12 +4,41 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
+import pytest
 from accessibility import axe
 from playwright.sync_api import Page, expect
 
 import armblocks as ab
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("journeys")
+
+
+@pytest.fixture(scope="module")
+def shared(open_studio: Callable[..., Page], folder: Path) -> Page:
+    return open_studio(folder)
+
+
+@pytest.fixture
+def page(shared: Page) -> Page:
+    """The page that all tests here share, with a model without an arm: that is drawn slowly in software."""
+    return open_example(shared, "van_der_pol_pid")
+
+
+def open_example(page: Page, name: str) -> Page:
+    page.keyboard.press("Escape")
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name=re.compile(f"^{name} [a-z]")).click()
+    expect(page.get_by_role("menu")).to_be_hidden()
+    expect(page.locator(".title")).to_have_text(name)
+    page.locator(".react-flow__node").first.wait_for()
+    return page
 
 
 def block(page: Page, name: str):
@@ -54,12 +83,18 @@ def wire(page: Page, source: str, target: str) -> None:
     page.mouse.up()
 
 
+def show_theme(page: Page, theme: Literal["light", "dark"]) -> None:
+    page.emulate_media(color_scheme=theme)
+    expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", theme)
+
+
 def run(page: Page) -> None:
     page.keyboard.press("Control+Enter")
     expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
 
 
-def test_the_first_example_is_shown_run_and_scrubbed(page: Page) -> None:
+def test_the_first_example_is_shown_run_and_scrubbed(shared: Page) -> None:
+    page = shared
     expect(page.locator(".robot canvas")).to_be_visible()
     run(page)
     expect(page.locator(".chart")).not_to_have_count(0)
@@ -71,9 +106,12 @@ def test_the_first_example_is_shown_run_and_scrubbed(page: Page) -> None:
     page.get_by_role("button", name="Play the run").click()
     expect(page.get_by_role("button", name="Hold the playback")).to_be_visible()
     page.get_by_role("button", name="Hold the playback").click()
+    for theme in ("dark", "light"):
+        show_theme(page, theme)
+        axe(page)
 
 
-def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, tmp_path: Path) -> None:
+def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Path) -> None:
     new_diagram(page)
     drag_from_library(page, "SineWave", 150, 150)
     drag_from_library(page, "Gain", 300, 150)
@@ -98,7 +136,7 @@ def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, tmp_path: P
     page.get_by_role("combobox", name="File").fill("made/by hand.json")
     page.get_by_role("button", name="Save", exact=True).click()
     expect(page.locator(".title")).to_have_text("by hand")
-    made = ab.load_diagram(tmp_path / "made" / "by hand.json")
+    made = ab.load_diagram(folder / "made" / "by hand.json")
     assert made.blocks["Gain"].parameter_value("gain") == 6.283185307179586
     assert [str(wire) for wire in made.connections][1] == "Sine Wave/y -> Gain/u"
 
@@ -130,23 +168,24 @@ def test_the_same_with_the_keyboard_alone_and_undone_to_nothing(page: Page) -> N
 
 
 def test_blocks_are_grouped_entered_and_left(page: Page) -> None:
-    block(page, "T2xyz").click()
+    block(page, "damping").click()
     page.keyboard.press("Control+g")
-    expect(block(page, "Subsystem")).to_be_visible()
-    expect(block(page, "T2xyz")).to_have_count(0)
+    expect(block(page, "Subsystem")).to_have_class(re.compile("selected"))
+    expect(block(page, "damping")).to_have_count(0)
     page.keyboard.press("Enter")
-    expect(block(page, "T2xyz")).to_be_visible()
-    expect(page.locator(".breadcrumbs")).to_have_text(re.compile("kr180model.*Subsystem"))
+    expect(block(page, "damping")).to_be_visible()
+    expect(page.locator(".breadcrumbs")).to_have_text(re.compile("van_der_pol_pid.*Subsystem"))
     page.keyboard.press("Escape")
     page.keyboard.press("Escape")
     expect(block(page, "Subsystem")).to_be_visible()
     run(page)
     page.keyboard.press("Control+z")
-    expect(block(page, "T2xyz")).to_be_visible()
+    expect(block(page, "damping")).to_be_visible()
 
 
 def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
-    page.get_by_role("combobox", name="Speed").select_option("0.5 × real time")
+    speed = page.get_by_role("combobox", name="Speed")
+    speed.select_option("2 × real time")
     page.keyboard.press("Control+Enter")
     state = page.locator(".run-state")
     expect(state).to_contain_text("running")
@@ -159,40 +198,41 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
     expect(state).to_contain_text("running")
     page.get_by_role("button", name="Stop").click()
     expect(state).to_contain_text("stopped", timeout=3000)
+    speed.select_option("as fast as possible")
 
 
-def test_two_pages_show_the_same_document(page: Page) -> None:
+def test_two_pages_show_the_same_document(open_studio: Callable[..., Page], tmp_path: Path) -> None:
+    page = open_studio(tmp_path, "van_der_pol_pid")
     other = page.context.new_page()
     other.goto(page.url)
     other.locator(".react-flow__node").first.wait_for()
-    block(page, "T2xyz").click()
+    block(page, "PID").click()
     page.keyboard.press("Delete")
-    expect(block(other, "T2xyz")).to_have_count(0)
+    expect(block(other, "PID")).to_have_count(0)
     other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
     other.keyboard.press("Control+z")
-    expect(block(page, "T2xyz")).to_be_visible()
+    expect(block(page, "PID")).to_be_visible()
 
 
 def test_copied_blocks_travel_as_text(page: Page) -> None:
-    block(page, "speed").click()
+    block(page, "PID").click()
     page.keyboard.press("Control+c")
     page.wait_for_function("navigator.clipboard.readText().then((text) => text.includes('\"blocks\"'))")
-    assert list(json.loads(page.evaluate("navigator.clipboard.readText()"))["blocks"]) == ["speed"]
+    assert list(json.loads(page.evaluate("navigator.clipboard.readText()"))["blocks"]) == ["PID"]
     page.keyboard.press("Control+v")
-    expect(block(page, "speed 2")).to_be_visible()
+    expect(block(page, "PID 2")).to_be_visible()
 
 
 def test_axe_finds_nothing_serious_in_the_light_and_in_the_dark(page: Page) -> None:
     dialog = page.get_by_role("dialog")
-    for theme in ("light", "dark"):
-        page.emulate_media(color_scheme=theme)
-        expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", theme)
+    for theme in ("dark", "light"):
+        show_theme(page, theme)
         axe(page)
         for opens in ("Control+k", "?", "Enter"):
-            block(page, "jtraj").focus()
+            block(page, "PID").focus()
             page.keyboard.press(opens)
             expect(dialog).to_be_visible()
             axe(page)
             page.keyboard.press("Escape")
             expect(dialog).to_be_hidden()
-            expect(block(page, "jtraj")).to_be_focused()  # who worked with the keys goes on where they were
+            expect(block(page, "PID")).to_be_focused()  # who worked with the keys goes on where they were

@@ -31,10 +31,10 @@ def lag_model(name: str) -> ab.Diagram:
 
 
 @pytest.fixture(scope="module")
-def opened(open_studio: Callable[[Path], Page], tmp_path_factory: pytest.TempPathFactory) -> Opened:
+def opened(open_studio: Callable[..., Page], tmp_path_factory: pytest.TempPathFactory) -> Opened:
     """One server and one page for all: each test opens a model of its own."""
     folder = tmp_path_factory.mktemp("running")
-    page = open_studio(folder)
+    page = open_studio(folder, "van_der_pol_pid")
     origin = page.url.partition("#")[0]
 
     def opening(diagram: ab.Diagram) -> Page:
