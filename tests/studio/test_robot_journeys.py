@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import base64
 import re
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -21,6 +23,17 @@ DROP = """([name, content]) => {
             new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: brought })
         )
 }"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("robots")
+
+
+@pytest.fixture(scope="module")
+def page(open_studio: Callable[..., Page], folder: Path) -> Page:
+    """One page for all: each test leaves it with a diagram on the screen. It begins without an arm."""
+    return open_studio(folder, "van_der_pol_pid")
 
 
 def drop(page: Page, name: str, content: bytes) -> None:
@@ -40,7 +53,7 @@ def open_shipped(page: Page, name: str) -> Locator:
     return editor
 
 
-def test_a_robot_is_typed_marked_undone_saved_and_opened_again(page: Page, tmp_path: Path) -> None:
+def test_a_robot_is_typed_marked_undone_saved_and_opened_again(page: Page, folder: Path) -> None:
     editor = open_shipped(page, "puma560")
     expect(tool_x(editor)).to_have_text("0.4521 m")
     cell = editor.get_by_role("textbox", name="a of link2", exact=True)
@@ -84,11 +97,11 @@ def test_a_robot_is_typed_marked_undone_saved_and_opened_again(page: Page, tmp_p
     page.get_by_role("textbox", name="File in this folder").fill("arms/mine.json")
     page.get_by_role("button", name="Save", exact=True).click()
     expect(editor.get_by_text("arms/mine.json")).to_be_visible()
-    (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()
+    (saved,) = read_robots((folder / "arms" / "mine.json").read_bytes(), "mine.json").values()
     assert saved.links[1].dh is not None
     assert saved.links[1].dh.a == 0.5
     assert saved.links[2:] == load_robot("puma560").links[2:]
-    editor.get_by_role("button", name="kr180model").click()
+    editor.get_by_role("button", name="van_der_pol_pid").click()
     expect(editor).to_have_count(0)
     expect(page.locator(".react-flow__node").first).to_be_visible()
 
@@ -132,6 +145,8 @@ def test_the_paper_s_script_is_dropped_looked_at_and_pictured(page: Page) -> Non
 
 
 def test_the_robot_of_a_block_is_edited_and_axe_finds_nothing_serious(page: Page) -> None:
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name=re.compile("^kr180model [a-z]")).click()
     panel = page.get_by_role("toolbar", name="Robot view")
     panel.get_by_role("button", name="Edit this robot").click()
     editor = page.locator(".robot-editor")
