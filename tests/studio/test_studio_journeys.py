@@ -63,7 +63,7 @@ def add(page: Page, typed: str) -> None:
 
 def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
     page.get_by_role("textbox", name="Search the library").fill(kind)
-    target = page.locator(".react-flow__pane")
+    target = page.locator(".canvas")  # an empty one has examples on it
     page.locator(f'.kind[data-type="{kind}"]').drag_to(target, target_position={"x": x, "y": y})
     page.get_by_role("button", name="Clear the search").click()
 
