@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import MutableMapping
+import re
+from collections.abc import Iterator, MutableMapping
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +22,11 @@ ORIGIN = f"http://{HOST}"
 @pytest.fixture
 def web(tmp_path: Path) -> Path:
     folder = tmp_path / "web"
-    folder.mkdir()
+    (folder / "assets").mkdir(parents=True)
     (folder / "index.html").write_text("<html></html>")
     (tmp_path / "web-secret").mkdir()
-    (tmp_path / "web-secret" / "key").write_text("secret")
-    (tmp_path / "secret.txt").write_text("secret")
+    (tmp_path / "web-secret" / "key").write_text("HIDDEN")
+    (tmp_path / "secret.txt").write_text("HIDDEN")
     (folder / "link.txt").symlink_to(tmp_path / "secret.txt")
     return folder
 
@@ -52,9 +53,9 @@ def call(app: Guard, path: str, headers: dict[str, str], *, method: str = "GET",
         "http_version": "1.1",
         "scheme": "http" if kind == "http" else "ws",
         "path": route,
-        "raw_path": route.encode(),
+        "raw_path": route.encode("utf-8", "replace"),
         "root_path": "",
-        "query_string": query.encode(),
+        "query_string": query.encode("utf-8", "replace"),
         "headers": [(name.encode(), value.encode()) for name, value in headers.items()],
         "client": ("127.0.0.1", 1),
         "server": ("127.0.0.1", 8642),
@@ -109,6 +110,71 @@ def test_every_route_refuses_a_stranger_but_login_and_health(app: Guard) -> None
         elif path not in Guard.OPEN:
             assert call(app, path, {"host": HOST})[0] == 401, path
     assert call(app, "/health", {"host": HOST})[0] == 200
+
+
+HOSTILE = (
+    "",
+    ".",
+    "..",
+    "../secret",
+    "../../secret.txt",
+    "%2e%2e%2fsecret.txt",
+    "..\\secret.txt",
+    "/etc/passwd",
+    "//host/share",
+    "C:\\secret",
+    "a\0b",
+    "x" * 20_000,
+    "\ud7ff\uffff",
+    "<script>alert(1)</script>",
+    "{document}",
+    "%s%n",
+    "__class__",
+)
+QUERIES = ("", "sheet=../..", "theme=dark&theme=x", "theme=%00", "sheet=" + "a/" * 5000, "key=%ff", "&&==&")
+
+
+def hostile_paths(app: Guard, document: str) -> Iterator[str]:
+    """Every route with something hostile in the place of each thing that it asks for, and hostile queries."""
+    for route in app._app.routes:  # pyright: ignore
+        if isinstance(route, WebSocketRoute):
+            continue
+        path: str = route.path
+        for hostile in HOSTILE:
+            for name in re.findall(r"{\w+}", path):
+                filled = path.replace(name, hostile)
+                yield filled.replace("{document}", document).replace("{kind}", "svg")
+            yield f"{path.rstrip('/')}/{hostile}"
+        for query in QUERIES:
+            yield f"{path.replace('{document}', document).replace('{kind}', 'svg')}?{query}"
+
+
+def test_no_route_breaks_or_gives_away_a_file_whatever_it_is_asked(
+    web: Path, keys: Keys, tmp_path: Path
+) -> None:
+    (tmp_path / "project").mkdir()
+    coming = HubToCome(ProjectFolder(tmp_path / "project"))
+    app = studio_app(coming, keys, frozenset({HOST}), web)
+
+    async def opened() -> str:
+        return (await coming.here()).documents.new().key
+
+    document = asyncio.run(opened())
+    assert call(app, f"/drawing/{document}.svg", cookie(keys))[0] == 200
+    paths = sorted(set(hostile_paths(app, document)))
+    assert len(paths) > 100
+    for path in paths:
+        status, answer, body = call(app, path, cookie(keys))
+        assert status in (200, 303, 307, 401, 404, 405, 422), (status, path[:100])
+        assert status == 200 or len(body) < 30_000
+        assert b"HIDDEN" not in body
+        assert "default-src 'self'" in answer["content-security-policy"]
+        if b"<script>alert" in body:
+            assert answer["content-type"].startswith("text/plain")
+    headers = {**cookie(keys), "origin": ORIGIN, "x-armblocks": "1", "sec-fetch-site": "same-origin"}
+    for path in [path for kind, path in routes(app) if kind == "http"]:
+        for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "NONSENSE"):
+            assert call(app, path, headers, method=method)[0] in (404, 405), (method, path)
 
 
 def test_the_login_link_opens_the_door_once(app: Guard, keys: Keys) -> None:
@@ -187,7 +253,7 @@ def test_two_host_headers_are_refused(app: Guard, keys: Keys) -> None:
 def test_no_path_leads_out_of_the_page_folder(app: Guard, keys: Keys, path: str) -> None:
     status, _, body = call(app, path, cookie(keys))
     assert status in (401, 404, 405)
-    assert b"secret" not in body
+    assert b"HIDDEN" not in body
 
 
 def test_answers_carry_the_policy_that_keeps_other_code_out(app: Guard, keys: Keys) -> None:
