@@ -1,5 +1,6 @@
 import { Alert, Button, Group } from '@mantine/core'
 import { IconAlertTriangle, IconFileAlert, IconHistory } from '@tabler/icons-react'
+import { reload, useDesk, type RobotShown } from '../robot/editor/desk'
 import { ask, useStudio } from '../store'
 import { show } from '../dialogs'
 
@@ -44,17 +45,10 @@ export function FileNotice({ path, disk, dirty, journaled, actions }: Standing &
   )
 }
 
-/** What is to be known of the drawing on the screen, and of what else was not saved. */
+/** What is to be known of the drawing or the robot on the screen, and of what else was not saved. */
 export function DiskNotice() {
-  const state = useStudio((s) => s.document?.state)
   const lost = useStudio((s) => (s.returned ? s.recoveries.length : 0))
-  if (!state) return null
-  const { document, path, disk = 'same', dirty, journaled = true } = state
-  const actions = {
-    reload: () => void ask({ kind: 'reload', document }),
-    keepMine: () => void ask({ kind: 'keep_mine', document }),
-    saveAs: () => show('save_as'),
-  }
+  const robot = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
   return (
     <>
       {lost > 0 && (
@@ -67,7 +61,29 @@ export function DiskNotice() {
           </Group>
         </Alert>
       )}
-      <FileNotice {...{ path, disk, dirty, journaled, actions }} />
+      {robot ? <OfRobot shown={robot} /> : <OfDrawing />}
     </>
   )
+}
+
+function OfRobot({ shown }: { shown: RobotShown }) {
+  const { robot, path, disk, dirty, journaled } = shown
+  const actions = {
+    reload: () => reload(robot),
+    keepMine: () => void ask({ kind: 'robot_keep_mine', robot }),
+    saveAs: () => void import('../robot/editor/save_dialog').then(({ saveRobotAs }) => saveRobotAs(shown)),
+  }
+  return <FileNotice {...{ path, disk, dirty, journaled, actions }} />
+}
+
+function OfDrawing() {
+  const state = useStudio((s) => s.document?.state)
+  if (!state) return null
+  const { document, path, disk = 'same', dirty, journaled = true } = state
+  const actions = {
+    reload: () => void ask({ kind: 'reload', document }),
+    keepMine: () => void ask({ kind: 'keep_mine', document }),
+    saveAs: () => show('save_as'),
+  }
+  return <FileNotice {...{ path, disk, dirty, journaled, actions }} />
 }

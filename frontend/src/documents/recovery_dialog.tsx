@@ -1,4 +1,4 @@
-import { Badge, Button, Card, Group, Modal, Stack, Text } from '@mantine/core'
+import { Badge, Button, Group, Modal, Paper, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import type { Recovery } from '../protocol'
 import { ask, useStudio } from '../store'
@@ -44,7 +44,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
     void ask({ kind: 'recover', document, action })
   }
   return (
-    <Card withBorder padding="sm" role="group" aria-label={path ?? title}>
+    <Paper withBorder p="sm" role="group" aria-label={path ?? title}>
       <Group justify="space-between" align="flex-start" wrap="nowrap">
         <div>
           <Text fw={600}>{path ?? `${title}, never saved`}</Text>
@@ -90,6 +90,6 @@ function Offer({ recovery }: { recovery: Recovery }) {
           </>
         )}
       </Group>
-    </Card>
+    </Paper>
   )
 }

@@ -4,14 +4,13 @@ import { IconAlertTriangle, IconArrowBackUp, IconArrowForwardUp, IconArrowLeft, 
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
 import { show } from '../../dialogs'
-import { FileNotice } from '../../documents/disk_notice'
 import { ask, useStudio } from '../../store'
-import { alter, edit, leaveEditor, reload, showRobot, useDesk, type Angles, type RobotShown } from './desk'
+import { alter, edit, leaveEditor, showRobot, useDesk, type Angles, type RobotShown } from './desk'
 import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
 import { RobotFields } from './robot_fields'
 import { LinkTable } from './table'
-import { saveRobot, saveRobotAs, SaveDialog } from './save_dialog'
+import { saveRobot, SaveDialog } from './save_dialog'
 
 const ArmPanel = lazy(() => import('./arm_panel'))
 /** From this height on (px) both tables are seen at once. */
@@ -96,7 +95,6 @@ export default function RobotEditor() {
     <div className="robot-editor" role="region" aria-label={`Robot ${shown.name}`}>
       <Bar shown={shown} />
       <Notes />
-      <OfFile shown={shown} />
       <div className="robot-dock">
         <DockviewReact className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'} components={panels} defaultTabComponent={Tab} onReady={arrange} />
       </div>
@@ -246,17 +244,6 @@ function Convention({ shown }: { shown: RobotShown }) {
       </Menu.Dropdown>
     </Menu>
   )
-}
-
-/** What is to be known of the robot's file and journal. */
-function OfFile({ shown }: { shown: RobotShown }) {
-  const { robot, path, disk, dirty, journaled } = shown
-  const actions = {
-    reload: () => reload(robot),
-    keepMine: () => void ask({ kind: 'robot_keep_mine', robot }),
-    saveAs: () => saveRobotAs(shown),
-  }
-  return <FileNotice {...{ path, disk, dirty, journaled, actions }} />
 }
 
 /** What was said while the file was read. */
