@@ -1,0 +1,30 @@
+import { IconEdit } from '@tabler/icons-react'
+import { useCallback, useMemo } from 'react'
+import { ask } from '../store'
+import { RunArm } from './run_arm'
+import { listed, type RobotScene } from './scene'
+import { Button } from './view_tools'
+
+export interface RunStageProps {
+  document: string
+  inside: string[]
+  block: string
+  scene: RobotScene
+  /** Poses of the arm at rest, and the joints' values there. */
+  rest: number[][][]
+  q: number[]
+}
+
+/** The arm of a block as the run moves it. */
+export default function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
+  const poses = useMemo(() => listed(rest), [rest])
+  const drawing = useCallback(
+    () => ask<string>({ kind: 'robot_picture', document, inside, block, q, theme: globalThis.document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light' }),
+    [document, inside, block, q],
+  )
+  return (
+    <RunArm path={[...inside, block].join('/')} scene={scene} rest={poses} drawing={drawing}>
+      <Button label="Edit this robot" icon={IconEdit} onClick={() => void ask({ kind: 'robot_of_block', document, inside, block })} />
+    </RunArm>
+  )
+}
