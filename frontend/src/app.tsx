@@ -2,7 +2,7 @@ import { useComputedColorScheme } from '@mantine/core'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps, type IDockviewPanelProps } from 'dockview-react'
 import { lazy, Suspense, useEffect, useState, type ComponentType, type FunctionComponent } from 'react'
 import { Canvas } from './canvas/canvas'
-import { later, useSettled, useWanted } from './later'
+import { later, useSettled, useSettling, useWanted } from './later'
 import { Palette } from './library/palette'
 import { Notices } from './notices'
 import { TopBar } from './run/top_bar'
@@ -12,7 +12,7 @@ import { useDesk } from './robot/editor/desk'
 import { useStudio } from './store'
 
 const RobotEditor = lazy(() => import('./robot/editor/robot_editor'))
-const RobotView = lazy(() => import('./robot/robot_view'))
+const RobotView = later(async () => (await import('./robot/robot_view')).default, 'Loading the robot view …')
 const Dialogs = later(async () => (await import('./all_dialogs')).AllDialogs)
 const Explorer = later(async () => (await import('./library/explorer')).Explorer, 'Loading the tree …')
 const Scopes = later(async () => (await import('./scopes/scopes')).Scopes, 'Loading the scopes …')
@@ -31,11 +31,13 @@ const panels: Record<string, FunctionComponent<IDockviewPanelProps>> = {
   scopes: ScopesPanel,
   tune: inFront(TunePanel),
   signals: inFront(SignalInspector),
-  robot: () => (
-    <Suspense fallback={<p className="empty">Loading the robot view …</p>}>
-      <RobotView />
-    </Suspense>
-  ),
+  robot: RobotPanel,
+}
+
+/** Where nothing but the processor draws, the arm's first picture takes seconds: the diagram comes first. */
+function RobotPanel() {
+  const settled = useSettled()
+  return settled ? <RobotView /> : <p className="empty">Loading the robot view …</p>
 }
 
 /** A panel that is drawn from when it first comes to the front: what stands behind another costs nothing. */
@@ -88,6 +90,7 @@ function arrange({ api }: DockviewReadyEvent): void {
 export function App() {
   const scheme = useComputedColorScheme('light')
   const editing = useDesk((s) => s.current !== null)
+  useSettling()
   const settled = useSettled()
   const wanted = useWanted()
   return (

@@ -1,4 +1,5 @@
-import { lazy, Suspense, useEffect, useState, type ComponentType } from 'react'
+import { lazy, Suspense, useEffect, type ComponentType } from 'react'
+import { create } from 'zustand'
 import { useDialogs, useTour } from './dialogs'
 import { useStudio } from './store'
 
@@ -19,20 +20,21 @@ export function later(load: () => Promise<ComponentType>, words = ''): Component
   )
 }
 
-/** Whether the first picture of the page is there, so that what comes later may come. It is fetched then. */
-export function useSettled(): boolean {
+/** Whether the first picture of the page is there, so that what comes later may come. */
+export const useSettled = create(() => false)
+
+/** Wait for the first picture, then fetch what comes later. */
+export function useSettling(): void {
   const shown = useStudio((s) => s.document !== null)
-  const [settled, setSettled] = useState(false)
   useEffect(() => {
     if (!shown) return
     const settle = () => {
-      setSettled(true)
+      useSettled.setState(true)
       for (const load of parts) void load()
     }
     const idle = requestIdleCallback(settle, { timeout: PATIENCE_MS })
     return () => cancelIdleCallback(idle)
   }, [shown])
-  return settled
 }
 
 /** Whether somebody wants a dialog, now or before the page has settled. */

@@ -197,6 +197,7 @@ def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> 
         preparing = asyncio.create_task(prepare())
         yield
         preparing.cancel()
+        await asyncio.gather(preparing, return_exceptions=True)
         if hub.made.done() and hub.made.exception() is None:
             hub.made.result().close()
 

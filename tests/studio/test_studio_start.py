@@ -1,0 +1,99 @@
+"""The page is served before what stands behind it; where that cannot be made, the server says why."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import MutableMapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from armblocks.errors import FormatError
+from armblocks.studio import launch
+from armblocks.studio import server as studio_server
+from armblocks.studio.guard import Keys
+from armblocks.studio.hub import Hub
+from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.server import FOREVER, HubToCome, studio_app
+
+HOST = "127.0.0.1:8642"
+
+
+@pytest.fixture
+def web(tmp_path: Path) -> Path:
+    (tmp_path / "web" / "assets").mkdir(parents=True)
+    (tmp_path / "web" / "index.html").write_text("<html></html>")
+    (tmp_path / "web" / "assets" / "index-1a2b.js").write_text("")
+    return tmp_path / "web"
+
+
+def answered(web: Path, hub: HubToCome, path: str) -> tuple[int, dict[str, str]]:
+    """Status and headers that a page with the session gets."""
+    keys, sent = Keys(8642), list[MutableMapping[str, Any]]()
+    app = studio_app(hub, keys, frozenset({HOST}), web)
+    scope: dict[str, Any] = {
+        "type": "http",
+        "method": "GET",
+        "path": path,
+        "root_path": "",
+        "query_string": b"",
+        "headers": [
+            (b"host", HOST.encode()),
+            (b"cookie", f"{keys.cookie_name}={keys.session}".encode()),
+        ],
+    }
+
+    messages = [{"type": "http.request", "body": b"", "more_body": False}]
+
+    async def receive() -> MutableMapping[str, Any]:
+        return messages.pop() if messages else await asyncio.Future()
+
+    async def send(message: MutableMapping[str, Any]) -> None:
+        sent.append(message)
+
+    asyncio.run(app(scope, receive, send))
+    return sent[0]["status"], {name.decode(): value.decode() for name, value in sent[0]["headers"]}
+
+
+def test_the_page_is_there_while_the_hub_is_made(
+    web: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on = threading.Event()
+
+    def slow(folder: ProjectFolder) -> Hub:
+        go_on.wait()
+        return Hub(folder)
+
+    monkeypatch.setattr("armblocks.studio.hub.Hub", slow)
+    hub = HubToCome(ProjectFolder(tmp_path))
+    hub.begin()
+    try:
+        assert answered(web, hub, "/")[0] == 200
+        assert answered(web, hub, "/assets/index-1a2b.js")[0] == 200
+        assert not hub.made.done()
+    finally:
+        go_on.set()
+    assert isinstance(hub.made.result(timeout=60), Hub)
+    hub.made.result().close()
+
+
+def test_files_that_are_named_by_their_content_are_kept_and_the_page_is_not(
+    web: Path, tmp_path: Path
+) -> None:
+    hub = HubToCome(ProjectFolder(tmp_path))
+    assert answered(web, hub, "/assets/index-1a2b.js")[1]["cache-control"] == FOREVER
+    assert answered(web, hub, "/")[1]["cache-control"] == "no-cache"
+
+
+def test_a_server_whose_hub_cannot_be_made_ends_with_the_reason(
+    web: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(folder: ProjectFolder) -> Hub:
+        raise FormatError("the shipped robots are missing", where=str(folder.root))
+
+    monkeypatch.setattr("armblocks.studio.hub.Hub", broken)
+    monkeypatch.setattr(launch, "built_page", lambda: studio_server.built_page(web))
+    with pytest.raises(FormatError, match="the shipped robots are missing"):
+        launch.serve(tmp_path, "", port=0, open_browser=False, announce=lambda _: None)
