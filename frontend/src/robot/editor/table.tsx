@@ -204,7 +204,7 @@ function TextCell({ label, text, doc, send, marked, wide, onlyAtTheEnd }: TextCe
   }
   const tip = fault ? `${fault.what}${fault.fix ? `. ${fault.fix}` : ''}` : marked ? `${marked.what} ${marked.fix}` : ''
   return (
-    <Tooltip label={tip} opened={Boolean(tip) && focused} multiline w={280} position="bottom" color={fault ? 'red.9' : 'dark'} withArrow>
+    <Tooltip label={tip} opened={Boolean(tip) && focused} multiline w={280} position="bottom" {...(fault ? { color: 'red.9' } : {})} withArrow>
       <input
         className={`cell${wide ? ' wide' : ''}${fault ? ' wrong' : marked ? ' marked' : ''}`}
         aria-label={label}
