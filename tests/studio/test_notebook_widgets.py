@@ -115,6 +115,11 @@ def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
     expect(arm.get_by_label("Position of the tool")).to_have_text(said(puma.fkine(q)[:3, 3]))
     expect(arm.get_by_role("slider", name="Time")).to_have_count(0)
     expect(arm.locator(".robot canvas")).to_be_visible()
+    page = arm.locator("html")
+    notebook.emulate_media(color_scheme="dark")
+    expect(page).to_have_attribute("data-mantine-color-scheme", "dark")
+    notebook.evaluate("document.body.dataset.jpThemeLight = 'true'")  # as JupyterLab says its theme
+    expect(page).to_have_attribute("data-mantine-color-scheme", "light")
 
 
 def test_what_cannot_be_shown_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,10 @@ interface Shown {
   arm: { path: string; scene: RobotScene; rest: number[][][]; drawing: string } | null
 }
 
-function show({ dark, key, run, frame, scopes, arm }: Shown): void {
+let shown: Shown | undefined
+
+function show(told: Shown): void {
+  const { key, run, frame } = told
   if (run) {
     const made = new RunSamples(key, run.channels, run.aliases)
     made.receive(frame)
@@ -38,6 +41,13 @@ function show({ dark, key, run, frame, scopes, arm }: Shown): void {
       run: { ...run, run: key, state: 'done', time: run.stopTime, realTimeFactor: 0, message: '', fault: null, solver: '', reason: '', tunables: [] },
     })
   }
+  shown = told
+  draw()
+}
+
+function draw(): void {
+  if (!shown) return
+  const { dark, run, scopes, arm } = shown
   root.render(
     <StrictMode>
       <MantineProvider theme={theme} forceColorScheme={dark ? 'dark' : 'light'}>
@@ -55,10 +65,13 @@ function show({ dark, key, run, frame, scopes, arm }: Shown): void {
 
 const root = createRoot(document.getElementById('root')!)
 const cursor = shareCursor((time) => parent.postMessage({ kind: 'time', time }, '*'))
-addEventListener('message', ({ source, data }: MessageEvent<Shown | { kind: 'time'; time: number }>) => {
+addEventListener('message', ({ source, data }: MessageEvent<Shown | { kind: 'time'; time: number } | { kind: 'theme'; dark: boolean }>) => {
   if (source !== parent) return
   if (data.kind === 'time') cursor.show(data.time)
-  else {
+  else if (data.kind === 'theme') {
+    shown = shown && { ...shown, dark: data.dark }
+    draw()
+  } else {
     cursor.join(data.key)
     show(data)
   }

@@ -237,26 +237,27 @@ function useDrawnWhenChanged(state: () => string): void {
 function Ground({ height, reach, colours }: { height: number; reach: number; colours: (typeof COLOURS)['light'] }) {
   return (
     <>
-      <mesh position={[0, 0, height - 0.001 * reach]} receiveShadow>
+      {/* The shadow hides nothing: the lines lie so near above it that depth alone cannot tell them apart. */}
+      <mesh position={[0, 0, height - 0.001 * reach]} renderOrder={-2} receiveShadow>
         <planeGeometry args={[12 * reach, 12 * reach]} />
-        <shadowMaterial opacity={colours.shadow} />
+        <shadowMaterial opacity={colours.shadow} depthWrite={false} />
       </mesh>
       <Grid
         key={colours.cell}
         position={[0, 0, height]}
         rotation={[Math.PI / 2, 0, 0]}
-        args={[8 * reach, 8 * reach]}
+        renderOrder={-1}
+        args={[12 * reach, 12 * reach]}
         cellSize={reach > 1 ? 0.25 : 0.1}
         cellThickness={0.7}
         sectionSize={reach > 1 ? 1 : 0.5}
         sectionThickness={1.1}
         cellColor={colours.cell}
         sectionColor={colours.section}
-        // Around the arm, however far the camera is: from a narrow panel's distance all of it would have faded.
+        // Around the arm, however far from it the camera is.
         fadeFrom={0}
         fadeDistance={6 * reach}
         fadeStrength={1.2}
-        infiniteGrid
       />
     </>
   )

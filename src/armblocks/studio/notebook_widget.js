@@ -16,6 +16,7 @@ function render({ model, el }) {
   frame.style.cssText = `display: block; width: 100%; height: ${model.get('height')}px; border: 0`
   const say = (message) => frame.contentWindow?.postMessage(message, '*')
   const show = () => say({ ...model.get('_shown'), kind: 'show', dark: isDark(), frame: bytes(model.get('_frame')) })
+  const dress = () => say({ kind: 'theme', dark: isDark() })
   const move = () => say({ kind: 'time', time: model.get('time') })
   const hear = ({ source, data }) => {
     if (source !== frame.contentWindow) return
@@ -27,13 +28,19 @@ function render({ model, el }) {
       model.save_changes()
     }
   }
+  const system = matchMedia('(prefers-color-scheme: dark)')
+  const notebook = new MutationObserver(dress)
   addEventListener('message', hear)
+  system.addEventListener('change', dress)
+  notebook.observe(document.body, { attributeFilter: ['class', 'data-jp-theme-light'] })
   model.on('change:_shown', show)
   model.on('change:time', move)
   frame.srcdoc = model.get('_page')
   el.append(frame)
   return () => {
     removeEventListener('message', hear)
+    system.removeEventListener('change', dress)
+    notebook.disconnect()
     model.off('change:_shown', show)
     model.off('change:time', move)
   }
