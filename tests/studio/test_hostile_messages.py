@@ -12,7 +12,8 @@ from typing import Any, get_args
 
 import pytest
 
-from armblocks.formats import load_robot, write_robot
+from armblocks.diagram import Diagram
+from armblocks.formats import diagram_to_bytes, load_robot, write_robot
 from armblocks.studio import messages as say
 from armblocks.studio.hub import Hub
 from armblocks.studio.page import Page
@@ -33,7 +34,7 @@ HOSTILE: tuple[Any, ...] = (
     float("inf"),
     "",
     " ",
-    "x" * 100_000,
+    "x" * 11_000,
     "../../secret.json",
     "..\\..\\secret.json",
     "/etc/passwd",
@@ -49,8 +50,8 @@ HOSTILE: tuple[Any, ...] = (
     "[" * 5000,
     [],
     [[]],
-    ["x"] * 3000,
-    [1e308] * 3000,
+    ["x"] * 300,
+    [1e308] * 1001,
     {},
     {"": {"": None}},
     {"a/b": 1, "__class__": "x"},
@@ -71,6 +72,13 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "parameters", "block": "PID", "values": {"P": "1"}},
         {"kind": "move", "places": {"PID": place}, "notes": {}},
         {"kind": "rename", "block": "PID", "name": "PID"},
+        {
+            "kind": "mask",
+            "block": "",
+            "name": "",
+            "parameters": [{"name": "k", "default": 1.0, "minimum": 0.0}],
+        },
+        {"kind": "paste", "text": diagram_to_bytes(Diagram(name="d", blocks={}), load_robot).decode()},
         {"kind": "settings", "values": {"stop_time": 1.0}},
     ]
     common = {"document": document, "base": None, "author": "me"}
@@ -95,6 +103,8 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         {"kind": "files"},
         {"kind": "outline", "document": document},
         {"kind": "find", "document": document, "text": "PID"},
+        {"kind": "copy", "document": document, "inside": [], "blocks": ["PID"], "notes": []},
+        {"kind": "ask_mask", "document": document, "inside": [], "block": ""},
         {"kind": "close", "document": "0123456789abcdef", "discard": False},
         {"kind": "recover", "document": "0123456789abcdef", "action": "open"},
         {"kind": "run", "document": "0123456789abcdef", "speed": 1.0, "tuned": {"PID.P": 1.0}},

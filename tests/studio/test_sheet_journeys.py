@@ -136,6 +136,11 @@ def test_a_block_is_taken_out_of_its_wire_and_put_into_another(sheet: Page) -> N
     expect(edge(sheet, "x2/y -> damping/u")).to_have_count(1)
     expect(edge(sheet, "damping/y -> x1/u")).to_have_count(1)
     expect(edge(sheet, "x2/y -> x1/u")).to_have_count(0)
+    left, right = (block(sheet, "damping").locator(f'[data-handleid="{port}"]') for port in "uy")
+    expect(edge(sheet, "damping/y -> x1/u").locator("path.line").first).to_have_attribute(
+        "d", re.compile(r"^M[\d.]+ [\d.]+L[\d.]+ [\d.]+$")
+    )  # turned round, it lets the wire run straight through
+    assert middle(left) < middle(right)
     sheet.keyboard.press("Control+z")
     sheet.keyboard.press("Control+z")
     expect(edge(sheet, "x2/y -> x1/u")).to_have_count(1)

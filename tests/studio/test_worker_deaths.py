@@ -16,7 +16,8 @@ from typing import Any
 
 import pytest
 
-from armblocks.studio import run_process, run_worker, workers
+from armblocks.errors import SimulationError
+from armblocks.studio import run_process, run_report, run_worker, workers
 from armblocks.studio.hub import Hub
 from armblocks.studio.page import Page
 from armblocks.studio.project_folder import ProjectFolder
@@ -241,5 +242,67 @@ def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) ->
         attach = {"number": 1, "request": {"kind": "attach", "document": document}}
         await talk.hub.answer(other, json.dumps(attach))
         assert any(isinstance(said, bytes) for said in late), "the samples are shown to who comes later"
+
+    talk(tmp_path, talking)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a disk that is always full is Linux's")
+def test_a_run_whose_samples_find_no_room_on_the_disk_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(**_: object) -> object:
+        return Path("/dev/full").open("r+b", buffering=0)
+
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        with monkeypatch.context() as patch:
+            patch.setattr("armblocks.studio.run_record.tempfile.TemporaryFile", full)
+            run = await talk.ask("run", document=document)
+        told = await talk.until(run, "failed", "done")
+        assert told["state"] == "failed"
+        assert told["fault"]["what"] == (
+            "the samples of the run cannot be kept (No space left on device): it was ended"
+        )
+        again = await talk.ask("run", document=document)
+        assert (await talk.until(again, "done", "failed"))["state"] == "done"
+
+    talk(tmp_path, talking)
+
+
+def crash_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
+    del pipe, job
+    ctypes.string_at(0)
+
+
+def defect_in_the_report(pipe: Connection, job: dict[str, Any]) -> None:
+    def defect(_: object) -> None:
+        raise KeyError("something")
+
+    run_report.begun = defect  # pyright: ignore[reportAttributeAccessIssue]
+    run_report.write(pipe, job)
+
+
+@pytest.mark.parametrize(
+    ("death", "words"),
+    [
+        (crash_in_the_report, "the report could not be made in the time and memory it may have"),
+        (defect_in_the_report, "armblocks has a defect (KeyError)"),
+    ],
+)
+def test_a_report_whose_process_breaks_is_refused_in_words(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    death: Callable[[Connection, dict[str, Any]], None],
+    words: str,
+) -> None:
+    monkeypatch.setattr(run_report, "write", death)
+
+    async def talking(talk: Talk) -> None:
+        document = await talk.ask("open", example="falling_pendulum")
+        run = await talk.ask("run", document=document)
+        await talk.until(run, "done")
+        with pytest.raises(SimulationError) as refused:
+            await talk.hub.report(document)
+        assert refused.value.what == words
 
     talk(tmp_path, talking)

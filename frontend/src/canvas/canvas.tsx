@@ -153,12 +153,12 @@ function Sheet() {
       if (!type) return
       event.preventDefault()
       const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
-      const found = wireAt(at, edges)
+      const found = wireAt(at, edges, wires)
       setInto(null)
       if (found) insertBlock(type, { x: at.x, y: found.y }, found.wire)
       else insertBlock(type, at)
     },
-    [flow, edges],
+    [flow, edges, wires],
   )
 
   const takeHold = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
@@ -170,16 +170,16 @@ function Sheet() {
   }
   const carry = (_: unknown, node: SheetNode) => {
     const block = node.id === held.current.loose ? blocks[node.id] : undefined
-    if (block) setInto(keyOf(wireAt(middleOf(block, node.position), edges)?.wire))
+    if (block) setInto(keyOf(wireAt(middleOf(block, node.position), edges, wires)?.wire))
   }
   const letGo = (_: unknown, node: SheetNode, moved: SheetNode[]) => {
-    const to = Object.fromEntries(moved.map(({ id, position }) => [id, position]))
+    const to: Places = Object.fromEntries(moved.map(({ id, position }) => [id, position]))
     const { freed, loose } = held.current
     held.current = NOTHING_HELD
     const left = freed.length ? takenOut(present(blocks, freed), wires) : wires
     const block = loose === null ? undefined : blocks[loose]
-    const found = block && wireAt(middleOf(block, node.position), edges)
-    if (found) to[block.name] = levelled(block, node.position, found.y)
+    const found = block && wireAt(middleOf(block, node.position), edges, wires)
+    if (found) to[block.name] = levelled(block, node.position, found)
     const after = found ? putInto(block, found.wire, left) : left
     // The wires stay as they are drawn until the server has them so.
     void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() => setHeld((now) => (now === held.current ? now : NOTHING_HELD)))
@@ -188,7 +188,7 @@ function Sheet() {
   const hover = (event: React.DragEvent) => {
     event.preventDefault()
     if (!event.dataTransfer.types.includes(BLOCK_TYPE)) return
-    setInto(keyOf(wireAt(flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }), edges)?.wire))
+    setInto(keyOf(wireAt(flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }), edges, wires)?.wire))
   }
 
   const sheet = useRef<HTMLDivElement>(null)
@@ -314,10 +314,11 @@ export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[]
   const { document } = useStudio.getState()
   const places: Record<string, Place> = {}
   const notes: Record<string, SheetNote> = {}
-  for (const [id, { x, y }] of Object.entries(to)) {
+  for (const [id, at] of Object.entries(to)) {
+    const { x, y } = at
     const place = document?.blocks[id]?.place
     const note = document?.notes[id]
-    if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, x, y }
+    if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, ...at }
     if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
   }
   if (Object.keys(places).length || Object.keys(notes).length) await change({ kind: 'move', places, notes, ...wiring })

@@ -1,5 +1,5 @@
 import type { SheetBlock, Wire } from '../protocol'
-import { blockOf, wireKey } from './sheet_layout'
+import { blockOf, wireKey, type Places } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
 /** Blocks taken out of their wires and put into others: what becomes of the wires of a sheet. */
@@ -43,21 +43,24 @@ export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead
   return { wires: after.filter((wire) => !old.has(wireKey(wire))), instead: before.filter((wire) => !next.has(wireKey(wire))) }
 }
 
-/** The wire whose level piece passes under a point, and the height of that piece. */
-export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[]): { wire: Wire; y: number } | undefined {
-  for (const { source, sourceHandle, target, targetHandle, data } of edges) {
+/** The wire whose level piece passes under a point, among those that are on the sheet already; the height of that piece, and whether it runs to the left. */
+export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wires: Wire[]): { wire: Wire; y: number; flipped: boolean } | undefined {
+  const present = new Set(wires.map(wireKey))
+  for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
+    // What has just closed behind a block does not take it in again.
+    if (!present.has(id)) continue
     const path = data?.path ?? []
     for (let k = 1; k < path.length; k++) {
       const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
       if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > Math.min(ax, bx) && at.x < Math.max(ax, bx))
-        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay }
+        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay, flipped: ax > bx }
     }
   }
   return undefined
 }
 
-/** Where a block stands so that a wire runs straight into its first input. */
-export function levelled(block: SheetBlock, at: { x: number; y: number }, y: number): { x: number; y: number } {
+/** Where a block stands so that a wire runs straight into its first input, and through it the way that the wire goes. */
+export function levelled(block: SheetBlock, at: { x: number; y: number }, wire: { y: number; flipped: boolean }): Places[string] {
   const input = block.inputs[0]
-  return input && input.dy === 0 ? { x: at.x, y: y - input.y } : at
+  return input && input.dy === 0 ? { x: at.x, y: wire.y - input.y, flipped: wire.flipped } : at
 }

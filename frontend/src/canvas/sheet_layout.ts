@@ -37,7 +37,7 @@ export function nameWidth(name: string): number {
 }
 
 /** Blocks by name, at the places where they are drawn now (which a drag may have changed). */
-export type Places = Record<string, { x: number; y: number }>
+export type Places = Record<string, { x: number; y: number; flipped?: boolean }>
 
 /** Where a block's name stands: where no wire leaves, as in the drawings of reports. */
 export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'beside' | 'above' {

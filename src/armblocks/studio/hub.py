@@ -248,7 +248,7 @@ class Hub:
         found = self.documents[request.document]
         before, version_before = found.document.diagram, found.document.version
         if isinstance(request, say.Reload):
-            self.documents.reload(found)
+            self.documents.reload(found, request.key)
         elif not self.documents.perform(found, request):
             return found.document.version
         for page in [page for page in self.pages if found.key in page.shows]:

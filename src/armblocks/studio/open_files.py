@@ -227,8 +227,10 @@ class OpenFiles(ABC, Generic[OpenedT]):
             self._snapshot_later(found, found.journal)
         return True
 
-    def reload(self, found: OpenedT) -> None:
-        """Take what the file holds now, as one step that can be undone."""
+    def reload(self, found: OpenedT, key: str = "") -> None:
+        """Take what the file holds now, as one step that can be undone; once for each ``key``."""
+        if key and key in found.seen:
+            return
         if found.path is None:
             raise self._no_file(found)
         data, on_disk = self.folder.read_known(found.path)
@@ -237,6 +239,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         document.saved = document.value
         found.on_disk, found.disk = on_disk, "same"
         self._saved(found, found.path, document.version)
+        found.seen.append(key)
 
     def replace(self, found: OpenedT, title: str, value: Any) -> None:
         """Put another drawing or robot in the place of this one, as one step that can be undone."""

@@ -198,7 +198,7 @@ class RobotDesk:
     ) -> int:
         found = self.robots[request.robot]
         if isinstance(request, say.RobotReload):
-            self.robots.reload(found)
+            self.robots.reload(found, request.key)
         elif not self.robots.perform(found, request):
             return found.document.version
         await self.tell(found)

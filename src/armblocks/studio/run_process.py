@@ -120,8 +120,10 @@ class RunProcess:
     async def _pass_on(self) -> None:
         last: say.RunProgress | None = None
         while (message := await self._heard()) is not None:
+            if self._broken:
+                continue  # it is being ended; what it says of its own end is not so
             if message[:1] == b"S":
-                await self._tell(message[1:])
+                await self._tell_samples(message[1:])
                 continue
             event = _EVENTS.validate_json(message[1:])
             if isinstance(event, say.RunProgress):
@@ -132,6 +134,14 @@ class RunProcess:
             await asyncio.to_thread(self._worker.process.join, JOIN_SECONDS)
             self.state = "stopped" if self._forced else "failed"
             await self._tell(self._lost(last))
+
+    async def _tell_samples(self, frame: bytes) -> None:
+        """Pass a frame on; where the disk does not take it the run is ended."""
+        try:
+            await self._tell(frame)
+        except OSError as error:
+            self._broken = f"the samples of the run cannot be kept ({error.strerror}): it was ended"
+            self._worker.process.kill()
 
     def _lost(self, last: say.RunProgress | None) -> say.RunProgress:
         """What is said of a worker that ended without a word."""

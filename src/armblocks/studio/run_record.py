@@ -1,6 +1,7 @@
 """What a run has said, for pages that come later: after a reload, after a lost line, or as a second page.
 
-It lies in a file without a name, which the system removes with the process: a long run costs no memory.
+It lies in a file without a name, which the system removes with the process: a long run costs no memory. Where
+the disk is full no more samples are taken; that the run ends thereby is still kept.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ class RunRecord:
     """Everything that a run has said, in order."""
 
     def __init__(self) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the run
+        self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - it lives as long as the run
+        self._words: dict[int, str] = {}
+        """Messages that the disk did not take, by their number."""
         self._spots: list[tuple[int, int, bool]] = []
         self._size = 0
 
@@ -23,18 +26,32 @@ class RunRecord:
         return len(self._spots)
 
     def __getitem__(self, index: int) -> Said:
+        if index in self._words:
+            return self._words[index]
         begin, size, text = self._spots[index]
         self._file.seek(begin)
         data = self._file.read(size)
         return data.decode() if text else data
 
     def append(self, said: Said) -> None:
-        """Keep what was said last."""
+        """Keep what was said last; raises ``OSError`` for a frame that the disk does not take."""
         data = said.encode() if isinstance(said, str) else said
-        self._file.seek(self._size)
-        self._file.write(data)
+        try:
+            self._write(data)
+        except OSError:
+            if not isinstance(said, str):
+                raise
+            self._words[len(self._spots)] = said
+            self._spots.append((self._size, 0, True))
+            return
         self._spots.append((self._size, len(data), isinstance(said, str)))
         self._size += len(data)
+
+    def _write(self, data: bytes) -> None:
+        self._file.seek(self._size)
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
 
     def close(self) -> None:
         """Forget everything."""

@@ -27,7 +27,7 @@ async def report_of(job: Mapping[str, Any]) -> bytes:
     """
     context = process_context()
     ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_write, args=(theirs, dict(job)), daemon=True)
+    process = context.Process(target=write, args=(theirs, dict(job)), daemon=True)
     process.start()
     theirs.close()
     try:
@@ -55,7 +55,7 @@ def _received(pipe: Connection) -> bytes:
     return said[1:]
 
 
-def _write(pipe: Connection, job: dict[str, Any]) -> None:
+def write(pipe: Connection, job: dict[str, Any]) -> None:
     """In the process: run the model, write the report, send its page."""
     limit_process()
     from armblocks.report import write_report
@@ -69,3 +69,7 @@ def _write(pipe: Connection, job: dict[str, Any]) -> None:
             pipe.send_bytes(b"H" + page.read_bytes())
     except ArmblocksError as error:
         pipe.send_bytes(b"E" + str(error).encode())
+    except MemoryError:
+        pass  # what there is of it frees itself, and that nothing was sent says enough
+    except Exception as error:  # a defect: told to who asked, and not to the terminal
+        pipe.send_bytes(f"Earmblocks has a defect ({type(error).__name__})".encode())
