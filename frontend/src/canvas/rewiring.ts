@@ -6,6 +6,8 @@ import type { WireEdgeType } from './wire_edge'
 
 /** px from a wire at which a block that is dropped goes into it. */
 const INTO_WIRE = 12
+/** px of wire beside a block that make it stand in the middle where there are no more. */
+const ROOM = 60
 
 /** Whether a block can stand in a wire. */
 const passes = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
@@ -43,8 +45,17 @@ export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead
   return { wires: after.filter((wire) => !old.has(wireKey(wire))), instead: before.filter((wire) => !next.has(wireKey(wire))) }
 }
 
-/** The wire whose level piece passes under a point, among those that are on the sheet already; the height of that piece, and whether it runs to the left. */
-export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wires: Wire[]): { wire: Wire; y: number; flipped: boolean } | undefined {
+/** A level piece of a wire: its height and its ends, and whether it runs to the left. */
+interface Piece {
+  wire: Wire
+  y: number
+  left: number
+  right: number
+  flipped: boolean
+}
+
+/** The level piece that passes under a point, of the wires that are on the sheet already. */
+export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wires: Wire[]): Piece | undefined {
   const present = new Set(wires.map(wireKey))
   for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
     // What has just closed behind a block does not take it in again.
@@ -52,15 +63,21 @@ export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wire
     const path = data?.path ?? []
     for (let k = 1; k < path.length; k++) {
       const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
-      if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > Math.min(ax, bx) && at.x < Math.max(ax, bx))
-        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay, flipped: ax > bx }
+      const [left, right] = [Math.min(ax, bx), Math.max(ax, bx)]
+      if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > left && at.x < right)
+        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay, left, right, flipped: ax > bx }
     }
   }
   return undefined
 }
 
-/** Where a block stands so that a wire runs straight into its first input, and through it the way that the wire goes. */
-export function levelled(block: SheetBlock, at: { x: number; y: number }, wire: { y: number; flipped: boolean }): Places[string] {
+/**
+ * Where a block stands so that a wire runs straight into its first input, and through it the way that the wire goes;
+ * where there is little room, in the middle of it.
+ */
+export function levelled(block: SheetBlock, at: { x: number; y: number }, { y, left, right, flipped }: Piece): Places[string] {
   const input = block.inputs[0]
-  return input && input.dy === 0 ? { x: at.x, y: wire.y - input.y, flipped: wire.flipped } : at
+  if (!input || input.dy !== 0) return at
+  const narrow = right - left < block.width + ROOM
+  return { x: narrow ? (left + right - block.width) / 2 : at.x, y: y - input.y, flipped }
 }
