@@ -1,0 +1,33 @@
+"""What a browser fetches before the page is there stays below what was promised."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from pathlib import Path
+
+import armblocks as ab
+
+WEB = Path(ab.__file__).parent / "studio" / "web"
+MOST_KB = 400
+EVERY_PAGES_FONTS = re.compile(r"(inter-latin-wght|jetbrains-mono-latin-400)-normal-.*\.woff2")
+"""Browsers fetch of a font the parts whose letters are on the page: every page has these."""
+
+
+def test_the_first_download_is_below_400_kb() -> None:
+    page = (WEB / "index.html").read_text(encoding="utf-8")
+    files = sorted((WEB / "assets").iterdir())
+    named = [file for file in files if file.name in page]
+    fonts = [file for file in files if EVERY_PAGES_FONTS.fullmatch(file.name)]
+    assert {file.suffix for file in named} == {".js", ".css"}
+    assert len(fonts) == 2
+    sizes = {file.name: len(gzip.compress(file.read_bytes(), 9)) for file in (*named, *fonts)}
+    whole = sum(sizes.values()) + len(gzip.compress(page.encode(), 9))
+    assert whole < 1000 * MOST_KB, f"{whole / 1000:.0f} kB: {sizes}"
+
+
+def test_three_dimensions_and_dialogs_come_later() -> None:
+    page = (WEB / "index.html").read_text(encoding="utf-8")
+    for part in ("stage", "all_dialogs", "scopes", "robot_editor"):
+        assert not re.search(rf"/{part}-[^/]*\.js", page), part
+        assert list((WEB / "assets").glob(f"{part}-*.js")), part
