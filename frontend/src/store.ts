@@ -217,8 +217,8 @@ function receive(event: ServerEvent): void {
       break
     case 'run_progress':
       runs.progressed(event)
-      // How far it has come may wait; that it ended, or was paused, may not.
-      if (run?.run === event.run && (event.state !== run.state || event.fault || isFree(performance.now())))
+      // How far a run that goes on has come may wait; what else is told of it may not.
+      if (run?.run === event.run && (event.state !== 'running' || run.state !== 'running' || isFree(performance.now())))
         useStudio.setState({
           run: {
             ...run,
