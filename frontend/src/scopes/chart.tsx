@@ -9,6 +9,9 @@ import type { Trace } from './trace'
 import { useWindow } from './window'
 import { XyPlot } from './xy_plot'
 
+/** Letters of a name that a legend never cuts. */
+const SHORT = 8
+
 /** A plot with its title, its legend (a click hides a trace), its exports, and the measures beside it. */
 export function Chart({ title, traces, path = false, band }: { title: string; traces: Trace[]; path?: boolean; band?: number }) {
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
@@ -32,7 +35,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
           {!path && stem && <span className="stem">{stem}</span>}
           {!path &&
             traces.map(({ key, label, tone, dash }, k) => (
-              <button key={key} type="button" aria-label={label} aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
+              <button key={key} type="button" className={names[k]!.length > SHORT ? 'long' : undefined} aria-label={label} aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
                 <svg width="16" height="4" aria-hidden>
                   <line x1="0" x2="16" y1="2" y2="2" stroke={`var(--${tone})`} strokeWidth="2.5" strokeDasharray={dash.join(' ')} />
                 </svg>
