@@ -866,6 +866,9 @@ export interface DocumentState {
   redo: string;
   disk?: "same" | "changed" | "gone";
   journaled?: boolean;
+  settings: {
+    [k: string]: number | string | null;
+  };
 }
 /**
  * A drawing or a robot that was not saved when the studio ended, as its journal gives it back.
@@ -917,9 +920,6 @@ export interface Sheet {
   wires: Wire[];
   notes: {
     [k: string]: SheetNote;
-  };
-  settings: {
-    [k: string]: number | string | null;
   };
   logged: string[];
   linked: string[];
@@ -983,9 +983,6 @@ export interface SheetChange {
     [k: string]: SheetNote;
   } | null;
   description?: string | null;
-  settings?: {
-    [k: string]: number | string | null;
-  } | null;
   logged?: string[] | null;
 }
 /**

@@ -11,7 +11,6 @@ import type {
   Fault,
   Finding,
   Recovery,
-  Sheet,
   SheetBlock,
   SheetNote,
   Tunable,
@@ -36,7 +35,6 @@ export interface OpenDocument {
   blocks: Record<string, SheetBlock>
   wires: Wire[]
   notes: Record<string, SheetNote>
-  settings: Sheet['settings']
   /** The library block that the sheet belongs to, by its path; empty for a sheet of one's own. */
   linked: string[]
   link: string
@@ -125,7 +123,6 @@ function changed(document: OpenDocument, event: EventOf<'changed'>): OpenDocumen
     wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...change.wires_added],
     notes: change.notes ?? document.notes,
     description: change.description ?? document.description,
-    settings: change.settings ?? document.settings,
     logged: change.logged ?? document.logged,
   }
 }

@@ -352,3 +352,16 @@ def test_blocks_are_found_on_all_sheets_by_name_type_and_value() -> None:
 
 def diagram_inside(diagram: Diagram) -> list[str]:
     return list(inside(diagram, ["inner"]).blocks)
+
+
+def test_settings_and_kept_values_are_the_model_s_whatever_sheet_is_shown() -> None:
+    document = Document(placed(load_diagram("puma560_servos", BLOCKS)), load_robot)
+    name, block = next(
+        (name, block) for name, block in document.diagram.blocks.items() if isinstance(block, DiagramBlock)
+    )
+    path, value = "motion.tmax", 1.25
+    document.edit(SetSettings(values={"stop_time": 7.0}), [name])
+    document.edit(KeepTuned(values={path: value}), [name])
+    assert document.diagram.settings.stop_time == 7.0
+    assert inside(document.diagram, [name]).settings == block.diagram.settings
+    assert document.diagram.block("motion").parameter_value("tmax") == value

@@ -22,7 +22,7 @@ const numberText = (value: number | string | null) => (typeof value === 'number'
 
 function Form({ onClose }: { onClose: () => void }) {
   const document = useStudio((s) => s.document?.state.document ?? '')
-  const settings = useStudio((s) => s.document?.settings)
+  const settings = useStudio((s) => s.document?.state.settings)
   const welcome = useStudio((s) => s.welcome)
   const run = useStudio((s) => s.run)
   const [start] = useState(() => Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])))

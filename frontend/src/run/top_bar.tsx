@@ -107,7 +107,7 @@ export function TopBar() {
 /** When the model stops, s: what is typed counts when the field is left. */
 function StopTime() {
   const known = useStudio((s) => s.document !== null)
-  const value = Number(useStudio((s) => s.document?.settings['stop_time']) ?? 10)
+  const value = Number(useStudio((s) => s.document?.state.settings['stop_time']) ?? 10)
   const written = `${value} s`
   return (
     <TextInput

@@ -9,7 +9,7 @@ from armblocks.diagram import Diagram
 from armblocks.studio import messages as say
 from armblocks.studio.aspects import Aspect, changed_aspects
 from armblocks.studio.clipping import ReadDiagram
-from armblocks.studio.edit_messages import Edit, summary
+from armblocks.studio.edit_messages import Edit, ModelEdit, summary
 from armblocks.studio.edited import Edited, Outcome
 from armblocks.studio.edits import applied
 from armblocks.studio.nesting import check_own, inside, with_inside
@@ -58,14 +58,19 @@ class Document(Edited[Diagram]):
 
     def outcome(self, request: say.Change | say.ArrangeBlocks) -> Outcome[Diagram]:
         """What the step is called, and the diagram after it."""
+        if isinstance(request, say.Change) and isinstance(request.edit, ModelEdit):
+            return Outcome(summary(request.edit), self._applied(request.edit, self.diagram))
         check_own(self.diagram, request.inside)
         sheet = inside(self.diagram, request.inside)
         if isinstance(request, say.Change):
             title = summary(request.edit)
-            after = applied(request.edit, sheet, self._resolve_robot, self._read_diagram)
+            after = self._applied(request.edit, sheet)
         else:
             title, after = "arrange", arranged(sheet)
         return Outcome(title, with_inside(self.diagram, request.inside, after))
+
+    def _applied(self, edit: Edit, sheet: Diagram) -> Diagram:
+        return applied(edit, sheet, self._resolve_robot, self._read_diagram)
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:
         """All that is different between two diagrams."""

@@ -182,7 +182,11 @@ class LogSignal(Message):
     logged: bool
 
 
-class KeepTuned(Message):
+class ModelEdit(Message):
+    """An edit of the whole model, whatever sheet of it is on the screen."""
+
+
+class KeepTuned(ModelEdit):
     """Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them."""
 
     kind: Literal["keep_tuned"] = "keep_tuned"
@@ -204,7 +208,7 @@ class BreakLink(Message):
     block: str
 
 
-class SetSettings(Message):
+class SetSettings(ModelEdit):
     """Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks."""
 
     kind: Literal["settings"] = "settings"

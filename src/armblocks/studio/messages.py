@@ -100,7 +100,6 @@ class Sheet(Message):
     blocks: dict[str, SheetBlock]
     wires: list[Wire]
     notes: dict[str, SheetNote]
-    settings: dict[str, float | str | None]
     logged: list[str]
     """Outputs, ``block/port``, that are seen without a Scope."""
     linked: list[str]
@@ -118,7 +117,6 @@ class SheetChange(Message):
     wires_removed: list[Wire]
     notes: dict[str, SheetNote] | None = None
     description: str | None = None
-    settings: dict[str, float | str | None] | None = None
     logged: list[str] | None = None
 
 
@@ -226,6 +224,8 @@ class DocumentState(Message):
     redo: str
     disk: Literal["same", "changed", "gone"] = "same"
     journaled: bool = True
+    settings: dict[str, float | str | None]
+    """How the model is run, by the names of ``SimulationOptions``."""
 
 
 class Recovery(Message):

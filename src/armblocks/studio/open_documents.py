@@ -41,6 +41,7 @@ class OpenDocument(OpenFile[Document]):
             redo=document.redo_title,
             disk=self.disk,
             journaled=self.journaled,
+            settings=dataclasses.asdict(document.diagram.settings),
         )
 
 

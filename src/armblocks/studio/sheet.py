@@ -8,7 +8,6 @@ from typing import Any
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
-from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.report.block_faces import FaceShape, face_size, port_labels
@@ -32,7 +31,6 @@ def sheet(diagram: Diagram) -> Sheet:
         blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
         wires=[_wire(wire, diagram) for wire in diagram.connections],
         notes=_notes(diagram),
-        settings=_settings(diagram.settings),
         logged=[str(ref) for ref in diagram.logged],
     )
 
@@ -54,7 +52,6 @@ def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
         wires_removed=[_wire(wire, before) for wire, _ in sorted(old - new)],
         notes=_notes(after) if after.notes != before.notes else None,
         description=after.description if after.description != before.description else None,
-        settings=_settings(after.settings) if after.settings != before.settings else None,
         logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
     )
 
@@ -185,7 +182,3 @@ def _wire(wire: Connection, diagram: Diagram) -> Wire:
 
 def _notes(diagram: Diagram) -> dict[str, SheetNote]:
     return {name: SheetNote(**dataclasses.asdict(note)) for name, note in diagram.notes.items()}
-
-
-def _settings(options: SimulationOptions) -> dict[str, Any]:
-    return dataclasses.asdict(options)
