@@ -23,6 +23,7 @@ export interface Command {
 const selected = () => useStudio.getState().selection.size > 0
 const chosen = () => chosenBlocks().length > 0
 const several = () => chosenBlocks().length > 1
+const masked = () => chosenBlocks().find(({ opens }) => opens)
 const ran = () => useStudio.getState().run !== null
 
 /** Every command, in the order of the palette. */
@@ -43,7 +44,7 @@ const LIST: Command[] = [
   { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
   { title: 'New diagram', run: () => void ask({ kind: 'new' }) },
   { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
-  { title: 'Edit the mask: parameters of the subsystem or the model', keys: 'Ctrl+M', onSheet: true, possible: () => !useStudio.getState().document?.linked.length, run: () => openMask(chosenBlocks().find(({ opens }) => opens)?.name) },
+  { title: 'Edit the mask: parameters of the subsystem or the model', keys: 'Ctrl+M', onSheet: true, possible: () => !useStudio.getState().document?.linked.length && !masked()?.link, run: () => openMask(masked()?.name) },
   { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
   { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
   { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: selected, run: () => void duplicate() },
