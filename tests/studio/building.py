@@ -1,0 +1,56 @@
+"""How people build a model in the page: with the mouse, or with the keyboard."""
+
+from __future__ import annotations
+
+from playwright.sync_api import Locator, Page, expect
+
+
+def block(page: Page, name: str) -> Locator:
+    """A block on the sheet."""
+    return page.locator(f'.react-flow__node[data-id="{name}"]')
+
+
+def new_diagram(page: Page) -> None:
+    """Begin with an empty sheet."""
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("menuitem", name="New diagram").click()
+    expect(page.get_by_text("Type to add a block")).to_be_visible()
+
+
+def add(page: Page, typed: str) -> None:
+    """Add a block by keyboard alone."""
+    page.keyboard.press(typed[0])
+    box = page.get_by_role("textbox", name="Add a block")
+    expect(box).to_be_visible()
+    box.press_sequentially(typed[1:])
+    box.press("Enter")
+    expect(box).to_be_hidden()
+
+
+def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
+    """Drop a block with the mouse at a place of the canvas, px."""
+    page.get_by_role("textbox", name="Search the library").fill(kind)
+    target = page.locator(".canvas")  # an empty one has examples on it
+    page.locator(f'.kind[data-type="{kind}"]').drag_to(target, target_position={"x": x, "y": y})
+    page.get_by_role("button", name="Clear the search").click()
+
+
+def wire(page: Page, source: str, target: str) -> None:
+    """Draw a wire with the mouse, between two handles ``block/port``."""
+
+    def middle(port: str) -> tuple[float, float]:
+        name, _, handle = port.partition("/")
+        box = block(page, name).locator(f'[data-handleid="{handle}"]').bounding_box()
+        assert box is not None
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    page.mouse.move(*middle(source))
+    page.mouse.down()
+    page.mouse.move(*middle(target), steps=5)
+    page.mouse.up()
+
+
+def run(page: Page) -> None:
+    """Run the model to its end."""
+    page.keyboard.press("Control+Enter")
+    expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)

@@ -1,0 +1,165 @@
+"""The paper's Figure 9, built from an empty sheet: with the mouse, and with the keyboard alone."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from building import add, block, drag_from_library, new_diagram, run, wire
+from playwright.sync_api import Locator, Page, expect
+
+import armblocks as ab
+
+BLOCKS = [
+    ("JTraj", "jtraj", 60, 250),
+    ("RobotPlot", "plot", 300, 40),
+    ("Fkine", "fkine", 300, 160),
+    ("Scope", "scope", 300, 280),
+    ("Derivative", "derivative", 300, 400),
+    ("T2xyz", "t2xyz", 540, 160),
+    ("XYGraph", "xy graph", 800, 30),
+    ("XYGraph", "xy graph", 800, 140),
+    ("XYGraph", "xy graph", 800, 250),
+    ("Display", "display", 1040, 100),
+    ("Derivative", "derivative", 540, 480),
+    ("Scope", "scope", 540, 360),
+    ("Rne", "rne", 800, 400),
+    ("Scope", "scope", 800, 530),
+    ("Scope", "scope", 1040, 400),
+]
+"""Type, what is typed to find it, and where it is dropped, px."""
+WIRES = [
+    ("jtraj/q", "plot/q"),
+    ("jtraj/q", "fkine/q"),
+    ("jtraj/q", "Scope/u"),
+    ("jtraj/q", "Derivative/u"),
+    ("jtraj/q", "rne/q"),
+    ("fkine/T", "T2xyz/T"),
+    ("T2xyz/x", "XY Graph/x"),
+    ("T2xyz/y", "XY Graph/y"),
+    ("T2xyz/x", "XY Graph 2/x"),
+    ("T2xyz/z", "XY Graph 2/y"),
+    ("T2xyz/y", "XY Graph 3/x"),
+    ("T2xyz/z", "XY Graph 3/y"),
+    ("T2xyz/x", "Display/u1"),
+    ("T2xyz/y", "Display/u2"),
+    ("T2xyz/z", "Display/u3"),
+    ("Derivative/y", "Derivative 2/u"),
+    ("Derivative/y", "Scope 2/u"),
+    ("Derivative/y", "rne/qd"),
+    ("Derivative 2/y", "rne/qdd"),
+    ("Derivative 2/y", "Scope 3/u"),
+    ("rne/tau", "Scope 4/u"),
+]
+VALUES = [
+    ("jtraj", {"q0": "[0 0 0 0]", "qf": "[3.14 0 1.57 0]"}),
+    ("Display", {"inputs": "3"}),
+    *[(name, {"robot": "kr180"}) for name in ("plot", "fkine", "rne")],
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("figure-nine")
+
+
+@pytest.fixture(scope="module")
+def page(open_studio: Callable[..., Page], folder: Path) -> Page:
+    page = open_studio(folder)
+    page.set_viewport_size({"width": 1920, "height": 1080})
+    return page
+
+
+def save_and_compare(page: Page, path: Path) -> None:
+    """What was built gives the torques and the way of the tool that the shipped model gives."""
+    page.keyboard.press("Control+s")
+    page.get_by_role("combobox", name="File").fill(path.name)
+    page.get_by_role("button", name="Save", exact=True).press("Enter")
+    expect(page.locator(".title")).to_have_text(path.stem)
+    made, shipped = ab.simulate(ab.load_diagram(path)), ab.simulate("kr180model")
+    np.testing.assert_array_equal(made.time, shipped.time)
+    for signal in ("rne/tau", "T2xyz/x", "T2xyz/y", "T2xyz/z"):
+        np.testing.assert_allclose(made[signal], shipped[signal], rtol=1e-12, atol=1e-12)
+
+
+def test_with_the_mouse(page: Page, folder: Path) -> None:
+    new_diagram(page)
+    for kind, _, x, y in BLOCKS:
+        drag_from_library(page, kind, x, y)
+    expect(page.locator(".react-flow__node")).to_have_count(len(BLOCKS))
+    for name, values in VALUES:
+        block(page, name).dblclick()
+        dialog = page.get_by_role("dialog")
+        for parameter, text in values.items():
+            if parameter == "robot":
+                dialog.get_by_role("combobox", name="robot").select_option(text)
+            else:
+                dialog.get_by_role("textbox", name=re.compile(rf"^{parameter}\b")).fill(text)
+        dialog.get_by_role("button", name="OK", exact=True).click()
+        expect(dialog).to_be_hidden()
+    expect(block(page, "Display").locator('[data-handleid="u3"]')).to_be_visible()
+    for count, (source, target) in enumerate(WIRES, 1):
+        wire(page, source, target)
+        expect(page.locator(".react-flow__edge")).to_have_count(count)
+    expect(page.locator(".block .fault")).to_have_count(0)
+    run(page)
+    save_and_compare(page, folder / "by mouse.json")
+
+
+def tab_to(page: Page, field: Locator) -> None:
+    """Go to a field with the Tab key."""
+    for _ in range(40):
+        if field.evaluate("(element) => element === document.activeElement"):
+            return
+        page.keyboard.press("Tab")
+    raise AssertionError("Tab does not lead there")
+
+
+def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
+    page.keyboard.press("Control+k")
+    page.get_by_role("textbox", name="Command").press_sequentially("new diagram")
+    page.keyboard.press("Enter")
+    expect(page.get_by_text("Type to add a block")).to_be_visible()
+    for count, (_, typed, _, _) in enumerate(BLOCKS, 1):
+        add(page, typed)
+        expect(page.locator(".react-flow__node")).to_have_count(count)
+    for name, values in VALUES:
+        page.keyboard.press("Control+f")
+        page.get_by_role("textbox", name="Find").press_sequentially(name)
+        expect(page.get_by_role("listbox", name="Found").get_by_role("option").first).to_contain_text(name)
+        page.keyboard.press("Enter")
+        expect(block(page, name)).to_be_focused()
+        page.keyboard.press("Enter")
+        dialog = page.get_by_role("dialog")
+        for parameter, text in values.items():
+            role = "combobox" if parameter == "robot" else "textbox"
+            field = dialog.get_by_role(role, name=re.compile(rf"^{parameter}\b"))
+            tab_to(page, field)
+            if role == "textbox":
+                page.keyboard.press("Control+a")
+            page.keyboard.type(text)
+        tab_to(page, dialog.get_by_role("button", name="OK", exact=True))
+        page.keyboard.press("Enter")
+        expect(dialog).to_be_hidden()
+    for count, (source, target) in enumerate(WIRES, 1):
+        page.keyboard.press(">")
+        for label, port in (("From the output", source), ("To the input", target)):
+            box = page.get_by_role("combobox", name=label)
+            expect(box).to_be_visible()
+            if box.input_value() == port:  # suggested, as the port of the block that is selected
+                continue
+            tab_to(page, box)
+            page.keyboard.press("Control+a")
+            page.keyboard.type(port)
+            expect(page.locator(f'[role="option"][value="{port}"][data-combobox-selected]')).to_be_visible()
+            page.keyboard.press("Enter")
+            expect(box).to_have_value(port)
+        tab_to(page, page.get_by_role("button", name="Connect", exact=True))
+        page.keyboard.press("Enter")
+        expect(page.locator(".react-flow__edge")).to_have_count(count)
+    expect(page.locator(".block .fault")).to_have_count(0)
+    run(page)
+    save_and_compare(page, folder / "by keyboard.json")
