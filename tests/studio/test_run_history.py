@@ -14,7 +14,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError
 from armblocks.face.model import CompiledDiagram
 from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio import messages as say
+from armblocks.studio import run_messages as say
 from armblocks.studio.run_history import RunHistory
 from armblocks.studio.run_process import RunProcess
 from armblocks.studio.tunables import tunables

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from armblocks.studio.edit_messages import Message
+from armblocks.studio.message import Message
 
 
 class Alteration(Message):

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from armblocks.studio.message import Message
 
 Px = Annotated[float, Field(ge=-1e7, le=1e7)]
 """A place on the sheet; further out nothing could be drawn exactly."""
 Size = Annotated[float, Field(gt=0, le=1e5)]
-
-
-class Message(BaseModel):
-    """A value that travels between page and server: unknown members are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Place(Message):

@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from armblocks.studio.alteration import Alteration
-from armblocks.studio.edit_messages import Edit, Message, Place, SetMask, SheetNote, Wire
+from armblocks.studio.edit_messages import Edit, SetMask
+from armblocks.studio.message import Fault, Message
 from armblocks.studio.robot_messages import (
     Opening,
     Readings,
@@ -21,157 +22,10 @@ from armblocks.studio.robot_messages import (
     RobotShown,
     RobotTables,
 )
+from armblocks.studio.run_messages import Control, Rewind, Run, RunEvent, SetSpeed, Tune
+from armblocks.studio.sheet_messages import BlockType, Finding, Found, Outline, Sheet, SheetChange, WireKind
 
 # -- what a page shows ---------------------------------------------------------------------------------------
-
-
-class PortSpot(Message):
-    """A port on the edge of its block: px from the block's corner, and the direction of its wire."""
-
-    name: str
-    doc: str
-    label: str
-    unit: str
-    x: float
-    y: float
-    dx: int
-    dy: int
-
-
-class Outline(Message):
-    """The sheets of a model as a tree."""
-
-    name: str
-    blocks: int
-    subsystems: list[Outline]
-
-
-class Found(Message):
-    """A block that was sought; ``match`` is the value that fits, ``""`` where name or type does."""
-
-    inside: list[str]
-    name: str
-    title: str
-    match: str
-
-
-class ParameterRule(Message):
-    """One parameter of a type of block, as its dialog needs it."""
-
-    name: str
-    kind: str
-    doc: str
-    unit: str
-    default: Any
-    tunable: bool
-    choices: list[str]
-    allowed: str
-
-
-class SheetBlock(Message):
-    """A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes."""
-
-    name: str
-    type: str
-    title: str
-    place: Place
-    width: float
-    height: float
-    face: str
-    inputs: list[PortSpot]
-    outputs: list[PortSpot]
-    opens: bool
-    """Whether there is a sheet inside."""
-    parameters: dict[str, Any]
-    """Values in the form of :func:`~armblocks.studio.parameter_values.parameter_json`."""
-    formulas: dict[str, str]
-    """The texts of those that are formulas."""
-    mask: list[ParameterRule]
-    """The parameters that the diagram inside declares; ``default`` is what they are here."""
-    link: str
-    """The entry of a library that the block is, ``file#name``; ``""`` for one of its own."""
-
-
-class Sheet(Message):
-    """The whole drawing."""
-
-    name: str
-    description: str
-    blocks: dict[str, SheetBlock]
-    wires: list[Wire]
-    notes: dict[str, SheetNote]
-    logged: list[str]
-    """Outputs, ``block/port``, that are seen without a Scope."""
-    linked: list[str]
-    """The way to the library block that the sheet belongs to, so that it cannot be changed."""
-    link: str
-    """The entry of the library that this block is."""
-
-
-class SheetChange(Message):
-    """From one version of the drawing to the next."""
-
-    blocks: dict[str, SheetBlock | None]
-    """Blocks that are new or other than before; ``None`` for those that are gone."""
-    wires_added: list[Wire]
-    wires_removed: list[Wire]
-    notes: dict[str, SheetNote] | None = None
-    description: str | None = None
-    logged: list[str] | None = None
-
-
-class Finding(Message):
-    """What the background check says; ``block`` and ``port`` are ``""`` where it is of the whole drawing."""
-
-    severity: Literal["error", "warning"]
-    block: str
-    port: str
-    what: str
-    fix: str
-
-
-class WireKind(Message):
-    """What runs on the wires that leave a port."""
-
-    shape: list[int]
-    unit: str
-    bus: bool = False
-    """Whether it is a bundle of signals."""
-
-
-class BlockType(Message):
-    """A type of block in the library palette. ``face`` is the drawing of one with the default parameters."""
-
-    type: str
-    title: str
-    family: str
-    summary: str
-    documentation: str
-    width: float
-    height: float
-    face: str
-    inputs: list[str]
-    outputs: list[str]
-    """Ports that it has with the default parameters."""
-    parameters: list[ParameterRule]
-
-
-class ViewOf(Message):
-    """A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``."""
-
-    block: str
-    kind: str
-    signals: list[str]
-    labels: list[str]
-    title: str
-
-
-class Channel(Message):
-    """One recorded signal of a run and where its numbers lie in the columns of a frame."""
-
-    name: str
-    shape: list[int]
-    unit: str
 
 
 class SettingRule(Message):
@@ -191,20 +45,6 @@ class SolverChoice(Message):
     title: str
     adaptive: bool
     stiff: bool
-
-
-class Tunable(Message):
-    """A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
-
-    ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
-    """
-
-    path: str
-    value: Any
-    unit: str
-    doc: str
-    low: float | None
-    high: float | None
 
 
 class DocumentState(Message):
@@ -412,51 +252,6 @@ class Recover(Message):
     action: Literal["open", "keep_both", "discard"]
 
 
-class Run(Message):
-    """Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
-
-    ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
-    """
-
-    kind: Literal["run"] = "run"
-    document: str
-    speed: float | None = Field(default=None, gt=0, le=1000)
-    tuned: dict[str, Any] = Field(default_factory=dict[str, Any])
-
-
-class Control(Message):
-    """Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant."""
-
-    kind: Literal["control"] = "control"
-    run: str
-    action: Literal["pause", "resume", "step", "back", "stop"]
-
-
-class Rewind(Message):
-    """Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay."""
-
-    kind: Literal["rewind"] = "rewind"
-    run: str
-    time: float
-
-
-class SetSpeed(Message):
-    """Change the speed of a run; ``None``: as fast as possible."""
-
-    kind: Literal["speed"] = "speed"
-    run: str
-    speed: float | None = Field(default=None, gt=0, le=1000)
-
-
-class Tune(Message):
-    """Change a tunable parameter of a run that is under way."""
-
-    kind: Literal["tune"] = "tune"
-    run: str
-    parameter: str
-    value: Any
-
-
 class TypedValue(Message):
     """Ask what a text typed into a parameter's field means: its value, or what is wrong with it."""
 
@@ -541,15 +336,6 @@ class Envelope(Message):
 # -- answers and events --------------------------------------------------------------------------------------
 
 
-class Fault(Message):
-    """Why a request was refused, in the parts of an ``ArmblocksError``."""
-
-    what: str
-    where: str
-    allowed: str
-    fix: str
-
-
 class Reply(Message):
     """The answer to a request: ``fault`` where it was refused."""
 
@@ -612,56 +398,6 @@ class Checked(Message):
     wires: dict[str, WireKind]
 
 
-class RunStarted(Message):
-    """A run has begun: what it records and how it is to be shown."""
-
-    kind: Literal["run_started"] = "run_started"
-    document: str
-    run: str
-    stop_time: float
-    channels: list[Channel]
-    views: list[ViewOf]
-    aliases: dict[str, str]
-    tunables: list[Tunable]
-    stride: int
-    """Of so many recorded instants the page gets the extremes of each signal, as two; 1: it gets all."""
-
-
-class RunTuned(Message):
-    """From this instant (s) on a parameter of a run has this value."""
-
-    kind: Literal["run_tuned"] = "run_tuned"
-    run: str
-    time: float
-    parameter: str
-    value: Any
-
-
-class RunRewound(Message):
-    """A run stands at an earlier instant (s) again: only the first ``count`` samples are still true."""
-
-    kind: Literal["run_rewound"] = "run_rewound"
-    run: str
-    time: float
-    count: int
-
-
-class RunProgress(Message):
-    """Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that."""
-
-    kind: Literal["run_progress"] = "run_progress"
-    run: str
-    state: Literal["running", "paused", "done", "stopped", "failed"]
-    time: float
-    real_time_factor: float
-    message: str
-    fault: Fault | None = None
-    solver: str = ""
-    reason: str = ""
-
-
-RunEvent = Annotated[RunStarted | RunTuned | RunRewound | RunProgress, Field(discriminator="kind")]
-"""What the process of a run has to say, besides its samples."""
 Event = Annotated[
     Reply | Welcome | Documents | Opened | Changed | Checked | RunEvent | RobotShown | RobotOpened,
     Field(discriminator="kind"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armblocks.diagram import Block, Diagram, DiagramBlock, ParameterKind
-from armblocks.studio.messages import Found, Outline
 from armblocks.studio.parameter_values import parameter_json
+from armblocks.studio.sheet_messages import Found, Outline
 
 MOST_FOUND = 50
 MOST_TEXT = 60

@@ -13,7 +13,7 @@ from armblocks.studio.outbox import Outbox
 from armblocks.studio.run_record import Said
 
 if TYPE_CHECKING:
-    from armblocks.studio.edit_messages import Message
+    from armblocks.studio.message import Message
 
 GONE = (RuntimeError, ConnectionError, WebSocketDisconnect)
 """What sending to a page raises that has left."""

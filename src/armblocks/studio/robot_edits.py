@@ -18,7 +18,7 @@ from pydantic import Field
 from armblocks.errors import InputError, RobotError
 from armblocks.robot import DhConvention, DhRow, Link, Robot, link_from_dh, serial_chain
 from armblocks.robot.dh_conversion import converted, reread
-from armblocks.studio.edit_messages import Message
+from armblocks.studio.message import Message
 from armblocks.studio.parameter_values import number_value
 from armblocks.studio.robot_columns import ROBOT_COLUMNS, Column, Owner, Quantity, Value
 from armblocks.studio.robot_link_columns import LINK_COLUMNS

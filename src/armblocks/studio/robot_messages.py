@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from armblocks.studio.alteration import Alteration
-from armblocks.studio.edit_messages import Message
+from armblocks.studio.message import Message
 from armblocks.studio.robot_edits import RobotEdit
 
 Number = Annotated[float, Field(allow_inf_nan=False)]

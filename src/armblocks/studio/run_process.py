@@ -19,7 +19,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from armblocks.errors import InputError
-from armblocks.studio import messages as say
+from armblocks.studio import run_messages as say
 from armblocks.studio.workers import Worker
 
 TellRun = Callable[[say.Message | bytes], Awaitable[None]]

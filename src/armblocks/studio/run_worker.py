@@ -30,7 +30,7 @@ from armblocks.errors import ArmblocksError, SimulationError
 from armblocks.face.diagram_run import DiagramRun
 from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
-from armblocks.studio import messages as say
+from armblocks.studio import run_messages as say
 from armblocks.studio.frames import sample_frame, thinned
 from armblocks.studio.parameter_values import tuned_value
 from armblocks.studio.project_folder import ProjectFolder

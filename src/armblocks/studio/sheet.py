@@ -17,8 +17,8 @@ from armblocks.report.picture import Picture
 from armblocks.report.svg import svg_marks
 from armblocks.studio.edit_messages import Place, SheetNote, Wire
 from armblocks.studio.edits import DEFAULT_ROBOT
-from armblocks.studio.messages import BlockType, ParameterRule, PortSpot, Sheet, SheetBlock, SheetChange
 from armblocks.studio.parameter_values import parameter_json
+from armblocks.studio.sheet_messages import BlockType, ParameterRule, PortSpot, Sheet, SheetBlock, SheetChange
 
 
 def sheet(diagram: Diagram) -> Sheet:

@@ -8,8 +8,8 @@ import numpy as np
 
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import tunable_parameters
-from armblocks.studio.messages import Tunable
 from armblocks.studio.parameter_values import parameter_json
+from armblocks.studio.run_messages import Tunable
 
 LONGEST = 64
 """Numbers of a parameter that a page would show: longer tables are edited in their file."""
