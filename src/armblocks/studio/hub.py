@@ -286,10 +286,8 @@ class Hub:
 
     async def _tell_state(self, found: OpenDocument) -> None:
         """Tell the pages that show a document where it stands; the drawing is as it was."""
-        diagram = found.document.diagram
-        event = say.Changed(
-            state=found.state(), before=found.document.version, change=sheet_change(diagram, diagram)
-        )
+        nothing = say.SheetChange(blocks={}, wires_added=[], wires_removed=[])
+        event = say.Changed(state=found.state(), before=found.document.version, change=nothing)
         await self.tell_all(found.key, event)
 
     async def _tell_documents(self) -> None:

@@ -158,7 +158,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         if found.document.dirty and not discard:
             raise InputError(
                 f"'{found.document.value.name}' has edits that no file holds",
-                where="the drawing",
+                where=f"the {found.document.noun}",
                 allowed="to save it, or to discard the edits",
                 fix="choose one of the two",
             )
@@ -239,7 +239,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
         document.saved = document.value
         found.on_disk, found.disk = on_disk, "same"
         self._saved(found, found.path, document.version)
-        found.seen.append(key)
+        if key:
+            found.seen.append(key)
 
     def replace(self, found: OpenedT, title: str, value: Any) -> None:
         """Put another drawing or robot in the place of this one, as one step that can be undone."""
