@@ -139,9 +139,9 @@ def test_a_journal_torn_anywhere_gives_back_what_was_before(disk: Disk, tmp_path
                 waiting = other.documents()
                 done = record - 2 if cut >= ends[record] else record - 3
                 if done < 0:
-                    assert [entry.missing != "" for entry in waiting.recoveries()] == [True]
+                    assert [entry.missing != "" for entry in waiting.left.offers()] == [True]
                     continue
-                assert [entry.edits for entry in waiting.recoveries()] == [done] * (done > 0)
+                assert [entry.edits for entry in waiting.left.offers()] == [done] * (done > 0)
                 if done > 0:
                     back = await waiting.recover(say.Recover(document=found.key, action="open"))
                     assert back is not None
@@ -198,7 +198,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_what_was_drawn(disk: Disk,
         theirs.write_bytes(theirs.read_bytes().replace(b'"gain"', b'"other"'))
         newer = theirs.read_bytes()
         after = after_crash.documents()
-        (recovery,) = after.recoveries()
+        (recovery,) = after.left.offers()
         assert (recovery.path, recovery.disk, recovery.edits) == ("a.json", "changed", 1)
         back = await after.recover(say.Recover(document=found.key, action="keep_both"))
         assert back is not None
@@ -207,7 +207,7 @@ def test_a_file_newer_than_the_journal_is_kept_beside_what_was_drawn(disk: Disk,
         assert theirs.read_bytes() == newer
         assert sorted(back.document.diagram.blocks) == ["gain", "mine"]
         assert not back.document.dirty
-        assert after.recoveries() == []
+        assert after.left.offers() == []
 
     going(talking)
 
@@ -238,11 +238,11 @@ def test_a_recovery_is_discarded_only_when_told_so(disk: Disk, tmp_path: Path) -
         second = disk.as_after_a_crash(tmp_path / "second")
         second.documents().end()
         after = second.documents()
-        assert len(after.recoveries()) == 1
+        assert len(after.left.offers()) == 1
         assert await after.recover(say.Recover(document=found.key, action="discard")) is None
         with pytest.raises(ArmblocksError, match="there is no diagram to recover named"):
             await after.recover(say.Recover(document=found.key, action="open"))
-        assert second.documents().recoveries() == []
+        assert second.documents().left.offers() == []
 
     going(talking)
 
@@ -279,7 +279,7 @@ def test_a_robot_that_is_gone_is_said_and_the_journal_kept(disk: Disk, tmp_path:
         documents.perform(found, change("2", AddBlocks(blocks=[block])))
         second = disk.as_after_a_crash(tmp_path / "second")
         after = OpenDocuments(second.project, second.kept, lambda name: load_robot("no " + name))
-        (recovery,) = after.recoveries()
+        (recovery,) = after.left.offers()
         assert recovery.missing.startswith("the last 1 edits could not be repeated")
         back = await after.recover(say.Recover(document=found.key, action="open"))
         assert back is not None
@@ -384,7 +384,7 @@ def test_a_journal_that_cannot_be_read_is_not_written_over(disk: Disk) -> None:
         with pytest.raises(FormatError, match="the journal holds no whole record"):
             documents.attach(key)
         assert journal.read_bytes() == b"nothing that is a journal"
-        assert [offer.document for offer in documents.recoveries()] == [key]
+        assert [offer.document for offer in documents.left.offers()] == [key]
 
     going(talking)
 
@@ -407,7 +407,7 @@ def test_a_defect_in_the_middle_of_a_journal_leaves_what_was_before_it(
 
         monkeypatch.setattr(Document, "outcome", defect)
         after = second.documents()
-        (offer,) = after.recoveries()
+        (offer,) = after.left.offers()
         assert offer.missing == "the last 2 edits could not be repeated: armblocks has a defect (KeyError)"
         assert sorted(after.attach(found.key).document.diagram.blocks) == ["b0", "b1"]
 
@@ -436,7 +436,7 @@ def test_a_file_that_is_deleted_or_renamed_is_told_and_what_it_held_is_kept(
             assert await told.get() == "gone"
             assert found.document.dirty
             crashed = disk.as_after_a_crash(tmp_path / "second").documents()
-            assert [(offer.path, offer.disk) for offer in crashed.recoveries()] == [("a.json", "gone")]
+            assert [(offer.path, offer.disk) for offer in crashed.left.offers()] == [("a.json", "gone")]
             place.with_name("b.json").rename(place)
             assert await told.get() == "same"
             place.unlink()

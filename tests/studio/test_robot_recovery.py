@@ -124,7 +124,7 @@ def test_unsaved_robots_are_offered_and_never_put_over_a_newer_file(disk: Disk, 
         theirs = write_robot(load_robot("kr180"))
         second.project.path("arm.json").write_bytes(theirs)
         after = second.robots()
-        (offer,) = after.recoveries()
+        (offer,) = after.left.offers()
         assert (offer.holds, offer.path, offer.disk, offer.edits, offer.parts) == (
             "robot",
             "arm.json",
@@ -132,7 +132,7 @@ def test_unsaved_robots_are_offered_and_never_put_over_a_newer_file(disk: Disk, 
             1,
             6,
         )
-        assert [offer.holds for offer in second.documents().recoveries()] == ["diagram"]
+        assert [offer.holds for offer in second.documents().left.offers()] == ["diagram"]
         back = await after.recover(say.Recover(document=found.key, action="keep_both"))
         assert back is not None
         assert back.path is not None

@@ -260,7 +260,7 @@ class Hub:
         """What is between a document and its file."""
         documents = self.documents
         if isinstance(request, say.Recover):
-            if self.robots.robots.waits(request.document):
+            if request.document in self.robots.robots.left:
                 key = await self.robots.recover(page, request)
             else:
                 opened = await documents.recover(request)
@@ -300,7 +300,7 @@ class Hub:
 
     def _recoveries(self) -> list[say.Recovery]:
         """Drawings and robots that wait to be recovered, the latest first."""
-        found = [*self.documents.recoveries(), *self.robots.robots.recoveries()]
+        found = [*self.documents.left.offers(), *self.robots.robots.left.offers()]
         return sorted(found, key=lambda entry: -entry.last)
 
     def _recent(self) -> list[str]:

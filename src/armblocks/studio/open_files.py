@@ -15,15 +15,16 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator
 from datetime import datetime
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import Any, Generic, TypeVar
 
-from armblocks.errors import ArmblocksError, FormatError, InputError, UnknownNameError
+from armblocks.errors import FormatError, InputError, UnknownNameError
 from armblocks.studio import messages as say
 from armblocks.studio.alteration import Alteration
-from armblocks.studio.file_journal import SNAPSHOT_EVERY, FileJournal, JournaledFile, journaled_file
+from armblocks.studio.file_journal import SNAPSHOT_EVERY, FileJournal, JournaledFile
 from armblocks.studio.file_kind import EditedT, FileKind
-from armblocks.studio.journal import SYNC_SECONDS, in_use
+from armblocks.studio.journal import SYNC_SECONDS
+from armblocks.studio.left_behind import LeftBehind
 from armblocks.studio.project_folder import Disk, Fingerprint, ProjectFolder
 from armblocks.studio.state_folder import StateFolder
 
@@ -74,12 +75,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
         self._open: dict[str, OpenedT] = {}
         self._same: dict[str, str] = {}
         """Keys under which a page of an earlier server knows what is open under another."""
-        self._waiting: dict[str, JournaledFile[Any]] = {}
-        """What an earlier server left behind, by key."""
-        self._unread: dict[str, Path] = {}
-        """Journals that could not be read, by what names them to pages."""
+        self.left = LeftBehind(folder, kept.journals, kind)
         self._tell: Callable[[OpenedT], Awaitable[None]] | None = None
-        self._look_for_journals()
 
     @abstractmethod
     def _made(self, key: str, document: Any) -> OpenedT:
@@ -127,10 +124,8 @@ class OpenFiles(ABC, Generic[OpenedT]):
         """What a page showed before, see :class:`~armblocks.studio.messages.Attach`."""
         with contextlib.suppress(UnknownNameError):
             return self[key]
-        if key in self._waiting:
-            return self._restore(self._waiting.pop(key))
-        if key in self._unread:  # what it lacked may be there now; if not, this says what it is
-            return self._restore(self._reread(key))
+        if key in self.left:
+            return self._restore(self.left.take(key))
         if path:
             found = self.open_path(path, key)
         else:
@@ -169,10 +164,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         for found in self:
             with contextlib.suppress(OSError):
                 self._put_away(found, keep=found.document.dirty)
-        for waiting in self._waiting.values():
-            if not waiting.document.dirty:
-                with contextlib.suppress(OSError):
-                    waiting.journal_path.unlink(missing_ok=True)
+        self.left.end()
 
     def _put_away(self, found: OpenedT, *, keep: bool) -> None:
         del self._open[found.key]
@@ -382,76 +374,13 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     # -- recovery --------------------------------------------------------------------------------------------
 
-    def _look_for_journals(self) -> None:
-        """Find what earlier servers left; the journals of another that still runs are not touched."""
-        for path in sorted(self.kept.journals.glob(f"*.{self.kind.name}")):
-            if in_use(path):
-                continue
-            try:
-                found = journaled_file(path, self.kind)
-                self._waiting[found.key] = found
-            except (ArmblocksError, OSError):
-                self._unread[path.stem] = path
-
-    def recoveries(self) -> list[say.Recovery]:
-        """What waits to be recovered, the latest first."""
-        found = [self._recovery(entry) for entry in self._waiting.values() if entry.document.dirty]
-        found += [self._unread_recovery(key, path) for key, path in self._unread.items()]
-        return sorted(found, key=lambda entry: -entry.last)
-
-    def _recovery(self, found: JournaledFile[Any]) -> say.Recovery:
-        disk = self.folder.compared(found.path, found.on_disk)[0] if found.path else "same"
-        return say.Recovery(
-            holds=self.kind.name,
-            document=found.key,
-            title=found.document.value.name,
-            path=found.path,
-            began=found.began,
-            last=found.last,
-            edits=found.edits,
-            parts=self.kind.parts(found.document.value),
-            disk=disk,
-            missing=found.missing,
-        )
-
-    def _unread_recovery(self, key: str, path: Path) -> say.Recovery:
-        """What is told of a journal that cannot be read."""
-        last = path.stat().st_mtime if path.exists() else 0.0
-        return say.Recovery(
-            holds=self.kind.name,
-            document=key,
-            title=key,
-            path=None,
-            began=last,
-            last=last,
-            edits=0,
-            parts=0,
-            disk="same",
-            missing="its journal cannot be read: open it to see why",
-        )
-
-    def _reread(self, key: str) -> JournaledFile[Any]:
-        """A journal that could not be read before; raises ``ArmblocksError`` where it still cannot."""
-        found = journaled_file(self._unread[key], self.kind)
-        del self._unread[key]
-        return found
-
-    def waits(self, key: str) -> bool:
-        """Whether there is something to recover under this key."""
-        return key in self._waiting or key in self._unread
-
     async def recover(self, request: say.Recover) -> OpenedT | None:
         """Do with a recovery what the user chose; what is open thereby."""
         key = request.document
-        if not self.waits(key):
-            raise UnknownNameError(f"{self.kind.name} to recover", key, [*self._waiting, *self._unread])
         if request.action == "discard":
-            path = self._waiting[key].journal_path if key in self._waiting else self._unread[key]
-            path.unlink(missing_ok=True)
-            self._waiting.pop(key, None)
-            self._unread.pop(key, None)
+            self.left.discard(key)
             return None
-        found = self._reread(key) if key in self._unread else self._waiting.pop(key)
+        found = self.left.take(key)
         opened = self._restore(found)
         if request.action == "keep_both":
             await self.save(opened, self._free_path(found), overwrite=False)
