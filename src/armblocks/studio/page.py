@@ -36,7 +36,7 @@ class Page:
     shows: dict[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])
     """Documents that it shows, and the path of the sheet that it looks at."""
     hears: dict[str, int] = field(default_factory=dict[str, int])
-    """Runs that it is told from their beginning, and how far: until then it gets nothing else of them."""
+    """Runs that it is told from their record, and how far: until then it gets nothing else of them."""
 
     @property
     def behind(self) -> bool:
