@@ -38,14 +38,17 @@ def test_a_stated_sample_time_is_taken_and_inherited_through_blocks_that_calcula
     assert set(clocks) == {"hold", "delay", "again"}
 
 
-def test_the_fastest_is_inherited_and_tenths_are_decimal() -> None:
+@pytest.mark.parametrize(("fastest", "other"), [(0.1, 0.3), (1.0 / 6.0, 1.0 / 3.0), (0.1 / 3.0, 0.7)])
+def test_the_fastest_is_inherited_where_periods_are_multiples_but_for_rounding(
+    fastest: float, other: float
+) -> None:
     builder = DiagramBuilder("d")
-    slow = builder.add("slow", CounterLimited(sample_time=0.3))
-    fast = builder.add("fast", CounterLimited(sample_time=0.1))
+    slow = builder.add("slow", CounterLimited(sample_time=other))
+    fast = builder.add("fast", CounterLimited(sample_time=fastest))
     builder.add("delay", UnitDelay(), builder.add("mux", Mux(), slow, fast))
     diagram = builder.build()
-    assert clocks_of(diagram)["delay"] == SampleClock(0.1)
-    assert trace_diagram(diagram).clocks == (SampleClock(0.1), SampleClock(0.3))
+    assert clocks_of(diagram)["delay"] == SampleClock(fastest)
+    assert trace_diagram(diagram).clocks == (SampleClock(fastest), SampleClock(other))
 
 
 def test_constants_leave_the_choice_to_what_they_feed() -> None:

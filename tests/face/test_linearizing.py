@@ -137,25 +137,30 @@ def test_a_sampled_loop_moves_as_its_linear_system() -> None:
     assert np.allclose(answer.values[:, 0, 0], result["x"], atol=1e-9)
 
 
-def test_clocks_of_several_rates_give_the_map_of_their_common_period() -> None:
+@pytest.mark.parametrize(("fast_every", "slow_every", "unit"), [(2, 3, 0.1), (3, 10, 1.0 / 30.0)])
+def test_clocks_of_several_rates_give_the_map_of_their_common_period(
+    fast_every: int, slow_every: int, unit: float
+) -> None:
     builder = ab.DiagramBuilder("two rates")
     source = builder.add("u", Constant(value=0.0))
     total = builder.add("sum", Sum(signs="+-"), source)
-    fast = builder.add("fast", ZeroOrderHold(sample_time=0.2), total)
+    fast = builder.add("fast", ZeroOrderHold(sample_time=round(fast_every * unit, 12)), total)
     state = builder.add("x", Integrator(), fast)
-    builder.connect(builder.add("slow", ZeroOrderHold(sample_time=0.3), state), total["u2"])
+    # 10/30 s is no decimal number: its double is a third only to rounding.
+    slow = ZeroOrderHold(sample_time=slow_every / round(1.0 / unit))
+    builder.connect(builder.add("slow", slow, state), total["u2"])
     system = ab.linearize(builder.build(), "u", "x")
-    assert system.dt == pytest.approx(0.6, rel=1e-15)
+    assert system.dt == pytest.approx(fast_every * slow_every * unit, rel=1e-15)
 
-    # By hand: slow takes x at 0 and 0.3, fast takes u - slow at 0, 0.2, 0.4.
+    # By hand, for 0.2 s and 0.3 s: slow takes x at 0 and 0.3, fast takes u - slow at 0, 0.2, 0.4.
     def period(x: float, slow: float, u: float) -> float:
         fast_value = 0.0
-        for k in range(6):
-            if k % 3 == 0:
+        for k in range(fast_every * slow_every):
+            if k % slow_every == 0:
                 slow = x
-            if k % 2 == 0:
+            if k % fast_every == 0:
                 fast_value = u - slow
-            x += 0.1 * fast_value
+            x += unit * fast_value
         return x
 
     assert system.A[0, 0] == pytest.approx(period(1.0, 0.0, 0.0), rel=1e-13)

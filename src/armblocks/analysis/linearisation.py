@@ -14,7 +14,6 @@ clock).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -26,6 +25,7 @@ from armblocks.analysis.dead_time import HIGHEST_ORDER, Approximated, dead_time
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.equations import HybridSystem, Signature
+from armblocks.equations.clock_ratios import common_period, exact_clocks
 from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 
@@ -260,7 +260,7 @@ def _over_a_period(
     from scipy.linalg import expm
 
     n, m, k = flow.x.shape[1], moved.size, flow.p.shape[1]
-    period, instants = common_period(system)
+    period, instants = ticks_of_a_period(system)
     generator = np.zeros((n + m + k, n + m + k))
     generator[:n] = np.hstack([flow.x, flow.z[:, moved], flow.p])
     flows: dict[Fraction, Array] = {}
@@ -286,16 +286,15 @@ def _over_a_period(
     return (a, b, output[:, :size], output[:, size:]), float(period)
 
 
-def common_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fraction, tuple[int, ...]]]]:
+def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fraction, tuple[int, ...]]]]:
     """The least common multiple of all periods (s), and every instant of one period with who ticks then.
 
-    Sample times are taken as the decimal numbers that a person wrote. Raises ``InputError`` where one period
-    has more than ``MOST_TICKS`` ticks.
+    Sample times have the ratios that a run sees (:mod:`armblocks.equations.clock_ratios`). Raises
+    ``InputError`` where one period has more than ``MOST_TICKS`` ticks.
     """
-    periods = [Fraction(repr(clock.period)) for clock in system.clocks]
-    offsets = [Fraction(repr(clock.offset)) for clock in system.clocks]
-    below = math.lcm(*(period.denominator for period in periods))
-    period = Fraction(math.lcm(*(int(period * below) for period in periods)), below)
+    clocks = exact_clocks(system.clocks)
+    periods = [own for own, _ in clocks]
+    period = common_period(clocks)
     count = sum(int(period / own) for own in periods)
     if count > MOST_TICKS:
         listed = ", ".join(f"{float(own):g} s" for own in periods)
@@ -306,7 +305,7 @@ def common_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fraction, 
             fix="choose sample times that are multiples of one another",
         )
     ticking: dict[Fraction, list[int]] = {}
-    for clock, (own, offset) in enumerate(zip(periods, offsets)):
+    for clock, (own, offset) in enumerate(clocks):
         for tick in range(int(period / own)):
             ticking.setdefault(offset + tick * own, [0] * len(periods))[clock] = 1
     return period, [(time, tuple(who)) for time, who in sorted(ticking.items())]

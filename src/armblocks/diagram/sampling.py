@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from armblocks.diagram.block_equations import BlockEquations
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.parameter import ParameterKind, parameter
 from armblocks.equations import SampleClock
+from armblocks.equations.clock_ratios import exact_clocks
 from armblocks.errors import DiagramError, InputError
 
 INHERITED = -1.0
@@ -195,9 +195,8 @@ def _fastest(name: str, block: Block, reaching: Collection[tuple[str, Source]]) 
         )
     fastest, by = clocks[0]
     for clock, other in clocks[1:]:
-        steps = _exact(clock.period) / _exact(fastest.period)
-        shift = (_exact(clock.offset) - _exact(fastest.offset)) / _exact(fastest.period)
-        if steps.denominator != 1 or shift.denominator != 1:
+        (step, start), (period, offset) = exact_clocks((fastest, clock))
+        if (period / step).denominator != 1 or ((offset - start) / step).denominator != 1:
             raise DiagramError(
                 f"'{by}' ticks every {fastest.period:g} s (offset {fastest.offset:g} s) and '{other}' every "
                 f"{clock.period:g} s (offset {clock.offset:g} s)",
@@ -206,8 +205,3 @@ def _fastest(name: str, block: Block, reaching: Collection[tuple[str, Source]]) 
                 fix=fix + ", or put a Rate Transition before one of the inputs",
             )
     return fastest
-
-
-def _exact(seconds: float) -> Fraction:
-    """The decimal number that a person wrote: 0.3 is three times 0.1, which the doubles are not."""
-    return Fraction(repr(seconds))

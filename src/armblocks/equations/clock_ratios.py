@@ -1,0 +1,54 @@
+"""Periods and offsets of clocks as exact fractions of a second, by the rule that a run decides ticks by.
+
+A run takes ticks within 4 units in the last place of each other for one instant. Two sample times therefore
+have the simplest ratio that their doubles allow within that distance: 0.3 s is three times 0.1 s, and 1/3 s
+is 10/3 times 0.1 s, though no double is a third. The common period of any number of clocks follows exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+from armblocks.equations.hybrid_system import SampleClock
+
+SAME_INSTANT = Fraction(1, 2**50)
+"""Relative distance up to which two instants are one: 4 units in the last place."""
+
+
+def ratio(numerator: float, denominator: float) -> Fraction:
+    """The simplest fraction within ``SAME_INSTANT`` of the quotient of two times; denominator > 0."""
+    quotient = Fraction(numerator) / Fraction(denominator)
+    if quotient < 0:
+        return -ratio(-numerator, denominator)
+    return simplest_between(quotient * (1 - SAME_INSTANT), quotient * (1 + SAME_INSTANT))
+
+
+def simplest_between(low: Fraction, high: Fraction) -> Fraction:
+    """The fraction of least denominator in ``[low, high]``, ``0 <= low <= high``; of several the smallest.
+
+    By continued fractions (Knuth, The Art of Computer Programming, volume 2, 4.5.3, exercise 39).
+    """
+    whole = math.ceil(low)
+    if whole <= high:
+        return Fraction(whole)
+    whole -= 1
+    return whole + 1 / simplest_between(1 / (high - whole), 1 / (low - whole))
+
+
+def exact_clocks(clocks: Sequence[SampleClock]) -> list[tuple[Fraction, Fraction]]:
+    """Period and offset (s) of each clock.
+
+    The first period is the simplest fraction that rounds to its double, the others have their ratios to it.
+    """
+    first = clocks[0].period
+    below, above = (Fraction(math.nextafter(first, side)) for side in (0.0, math.inf))
+    unit = simplest_between((below + Fraction(first)) / 2, (Fraction(first) + above) / 2)
+    return [(unit * ratio(clock.period, first), unit * ratio(clock.offset, first)) for clock in clocks]
+
+
+def common_period(clocks: Sequence[tuple[Fraction, Fraction]]) -> Fraction:
+    """The least common multiple (s) of the periods that :func:`exact_clocks` returns."""
+    below = math.lcm(*(period.denominator for period, _ in clocks))
+    return Fraction(math.lcm(*(int(period * below) for period, _ in clocks)), below)
