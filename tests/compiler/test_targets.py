@@ -4,10 +4,12 @@ import ctypes
 import platform
 from dataclasses import replace
 
+import casadi
 import numpy as np
 import pytest
+from casadi import SX
 from llvmlite import binding as llvm
-from small_functions import mixed, same_bits
+from small_functions import mixed, same_bits, traced
 
 from armblocks.compiler import compile_function
 from armblocks.compiler.batch import emit_batch
@@ -16,8 +18,8 @@ from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.llvm_ir import emit_function
-from armblocks.compiler.native import NativeCode, _link, compile_object, load_code
-from armblocks.compiler.target import Target, host_target, vector_lanes
+from armblocks.compiler.native import Effort, NativeCode, _link, compile_object, load_code
+from armblocks.compiler.target import Target, host_target, target_features, vector_lanes
 
 LAYOUT = BatchLayout(inputs=(Layout.ROWS, Layout.ROWS), outputs=(Layout.ROWS,))
 
@@ -80,6 +82,51 @@ def test_older_processors_give_the_same_bits(cpu: str, lanes: int) -> None:
 )
 def test_lanes_follow_the_vector_registers(triple: str, features: dict[str, bool], lanes: int) -> None:
     assert vector_lanes(triple, features) == lanes
+
+
+@pytest.mark.parametrize(
+    ("triple", "features"),
+    [
+        ("x86_64-unknown-linux-gnu", "+avx2,-prefer-256-bit"),
+        ("amd64-unknown-freebsd", "+avx2,-prefer-256-bit"),
+        ("aarch64-unknown-linux-gnu", "+avx2"),
+        ("arm64-apple-darwin", "+avx2"),
+    ],
+)
+def test_only_x86_64_is_told_not_to_prefer_256_bits(triple: str, features: str) -> None:
+    assert target_features(triple, "+avx2") == features
+
+
+def negations(a: SX, b: SX) -> SX:
+    """Multiply-adds whose sum is exactly zero for a = 3, b = 2, each negated in another way."""
+    rest = [a[k] * b[k] - 6 for k in range(4)]
+    return casadi.vertcat(
+        -rest[0],
+        casadi.if_else(a[4] > 0, -1.0, 1.0) * rest[1],
+        casadi.if_else(a[4] > 0, -rest[2], rest[2]),
+        casadi.atan2(-rest[3], -1.0),
+    )
+
+
+def test_a_negated_multiply_add_keeps_the_sign_of_zero_in_every_row() -> None:
+    count = 19  # rows in whole vectors, and a tail of single rows
+    result = compile_function(traced(negations, 5, 5))(np.full((count, 5), 3.0), np.full((count, 5), 2.0))
+    assert same_bits(result, np.tile([-0.0, -0.0, -0.0, -np.pi], (count, 1)))
+
+
+@pytest.mark.parametrize("effort", Effort)
+def test_arm64_code_has_no_negated_multiply_add(effort: Effort) -> None:
+    """FNMADD computes (-a) b - c, whose exact zero is +0; the negated zero of a b + c is -0."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = replace(host_target(), triple="aarch64-unknown-linux-gnu", cpu="generic", features="", lanes=2)
+    made = Module()
+    emit_function(made, tape_from(traced(negations, 5, 5)), "evaluate", linkage="")
+    code = compile_object(made.text, target, effort=effort)
+    words = np.frombuffer(code[: len(code) // 4 * 4], "<u4")
+    # C7.2 of the Arm Architecture Reference Manual: FMADD and FNMADD differ in bit 21 (o1), bit 15 (o0) is 0.
+    assert np.any((words & 0xFFE08000) == 0x1F400000) or np.any((words & 0xFFE08000) == 0x1F408000)
+    assert not np.any((words & 0xFFE08000) == 0x1F600000)
 
 
 def test_the_host_is_known_once() -> None:

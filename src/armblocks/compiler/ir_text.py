@@ -128,7 +128,11 @@ class Body:
 
     def fma(self, a: str, b: str, c: str) -> str:
         """``a b + c``, rounded once."""
-        return self.intrinsic("fma", a, b, c)
+        result = self.intrinsic("fma", a, b, c)
+        # For -(a b + c) LLVM selects ARM64's FNMADD, which computes (-a) b + (-c): where the sum is exactly
+        # zero that gives +0 instead of -0. A negation may also arise from a select or a product with -1, so
+        # the fence stands here. Vectors have no such instruction.
+        return self.intrinsic("arithmetic.fence", result) if self.lanes == 1 else result
 
     def intrinsic(self, name: str, *operands: str) -> str:
         """``llvm.<name>`` of doubles."""

@@ -52,20 +52,32 @@ def host_target() -> Target:
     with _LOCK:
         llvm.initialize_native_target()
         llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features()
+    triple, features = llvm.get_process_triple(), llvm.get_host_cpu_features()
     return Target(
-        triple=llvm.get_process_triple(),
+        triple=triple,
         cpu=llvm.get_host_cpu_name(),
-        # LLVM keeps to half of a 512-bit register on some processors unless told so.
-        features=",".join(part for part in (features.flatten(), "-prefer-256-bit") if part),
-        lanes=vector_lanes(llvm.get_process_triple(), features),
+        features=target_features(triple, features.flatten()),
+        lanes=vector_lanes(triple, features),
         llvm_version=f"llvmlite {llvmlite.__version__}, LLVM {'.'.join(map(str, llvm.llvm_version_info))}",
     )
 
 
+def target_features(triple: str, found: str) -> str:
+    """LLVM's list of features for a processor that has those ``found`` (``"+avx2,-sve"``).
+
+    On some x86-64 processors LLVM uses only half of a 512-bit register unless ``prefer-256-bit`` is switched
+    off. Other architectures do not know this feature.
+    """
+    return ",".join(part for part in (found, "-prefer-256-bit" if _is_x86_64(triple) else "") if part)
+
+
+def _is_x86_64(triple: str) -> bool:
+    return triple.startswith(("x86_64", "amd64"))
+
+
 def vector_lanes(triple: str, features: dict[str, bool]) -> int:
     """Doubles in the widest vector register that has a fused multiply-add, by the processor's features."""
-    if triple.startswith(("x86_64", "amd64")):
+    if _is_x86_64(triple):
         if features.get("avx512f"):
             return 8
         return 4 if features.get("avx2") and features.get("fma") else 2
