@@ -17,6 +17,7 @@ from scipy.io import loadmat
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.reduction import staircase
 from armblocks.errors import InputError, UnknownNameError
+from unordered import matched
 
 Array = NDArray[np.float64]
 SEEDS = range(6)
@@ -52,18 +53,6 @@ def transfer(numerator: list[float], denominator: list[float]) -> LinearSystem:
     B[-1] = 1.0
     rest = above[1:] - above[0] * below[1:]
     return LinearSystem(A, B, rest[::-1][None, :], np.array([[above[0]]]))
-
-
-def matched(found: Any, wanted: Any, tolerance: float = 1e-8) -> bool:
-    """The same numbers in any order."""
-    left = list(np.asarray(found))
-    for value in np.asarray(wanted):
-        if not left:
-            return False
-        k = int(np.argmin(np.abs(np.array(left) - value)))
-        if abs(left.pop(k) - value) > tolerance * max(1.0, abs(value)):
-            return False
-    return not left
 
 
 # Poles and zeros.

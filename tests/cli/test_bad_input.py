@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import Result
 
+from interruptible import killed_at_the_end, start_interruptible
+
 Refused = Callable[..., str]
 Write = Callable[..., str]
 
@@ -224,18 +226,18 @@ def test_ctrl_c_keeps_what_was_computed_and_says_so(write_diagram: Write, tmp_pa
     path = write_diagram(
         blocks, "k/y -> v/u", "v/y -> x/u", "x/y -> k/u", stop_time=1e9, step=1e-2, sample_time=1e5
     )
-    process = subprocess.Popen(
+    process = start_interruptible(
         [sys.executable, "-m", "armblocks", "run", path, "--solver", "rk4", "--out", "kept", "--no-figures"],
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        text=True,
     )
-    assert process.stderr is not None
-    assert "x real time" in process.stderr.readline()  # the first line of progress: the run is under way
-    process.send_signal(signal.SIGINT)
-    stdout, stderr = process.communicate(timeout=60)
+    with killed_at_the_end(process):
+        assert process.stderr is not None
+        assert "x real time" in process.stderr.readline()  # the first line of progress: the run is under way
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=120)
     assert process.returncode == 130, stderr
     assert "Traceback" not in stderr
     assert "incomplete: stopped by Ctrl-C" in " ".join(stdout.split())

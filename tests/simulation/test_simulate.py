@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 
 import casadi as ca
 import numpy as np
@@ -228,6 +229,7 @@ def test_a_signal_from_outside_ends_a_long_native_run_soon() -> None:
     previous = signal.signal(signal.SIGALRM, interrupt)
     try:
         OSCILLATOR.integrator(find_tableau("rk4"))
+        used = time.process_time()
         signal.setitimer(signal.ITIMER_REAL, 0.15)
         options = SimulationOptions(stop_time=1e6, solver="rk4", step=1e-4, sample_time=1.0)  # minutes
         result = simulate(OSCILLATOR, options)
@@ -235,7 +237,7 @@ def test_a_signal_from_outside_ends_a_long_native_run_soon() -> None:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, previous)
     assert not result.run.complete
-    assert result.run.wall_time < 5.0  # a tenth of it on a free machine
+    assert time.process_time() - used < 5.0  # of minutes that the whole run takes
 
 
 def test_runs_repeat_bit_for_bit() -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from playwright.sync_api import Locator, Page, expect
+
+from conftest import PATIENCE_MS
 
 
 def block(page: Page, name: str) -> Locator:
@@ -48,6 +52,21 @@ def wire(page: Page, source: str, target: str) -> None:
     page.mouse.down()
     page.mouse.move(*middle(target), steps=5)
     page.mouse.up()
+
+
+def wait_until(page: Page, true: Callable[[], bool]) -> None:
+    """Wait for what no locator says: a state on this side of the line, or a relation of two numbers."""
+    step = 50
+    for _ in range(PATIENCE_MS // step):
+        if true():
+            return
+        page.wait_for_timeout(step)  # the events of the browser are handled meanwhile
+    raise AssertionError("it did not come")
+
+
+def expect_focus_inside(found: Locator) -> None:
+    """Wait until the keys go to a dialog: it takes the focus shortly after it is shown."""
+    expect(found.locator(":focus")).to_have_count(1)
 
 
 def run(page: Page) -> None:

@@ -16,6 +16,8 @@ import pytest
 from firefox_bidi import firefox_path
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
+from interruptible import start_interruptible
+
 FLAGS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -41,7 +43,7 @@ class Studio:
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         self.folder = folder
-        self.process = subprocess.Popen(
+        self.process = start_interruptible(
             [
                 sys.executable,
                 "-m",
@@ -55,7 +57,6 @@ class Studio:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            text=True,
             env={**os.environ, "COLUMNS": "300"},
         )
         assert self.process.stdout is not None
@@ -66,6 +67,7 @@ class Studio:
                 self.link = found.group()
                 self.address = self.link.partition("login")[0]
                 return
+        self.kill()
         raise AssertionError(f"the studio did not start: {said}")
 
     def kill(self) -> None:
@@ -79,7 +81,7 @@ class Studio:
         """End it with Ctrl-C, as a user does."""
         self.process.send_signal(signal.SIGINT)
         try:
-            self.process.wait(timeout=10)
+            self.process.wait(timeout=PATIENCE_MS / 1000)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

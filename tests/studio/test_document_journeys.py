@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from accessibility import axe
+from building import wait_until
 from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
 
 from conftest import PATIENCE_MS, TOUR_SEEN, Studio
@@ -96,7 +97,7 @@ def test_save_as_asks_before_it_overwrites(page: Page, server: list[Studio]) -> 
     field.press("Enter")
     expect(page.locator(".title")).to_have_text("one")
     expect(page).to_have_title("one – armblocks")
-    assert page.url.endswith("#models/one.json")
+    expect(page).to_have_url(re.compile("#models/one.json$"))
     assert (folder / "models" / "one.json").is_file()
     (folder / "theirs.json").write_text("{}")
     page.keyboard.press("Control+Shift+S")
@@ -182,17 +183,17 @@ def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
     line.held = True
     block(page, "Gain").click()
     page.keyboard.press("ArrowDown")
+    expect(page.get_by_role("button", name="Undo move Gain (Ctrl+Z)")).to_be_enabled()
     other.keyboard.press("ArrowRight")  # of the place where Gain is not any more
-    page.wait_for_timeout(500)
+    wait_until(page, lambda: any("changed in another page" in str(said) for said in line.waiting))
     line.release()
     expect(other.get_by_text("what you changed was changed in another page meanwhile")).to_be_visible()
     other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
     add(other, "sum")
     expect(block(page, "Sum")).to_be_visible()
     places = "nodes => nodes.map(node => [node.dataset.id, node.style.transform]).sort()"
-    assert page.locator(".react-flow__node").evaluate_all(places) == other.locator(
-        ".react-flow__node"
-    ).evaluate_all(places)
+    here, there = (shown.locator(".react-flow__node") for shown in (page, other))
+    wait_until(page, lambda: here.evaluate_all(places) == there.evaluate_all(places))
     other.close()
     page.keyboard.press("Control+s")
     expect(page).to_have_title("two – armblocks")
@@ -242,7 +243,7 @@ def test_robot_edits_survive_a_killed_server_and_a_reload(page: Page, server: li
     length.press("Enter")
     expect(editor.get_by_label("changed", exact=True)).to_be_visible()
     old.kill()
-    expect(page.get_by_text("The studio does not answer")).to_be_visible(timeout=3000)
+    expect(page.get_by_text("The studio does not answer")).to_be_visible()
     other = editor.get_by_role("textbox", name="a of link2", exact=True)
     other.fill("0.25")  # waits in the page, and outlives it
     other.press("Enter")

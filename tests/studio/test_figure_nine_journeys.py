@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import add, block, drag_from_library, new_diagram, run, wire
+from building import add, block, drag_from_library, expect_focus_inside, new_diagram, run, wire
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -110,7 +110,8 @@ def test_with_the_mouse(page: Page, folder: Path) -> None:
 
 
 def tab_to(page: Page, field: Locator) -> None:
-    """Go to a field with the Tab key."""
+    """Go to a field of the dialog with the Tab key, once around at most."""
+    expect_focus_inside(page.get_by_role("dialog"))
     for _ in range(40):
         if field.evaluate("(element) => element === document.activeElement"):
             return
@@ -144,6 +145,7 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
         tab_to(page, dialog.get_by_role("button", name="OK", exact=True))
         page.keyboard.press("Enter")
         expect(dialog).to_be_hidden()
+        expect(block(page, name)).to_be_focused()
     for count, (source, target) in enumerate(WIRES, 1):
         page.keyboard.press(">")
         for label, port in (("From the output", source), ("To the input", target)):

@@ -113,7 +113,7 @@ class Listener:
                 await self.news.wait()
 
         try:
-            return await asyncio.wait_for(waiting(), 20)
+            return await asyncio.wait_for(waiting(), 120)
         except TimeoutError:
             raise AssertionError(f"no such {kind} among {self.events}") from None
 
@@ -131,8 +131,7 @@ def test_a_run_is_tuned_taken_back_and_finished_in_its_own_process() -> None:
         while len(heard.times) < 100:
             await asyncio.sleep(0.02)
         run.obey(say.Control(run="r", action="pause"))
-        await heard.until(say.RunProgress, lambda event: event.state == "paused")
-        await asyncio.sleep(0.1)
+        await heard.until(say.RunProgress, lambda event: event.state == "paused")  # after the last samples
         reached = len(heard.times)
         run.obey(say.Tune(run="r", parameter="PID.P", value="2*3"))
         assert (await heard.until(say.RunTuned)).parameter == "PID.P"

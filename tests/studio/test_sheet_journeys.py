@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from accessibility import axe
+from building import wait_until
 from playwright.sync_api import Locator, Page, expect
 
 from armblocks.blocks import BLOCKS
@@ -76,18 +77,19 @@ def test_a_wire_is_led_by_hand_follows_its_block_and_finds_its_own_way_again(she
     sheet.mouse.move(x, y - 40, steps=4)
     sheet.mouse.up()
     expect(sheet.get_by_role("button", name="Undo bend 1 wire (Ctrl+Z)")).to_be_enabled()
+    line = edge(sheet, wire).locator("path.line").first
+    expect(line).not_to_have_attribute("d", before or "")
     led = way(sheet, wire)
-    assert led != before
     block(sheet, "PID").click()
     sheet.keyboard.press("ArrowDown")
     expect(sheet.get_by_role("button", name="Undo move PID (Ctrl+Z)")).to_be_enabled()
-    moved = way(sheet, wire)
-    assert moved not in (led, before)
+    expect(line).not_to_have_attribute("d", led or "")
+    assert way(sheet, wire) != before
     sheet.keyboard.press("Control+z")
-    expect(edge(sheet, wire).locator("path.line").first).to_have_attribute("d", led or "")
+    expect(line).to_have_attribute("d", led or "")
     edge(sheet, wire).locator(".piece").nth(2).click(force=True)
     sheet.get_by_role("button", name="Reset the route").click()
-    expect(edge(sheet, wire).locator("path.line").first).to_have_attribute("d", before or "")
+    expect(line).to_have_attribute("d", before or "")
 
 
 def test_a_block_that_is_dropped_on_a_wire_goes_into_it(sheet: Page) -> None:
@@ -230,8 +232,12 @@ def test_blocks_are_turned_and_aligned(sheet: Page) -> None:
     bar = sheet.get_by_role("toolbar", name="Arrange the selected blocks")
     bar.get_by_role("button", name="Align top edges").click()
     expect(sheet.get_by_role("button", name=re.compile("Undo move"))).to_be_enabled()
-    boxes = [block(sheet, name).bounding_box() for name in ("PID", "x1", "one")]
-    assert len({round(box["y"]) for box in boxes if box}) == 1
+
+    def tops() -> set[int]:
+        boxes = [block(sheet, name).bounding_box() for name in ("PID", "x1", "one")]
+        return {round(box["y"]) for box in boxes if box}
+
+    wait_until(sheet, lambda: len(tops()) == 1)
     sheet.keyboard.press("Control+z")
     command(sheet, "equal gaps from left")
     expect(sheet.get_by_role("button", name=re.compile("Undo move"))).to_be_enabled()
@@ -250,10 +256,8 @@ def test_a_note_is_written_moved_saved_and_deleted(sheet: Page) -> None:
     note.click()
     sheet.keyboard.press("ArrowUp")
     expect(sheet.get_by_role("button", name="Undo move 1 note (Ctrl+Z)")).to_be_enabled()
-    after = note.bounding_box()
     assert before is not None
-    assert after is not None
-    assert after["y"] < before["y"]
+    wait_until(sheet, lambda: (note.bounding_box() or before)["y"] < before["y"])
     sheet.keyboard.press("Delete")
     expect(note).to_have_count(0)
     sheet.keyboard.press("Control+z")

@@ -20,6 +20,14 @@ from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.server import built_page
 
 Told = list[dict[str, Any]]
+PATIENCE_SECONDS = 60
+
+
+async def until(true: Callable[[], bool]) -> None:
+    """Let the hub work until what it is expected to do is done."""
+    async with asyncio.timeout(PATIENCE_SECONDS):
+        while not true():
+            await asyncio.sleep(0.005)
 
 
 def talk(
@@ -51,7 +59,6 @@ def talk(
             return reply["value"]
 
         await talking(hub, ask, told)
-        await asyncio.sleep(0.4)  # the background check
         hub.close()
 
     asyncio.run(going())
@@ -68,15 +75,20 @@ def test_a_drawing_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
         await ask(
             "change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]}
         )  # sent twice, done once
-        await asyncio.sleep(0.4)
+
+        def last_check() -> list[Any] | None:
+            return next((event["findings"] for event in reversed(told) if event["kind"] == "checked"), None)
+
+        await until(lambda: bool(last_check()))
         await ask("undo", document=key)
         assert await ask("save", document=key, path="models/mine.json") == "models/mine.json"
-        await asyncio.sleep(0.4)
+        await until(lambda: last_check() == [])
 
     told = talk(tmp_path, talking)
     assert load_diagram(tmp_path / "models" / "mine.json", BLOCKS).name == "mine"
     checks = [event for event in told if event["kind"] == "checked"]
-    assert [(f["block"], f["port"]) for f in checks[0]["findings"]] == [("gain", "u")]
+    first = next(event["findings"] for event in checks if event["findings"])
+    assert [(f["block"], f["port"]) for f in first] == [("gain", "u")]
     assert checks[-1]["findings"] == []
     assert checks[-1]["wires"]["PID/y"]["shape"] == []
     last = [event for event in told if event["kind"] == "changed"][-1]

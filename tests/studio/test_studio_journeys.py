@@ -73,7 +73,7 @@ def test_a_diagram_is_built_with_the_mouse_run_and_saved(page: Page, folder: Pat
     expect(page.locator(".react-flow__node")).to_have_count(3)
     expect(page.locator(".block .fault")).to_have_count(2)
     wire(page, "Sine Wave/y", "Gain/u")
-    wire(page, "Gain/y", "Scope/u1" if page.locator('[data-handleid="u1"]').count() else "Scope/u")
+    wire(page, "Gain/y", "Scope/u")
     expect(page.locator(".react-flow__edge")).to_have_count(2)
     expect(page.locator(".block .fault")).to_have_count(0)
     block(page, "Gain").dblclick()
@@ -151,7 +151,7 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
     page.get_by_role("button", name="Resume").click()
     expect(state).to_contain_text("running")
     page.get_by_role("button", name="Stop").click()
-    expect(state).to_contain_text("stopped", timeout=3000)
+    expect(state).to_contain_text("stopped")
     speed.select_option("as fast as possible")
 
 

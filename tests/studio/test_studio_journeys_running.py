@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from building import wait_until
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -71,14 +72,6 @@ def shown_time(page: Page) -> float:
     return float(page.locator(".timeline .instant").inner_text().removesuffix(" s"))
 
 
-def wait_until(page: Page, true: Callable[[], bool]) -> None:
-    for _ in range(600):
-        if true():
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError("it did not come")
-
-
 def number(text: str) -> float:
     return float(text.replace("−", "-").split()[0])
 
@@ -104,7 +97,7 @@ def test_a_run_is_tuned_stepped_back_and_the_value_kept(opened: Opened) -> None:
     expect(page.locator(".timeline .instant")).to_have_text("0.010 s")
     page.get_by_role("button", name="Go back to here").click()
     expect(page.get_by_role("button", name="Go back to here")).to_be_hidden()
-    assert shown_time(page) <= 0.02
+    wait_until(page, lambda: shown_time(page) <= 0.02)
     page.get_by_role("combobox", name="Speed").select_option("as fast as possible")
     page.get_by_role("button", name="Resume").click()
     expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
@@ -162,8 +155,9 @@ def saved(page: Page, scope: str, entry: str) -> bytes:
 
 
 def measured(table: Locator, signal: str) -> dict[str, str]:
-    heads = table.locator("thead th").all_inner_texts()
     row = table.locator("tbody tr", has=table.page.locator("th", has_text=re.compile(f"^{signal}")))
+    expect(row).to_be_visible()
+    heads = table.locator("thead th").all_inner_texts()
     return dict(zip(heads[1:], row.locator("td").all_inner_texts()))
 
 
