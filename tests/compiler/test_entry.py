@@ -1,9 +1,12 @@
-"""The builtin for single calls: the kernel's own answers and refusals, and no reference lost or kept."""
+"""The builtin: the kernel's own answers and refusals, and no reference lost or kept."""
 
 import gc
 import sys
+import threading
 import weakref
+from collections.abc import Callable, Sequence
 from types import BuiltinFunctionType
+from typing import Any
 
 import casadi
 import numpy as np
@@ -157,13 +160,17 @@ def test_results_are_new_arrays(kernel: Kernel) -> None:
 
 def test_no_reference_is_lost_or_kept(kernel: Kernel, several: Kernel) -> None:
     a, b = arguments(5)
-    A = np.eye(2)
-    watched = (a, b, A, np.dtype(np.float64), np.ndarray, np.float64, kernel, kernel.entry, several.entry)
+    A, out, batch, t = np.eye(2), np.empty(11), np.ones((600, 3)), np.ones(9)
+    watched = (a, b, A, out, batch, t, np.dtype(np.float64), np.ndarray, np.float64)
+    watched += (kernel, kernel.entry, several.entry)
 
     def exercise() -> None:
         for _ in range(500):
-            kernel.entry(a, b)
+            kernel.entry(a, b, threads=1)
+            kernel.entry(a, b, out=out)
             several.entry(1.5, A)
+            several.entry(t, A, out=None)
+            kernel.entry(batch, b)
             for wrong in ((a,), (a, A), (a, None)):
                 with pytest.raises(InputError):
                     kernel.entry(*wrong)
@@ -240,14 +247,127 @@ def test_random_mixtures_of_arguments(kernel: Kernel) -> None:
     pool = [*odd_arguments().values(), np.zeros(2), None, "x", 1.0, *arguments(9)]
     for _ in range(300):
         chosen = [pool[k] for k in rng.integers(len(pool), size=rng.integers(0, 4))]
-        try:
-            expected = kernel(*chosen)
-        except InputError as error:
-            with pytest.raises(InputError) as found:
-                kernel.entry(*chosen)
-            assert str(found.value) == str(error)
-        else:
-            assert same_bits(np.asarray(kernel.entry(*chosen)), np.asarray(expected))
+        assert outcome(kernel.entry, chosen, {}) == outcome(kernel, chosen, {})
+
+
+def outcome(call: Callable[..., object], given: Sequence[object], options: dict[str, object]) -> object:
+    """What a call gives, as comparable values: type, shape, bits of each result, or the text of the error."""
+    try:
+        result = call(*given, **options)
+    except InputError as error:
+        return str(error)
+    parts = result if isinstance(result, tuple) else (result,)
+    flags = [part is options.get("out") or part.flags.owndata for part in parts]
+    return [type(result), flags, *((type(part), part.shape, part.tobytes()) for part in parts)]
+
+
+def call_with_options(shapes: Sequence[tuple[int, ...]], result: tuple[int, ...], seed: int) -> Any:
+    """Random plain inputs, single or in batches, and random options: most of them good, some of them not."""
+    rng = np.random.default_rng(seed)
+    samples = int(rng.choice([0, 1, 2, 7, 8, 9, 64, 600]))
+    memory = rng.normal(size=40_000)  # all arrays are pieces of it, so that they may overlap
+    place = 0
+
+    def piece(shape: tuple[int, ...]) -> np.ndarray:
+        nonlocal place
+        start = place
+        place += int(np.prod(shape))
+        return memory[start:place].reshape(shape)
+
+    given: list[Any] = []
+    for shape in shapes:
+        count = samples + (rng.random() < 0.02)
+        batched = rng.random() < 0.6
+        value = piece((count, *shape) if batched else shape)
+        given.append(float(value) if value.ndim == 0 else value)
+    options: dict[str, Any] = {}
+    if rng.random() < 0.3:
+        options["threads"] = rng.choice(np.array([1, 1, 1, 2, 0, True, None], object))
+    if rng.random() < 0.7:
+        batched = any(np.ndim(value) > len(shape) for value, shape in zip(given, shapes))
+        place = max(0, place - int(rng.choice([0, 0, 0, 1, place])))
+        out: Any = piece((samples, *result) if batched else result)
+        wrong = rng.integers(16)
+        if wrong == 0:
+            out.flags.writeable = False
+        options["out"] = {
+            1: lambda: out.astype(np.float32),
+            2: lambda: out.astype(">f8"),
+            3: lambda: piece((*out.shape, 2))[..., 0],
+            4: lambda: piece((1, *out.shape)),
+            5: lambda: piece((samples + 1, *result)),
+            6: lambda: out.tolist(),
+            7: lambda: out.view(Subclass),
+            8: lambda: None,
+            9: lambda: (out,),
+        }.get(wrong, lambda: out)()
+    return given, options, memory
+
+
+def test_batches_and_options_are_served_as_the_kernel_serves_them(kernel: Kernel, several: Kernel) -> None:
+    square = compile_function(
+        TracedFunction.trace("square", signature(("t", ())), signature(("s", ())), lambda t: t * t)
+    )
+    for called, shapes, result in (
+        (kernel, [(3,), (3,)], (11,)),
+        (several, [(), (2, 2)], (2, 2)),
+        (square, [()], ()),
+    ):
+        for seed in range(150):
+            expected = call_with_options(shapes, result, seed)
+            found = call_with_options(shapes, result, seed)
+            assert outcome(called.entry, *found[:2]) == outcome(called, *expected[:2])
+            assert same_bits(found[2], expected[2])  # nothing else was written
+
+
+def test_batches_and_options_run_no_python(kernel: Kernel, several: Kernel) -> None:
+    def fallback(*arguments: object, **options: object) -> None:
+        raise AssertionError(f"{arguments} {options}")
+
+    builtin = kernel.entry_before(fallback)
+    a, b = arguments(10)
+    out = np.empty(11)
+    assert builtin(a, b, out=out, threads=1) is out
+    assert same_bits(out, kernel(a, b))
+    for count in (0, 1, 8, 33, 600):
+        batch = np.tile(a, (count, 1))
+        for given in ((batch, b), (a, np.tile(b, (count, 1))), (batch, np.tile(b, (count, 1)))):
+            expected = kernel(*given)  # the batch function for these inputs is there from now on
+            assert same_bits(builtin(*given, threads=1), expected)
+            out = np.empty((count, 11))
+            assert builtin(*given, out=out) is out
+            assert same_bits(out, expected)
+    t = np.arange(5.0)
+    expected = several(t, np.eye(2))
+    found = several.entry_before(fallback)(t, np.eye(2))
+    assert all(map(same_bits, found, expected))
+
+
+def test_long_batches_leave_other_threads_their_turn(kernel: Kernel) -> None:
+    a, b = (np.random.default_rng(k).normal(size=(600, 3)) for k in (1, 2))
+    expected = kernel(a, b)
+    found: list[np.ndarray] = []
+
+    def work() -> None:
+        found.extend(kernel.entry(a, b) for _ in range(50))
+
+    workers = [threading.Thread(target=work) for _ in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert len(found) == 200
+    assert all(same_bits(result, expected) for result in found)
+
+
+def test_batches_of_kernels_with_many_inputs_are_left_to_python() -> None:
+    shapes = [(name, (1,)) for name in "abcdefghi"]
+    kernel = compile_function(
+        TracedFunction.trace("nine", signature(*shapes), signature(("s", (1,))), lambda *x: sum(x))
+    )
+    single = [np.array([float(k)]) for k in range(9)]
+    assert kernel.entry(*single) == [36.0]
+    assert np.array_equal(kernel.entry(*single[:8], np.zeros((3, 1))), np.full((3, 1), 28.0))
 
 
 def test_matrices_in_column_order_are_read_as_what_they_are() -> None:

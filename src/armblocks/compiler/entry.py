@@ -1,11 +1,15 @@
-"""The way into a kernel for one sample: a CPython builtin whose code stands in the kernel's own LLVM module.
+"""The way into a kernel from Python: a CPython builtin whose code stands in the kernel's own LLVM module.
 
 A call through ``ctypes`` costs several times the work of a whole robot model. The builtin made here has the
-signature of ``METH_FASTCALL | METH_KEYWORDS``; it looks at its arguments, and when each is a plain
-C-contiguous float64 array of exactly the slot's shape (a float for a scalar slot), it allocates the result
-and calls the evaluation: no Python code runs. Anything else (lists, batches, ``out=``, subclasses, a wrong
-shape) goes to a Python callable that serves or refuses it with the full text. No C compiler is involved, so
-the wheel stays pure Python.
+signature of ``METH_FASTCALL | METH_KEYWORDS``. It checks its arguments. When each is a plain C-contiguous
+float64 array of the slot's shape (a float for a scalar slot), with or without the samples' axis, it allocates
+the result, or takes the array of ``out=``, and calls the evaluation: no Python code runs. Anything else
+(lists, subclasses, a wrong shape, ``out=`` that shares memory with an input, two threads) goes to a Python
+callable that serves or refuses it with the full text. No C compiler is involved, so the wheel stays pure
+Python.
+
+Batches have machine code of their own, which is made when a batch first needs it. The first batch therefore
+goes to the Python callable; the kernel then puts the address into :data:`BATCHES`.
 
 The builtin reads ``PyArrayObject`` by its field offsets, which NumPy's binary interface fixes. They are
 compared with a real array once per process; if anything differs (a build without the GIL has another object
@@ -16,23 +20,31 @@ from __future__ import annotations
 
 import ctypes
 import importlib
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from armblocks.compiler.native import NativeCode
+
 ENTRY = "armblocks_entry"
 """Symbol of the builtin's C function."""
 TABLE = "armblocks_entry_table"
 """Symbol of the addresses that each process fills in: code on disk must not hold any."""
+BATCHES = "armblocks_entry_batches"
+"""Symbol of the addresses of the functions for batches, null until made: see :func:`offer_batch`."""
+MOST_BATCH_INPUTS = 8
+"""Batches of kernels with more inputs go to the Python callable: the table has a place for each subset."""
 
 _FASTCALL_WITH_KEYWORDS = 0x0080 | 0x0002
 # Byte offsets in the structures of CPython and NumPy on 64-bit systems.
 OBJECT_TYPE, FLOAT_VALUE = 8, 16
 ARRAY_DATA, ARRAY_NDIM, ARRAY_DIMENSIONS, ARRAY_DESCR, ARRAY_FLAGS = 16, 24, 32, 56, 64
-C_CONTIGUOUS_AND_ALIGNED = 0x0001 | 0x0100
+C_CONTIGUOUS_AND_ALIGNED, WRITEABLE = 0x0001 | 0x0100, 0x0400
+OWNER_CALL = 16
 # Places in NumPy's table of C functions.
 _NUMPY_ARRAY_TYPE, _NUMPY_SCALAR, _NUMPY_NEW_FROM_DESCR = 2, 60, 94
 
@@ -48,7 +60,17 @@ PLACES = (
     "reference",
     "release",
     "vectorcall",
+    "tuple_size",
+    "tuple_item",
+    "none",
+    "out_name",
+    "threads_name",
+    "one",
+    "save_thread",
+    "restore_thread",
 )
+# Names of options are interned strings and small integers exist once: both are compared by address.
+_OUT_NAME, _THREADS_NAME, _ONE = sys.intern("out"), sys.intern("threads"), 1
 
 Callback = Callable[..., Any]
 
@@ -70,7 +92,10 @@ _DEFINITIONS: list[_MethodDefinition] = []
 
 
 class _Owner:
-    """The builtin's ``self``: what it falls back to, and what must live as long as it does."""
+    """The builtin's ``self``: what it falls back to, and what must live as long as it does.
+
+    The C function reads ``call`` by its offset.
+    """
 
     __slots__ = ("call", "kept")
 
@@ -78,8 +103,15 @@ class _Owner:
         self.call = call
         self.kept = kept
 
-    def __call__(self, *arguments: object, **options: object) -> object:
-        return self.call(*arguments, **options)
+
+def offer_batch(code: NativeCode, batched: Sequence[bool], address: int) -> None:
+    """Tell the builtin in ``code`` the function for batches in which the inputs ``batched`` have samples.
+
+    The function's code must live as long as the builtin.
+    """
+    if len(batched) <= MOST_BATCH_INPUTS:
+        index = sum(1 << k for k, own in enumerate(batched) if own)
+        ctypes.c_void_p.from_address(code.address(BATCHES) + 8 * index).value = address
 
 
 def make_entry(
@@ -143,6 +175,14 @@ def _addresses() -> list[int] | None:
         "reference": _python_function("Py_IncRef"),
         "release": _python_function("Py_DecRef"),
         "vectorcall": _python_function("PyObject_Vectorcall"),
+        "tuple_size": _python_function("PyTuple_Size"),
+        "tuple_item": _python_function("PyTuple_GetItem"),
+        "none": id(None),
+        "out_name": id(_OUT_NAME),
+        "threads_name": id(_THREADS_NAME),
+        "one": id(_ONE),
+        "save_thread": _python_function("PyEval_SaveThread"),
+        "restore_thread": _python_function("PyEval_RestoreThread"),
     }
     return [found[place] for place in PLACES]
 
@@ -152,9 +192,12 @@ def _python_function(name: str) -> int:
 
 
 def _layout_is_known() -> bool:
-    """Compare the offsets with arrays and floats of known content."""
+    """Compare the offsets with arrays, floats and an owner of known content."""
     array = np.empty((3, 5))
     turned = array.T
+    read_only = np.empty(2)
+    read_only.flags.writeable = False
+    owner = _Owner(len, None)
     view, other = _View(id(array)), _View(id(turned))
     number = 0.1234567890123
     return (
@@ -165,6 +208,9 @@ def _layout_is_known() -> bool:
         and view.word(ARRAY_DESCR) == id(np.dtype(np.float64))
         and view.half(ARRAY_FLAGS) & C_CONTIGUOUS_AND_ALIGNED == C_CONTIGUOUS_AND_ALIGNED
         and other.half(ARRAY_FLAGS) & C_CONTIGUOUS_AND_ALIGNED == 0x0100
+        and view.half(ARRAY_FLAGS) & WRITEABLE == WRITEABLE
+        and _View(id(read_only)).half(ARRAY_FLAGS) & WRITEABLE == 0
+        and _View(id(owner)).word(OWNER_CALL) == id(len)
         and all(
             _View(id(value)).word(OBJECT_TYPE) == id(type(value))
             and ctypes.c_double.from_address(id(value) + FLOAT_VALUE).value == number

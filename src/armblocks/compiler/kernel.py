@@ -20,7 +20,7 @@ from armblocks.compiler.arguments import (
     new_outputs,
     read_input,
 )
-from armblocks.compiler.entry import ENTRY, TABLE, make_entry
+from armblocks.compiler.entry import ENTRY, TABLE, make_entry, offer_batch
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.tape import OperationCount, Tape
@@ -68,7 +68,7 @@ class Kernel:
         self._digest = digest
         self._make_tape = tape
         self._batches: dict[str, Callable[..., None]] = {}
-        self._loaded: list[NativeCode] = []  # what the functions above run in
+        self._loaded: dict[str, NativeCode] = {}  # what the functions above run in
         self._lock = threading.RLock()
 
     @cached_property
@@ -83,13 +83,13 @@ class Kernel:
 
     @cached_property
     def entry(self) -> Callable[..., Any]:
-        """A builtin that takes the same arguments as the kernel; by far the fastest way in for one sample."""
+        """A builtin that takes the same arguments as the kernel; by far the fastest way in."""
         return self.entry_before(self.__call__)
 
     def entry_before(self, fallback: Callable[..., Any]) -> Callable[..., Any]:
-        """A builtin like :attr:`entry` that leaves all but plain single calls to ``fallback``.
+        """A builtin like :attr:`entry` that leaves what it does not serve to ``fallback``.
 
-        ``fallback`` gets the arguments and options unchanged.
+        It serves plain arrays, ``out=`` and ``threads=1``. ``fallback`` gets all else, unchanged.
         """
         options = "/, *, out=None, threads=1"
         names = ", ".join(self.inputs.names)
@@ -98,6 +98,8 @@ class Kernel:
         doc = f"{self.name}({names}, {options})\n--\n\n{shapes} -> {results}; or N samples of each."
         with self._lock:
             code = self._single
+            for key in self._batches:
+                self._offer_batch(code, key)
             return make_entry(
                 name=self.name,
                 doc=doc,
@@ -193,9 +195,18 @@ class Kernel:
                 code = load_code(("batch", self._digest, key), lambda: self._write_batch(key))
                 pointers = [ctypes.c_void_p] * (len(self.inputs) + len(self.outputs))
                 prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *pointers)
-                self._loaded.append(code)
+                self._loaded[key] = code
                 self._batches[key] = prototype(code.address("batch"))
+                if "_single" in self.__dict__:
+                    self._offer_batch(self._single, key)
             return self._batches[key]
+
+    def _offer_batch(self, single: NativeCode, key: str) -> None:
+        """Let builtins in ``single`` call the function for batches of this layout, if results are rows."""
+        inputs = key[: len(self.inputs)]
+        if _COLUMNS not in key:
+            address = self._loaded[key].address("batch")
+            offer_batch(single, [kind == _ROWS for kind in inputs], address)
 
     def _write_batch(self, key: str) -> str:
         from armblocks.compiler.batch import emit_batch

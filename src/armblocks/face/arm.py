@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -58,6 +58,21 @@ class OfMotion(Protocol):
         out: Array | None = None,
         threads: int = 1,
     ) -> Array: ...
+
+
+class OfLoadedMotion(Protocol):
+    """``f(q, qd, qdd or tau, wrench, payload)``: the kernel behind :class:`OfMotion` under a load."""
+
+    def __call__(self, *arrays: ArrayLike, out: Array | None = None, threads: int = 1) -> Array: ...
+
+
+def _zeros(count: int) -> Array:
+    zeros = np.zeros(count)
+    zeros.flags.writeable = False
+    return zeros
+
+
+_NO_WRENCH, _NO_PAYLOAD = _zeros(6), _zeros(10)
 
 
 class Arm:
@@ -201,6 +216,10 @@ class Arm:
         """The plain kernel, and the one with wrench and payload as soon as a call names either."""
         plain = self._kernel(method)
 
+        @cache
+        def loaded() -> OfLoadedMotion:
+            return self._kernel(f"{method}_loaded").entry
+
         def general(
             *arguments: ArrayLike,
             wrench: ArrayLike | None = None,
@@ -210,17 +229,15 @@ class Arm:
         ) -> Array:
             if wrench is None and payload is None:
                 return plain(*arguments, out=out, threads=threads)
-            loaded = self._kernel(f"{method}_loaded")
+            force = _NO_WRENCH if wrench is None else wrench
             carried = (
-                payload.vector()
+                payload.numbers
                 if isinstance(payload, Payload)
-                else np.zeros(10)
+                else _NO_PAYLOAD
                 if payload is None
                 else payload
             )
-            return loaded(
-                *arguments, np.zeros(6) if wrench is None else wrench, carried, out=out, threads=threads
-            )
+            return loaded()(*arguments, force, carried, out=out, threads=threads)
 
         return plain.entry_before(general)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ class Payload:
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        vector = self.vector()
+        vector = self.numbers
         if vector.shape != (10,) or not np.isfinite(vector).all():
             raise InputError(
                 f"payload {self} is not made of 1 + 3 + 6 finite numbers",
@@ -39,6 +40,13 @@ class Payload:
                 fix="give the mass in kg",
             )
 
+    @cached_property
+    def numbers(self) -> NDArray[np.float64]:
+        """The ten numbers in the order that the compiled dynamics take, read-only."""
+        numbers = np.array([self.mass, *self.centre, *self.inertia], dtype=np.float64)
+        numbers.flags.writeable = False
+        return numbers
+
     def vector(self) -> NDArray[np.float64]:
-        """The ten numbers in the order that the compiled dynamics take."""
-        return np.array([self.mass, *self.centre, *self.inertia], dtype=np.float64)
+        """A copy of :attr:`numbers`."""
+        return self.numbers.copy()
