@@ -16,6 +16,7 @@ from armblocks.blocks import (
     CompareToConstant,
     Constant,
     Derivative,
+    Expression,
     Gain,
     Integrator,
     Mux,
@@ -31,6 +32,7 @@ from armblocks.blocks import (
     VariableTransportDelay,
     ZeroOrderHold,
 )
+from armblocks.compiler.native_integrator import FIRST_ROOM
 from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
@@ -124,6 +126,34 @@ def test_a_sine_comes_out_late(run: Run) -> None:
     close(result["late/y"], expected, 2e-8)
 
 
+BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "sqrt(u)": np.sqrt,
+    "sqrt(u + 1e-12)": lambda t: np.sqrt(t + 1e-12),
+    "sqrt(abs(u - 0.51))": lambda t: np.sqrt(np.abs(t - 0.51)),
+    "sqrt(max(1.3 - u, 0))": lambda t: np.sqrt(np.maximum(1.3 - t, 0.0)),
+    "sin(40*u)": lambda t: np.sin(40.0 * t),
+}
+"""Signals that no state follows, with slopes that are infinite, nearly so, or change within a step."""
+
+
+@pytest.mark.parametrize("formula", BENT)
+@pytest.mark.parametrize(
+    "settings", [{}, {"rtol": 1e-9, "atol": 1e-12}, {"solver": "rk4", "step": 0.1}], ids=str
+)
+def test_the_past_of_a_signal_is_exact_however_it_bends(
+    formula: str, settings: dict[str, object], tmp_path: Path
+) -> None:
+    builder = DiagramBuilder("d")
+    bent = builder.add("bent", Expression(formula=formula), builder.add("t", Clock()))
+    builder.add("late", TransportDelay(delay=1.0), bent)
+    result = native(sample_time=0.0371, **settings)(builder.build(), 3.0)
+    expected = np.where(result.time < 1.0, 0.0, BENT[formula](np.maximum(result.time - 1.0, 0.0)))
+    close(result["late/y"], expected, 1e-8 if "rtol" in settings else 3e-6)
+    assert result.final_state is not None
+    result.final_state.save(tmp_path / "state")
+    assert RunState.load(tmp_path / "state").past.tolist() == result.final_state.past.tolist()
+
+
 def test_the_derivative_of_what_is_late_is_the_late_derivative(run: Run) -> None:
     builder = DiagramBuilder("d")
     late = builder.add("late", TransportDelay(delay=0.5), builder.add("sine", SineWave(frequency=2.0)))
@@ -211,7 +241,7 @@ def test_a_pipe_in_which_the_flow_slows_down(run: Run) -> None:
 def test_a_long_run_forgets_what_is_out_of_reach() -> None:
     result = native(solver="rk4", step=0.01)(decay(0.5), 200.0)
     assert result.final_state is not None
-    assert result.final_state.past.size < 256 * 4  # of 20 000 steps, the last half second is kept
+    assert result.final_state.past.size < FIRST_ROOM * 4  # numbers of a row; 20 000 steps make 40 000 rows
     # it fades with the real part of the root of s + exp(-s / 2) = 0
     s = complex(-1.0, 1.0)
     for _ in range(50):

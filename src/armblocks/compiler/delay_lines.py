@@ -3,20 +3,28 @@
 The past is a table at the end of the array of doubles: a row is a time, whether the row stands in the middle
 of a step, and the value and the exact slope of every signal that is delayed. Each step leaves two rows, its
 middle and its end, so that between the ends of a step the quintic through three values and slopes (Hermite)
-is as good as the step. Where a signal jumps, or its slope does, two rows have the same time: what was before
-and what is after. A line (one delayed scalar) looks no further than the next such place until it has come to
-it: its value is then smooth, and the loop ends a step exactly there.
+is as good as the step. A signal can bend more than the states do (a root, a fast sine, no state at all): a
+step is then divided until the quintics meet the signal within the tolerances. Where a slope is not finite,
+the parabola through the three values gives another. Where a signal jumps, or its slope does, two rows have
+the same time: what was before and what is after. A line (one delayed scalar) looks no further than the next
+such place until it has come to it: its value is then smooth, and the loop ends a step exactly there.
 """
 
 from __future__ import annotations
 
-from armblocks.compiler.integrator_workspace import Count, LoopSizes, Workspace
+import sys
+
+from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module, number_text
 
 SAME_ABOVE = 1.0 + 2.0**-50
-ROWS_OF_A_STEP = 6
-"""Rows that one step and the instant at its end add at most."""
+MOST_PIECES = 256
+"""Of one step: on both sides of a root's steepest point they shrink and grow by 48 powers of two."""
+ROWS_OF_A_STEP = 2 * MOST_PIECES + 6
+"""Rows that one step, the instant at its end and the row that a signal is compared in add at most."""
+NO_SLOPE = sys.float_info.max
+"""Stands in the table for a slope that is not finite."""
 
 
 def emit_delay_lines(module: Module, workspace: Workspace, sizes: LoopSizes) -> None:
@@ -24,13 +32,15 @@ def emit_delay_lines(module: Module, workspace: Workspace, sizes: LoopSizes) -> 
 
     ``void look_back(ptr t, ptr x, ptr reals, ptr counts, ptr p)`` writes the delayed values at ``t`` into
     ``z``. ``void keep(ptr t, ptr x, ptr reals, ptr counts, ptr p, double middle)`` adds a row; ``void
-    keep_change`` of the same arguments adds one only if it differs from the last. ``void arrive(double t, ptr
-    reals, ptr counts)`` moves each line past the places that it has come to, and finds the next one. ``double
+    keep_change`` of the same arguments adds one only if it differs from the last. ``i1 strays(ptr t, ptr x,
+    ptr reals, ptr counts, ptr p, double s, double factor)``, whether the quintic of the last three rows at
+    ``s`` (-1 to 1) is further from a signal at ``t`` than ``factor`` times the tolerances. ``void
+    arrive(double t, ptr reals, ptr counts)`` moves each line past the places that it has come to, and finds the next one. ``double
     next_arrival(ptr reals, ptr counts)`` is when a line comes to one. ``i1 make_room(double t, ptr reals, ptr
     counts)`` forgets what no line can reach any more, and tells whether there is room for another step.
     """
     writer = _DelayLines(module, workspace, sizes)
-    for name in ("look_back", "keep", "keep_change", "arrive", "next_arrival", "make_room"):
+    for name in ("look_back", "keep", "keep_change", "strays", "arrive", "next_arrival", "make_room"):
         module.define(name, getattr(writer, name))
 
 
@@ -115,7 +125,9 @@ class _DelayLines:
         w.place(beyond)
         # A rounding error past the last row, or before anything was: straight on.
         past = w.subtract(instant, w.get(self.row(w, i)))
-        w.put(w.fma(self.slope(w, i, line), past, self.value(w, i, line)), value)
+        known = self.slope(w, i, line)
+        known = w.select(self.is_slope(w, known), known, number_text(0.0))
+        w.put(w.fma(known, past, self.value(w, i, line)), value)
         w.put(self.slope(w, i, line), slope)
         w.jump(done)
         w.place(between)
@@ -137,19 +149,33 @@ class _DelayLines:
         rest = w.subtract(number_text(1.0), square)
         # Over the differences from the middle: a constant is then itself, to the bit.
         centre = self.value(w, rows[1], line)
+        values = [w.subtract(self.value(w, row, line), centre) for row in rows]
+        bases = (
+            self.end_basis(w, minus, -1.0),
+            self.middle_basis(w, s, square, rest),
+            self.end_basis(w, s, 1.0),
+        )
         total, rate = number_text(0.0), number_text(0.0)
-        for row, parts in (
-            (rows[0], self.end_basis(w, minus, -1.0)),
-            (rows[1], self.middle_basis(w, s, square, rest)),
-            (rows[2], self.end_basis(w, s, 1.0)),
-        ):
+        for place, (row, u, parts) in enumerate(zip(rows, values, bases)):
             of_value, of_slope, rate_of_value, rate_of_slope = parts
-            u = w.subtract(self.value(w, row, line), centre)
-            du = w.multiply(H, self.slope(w, row, line))
+            known = self.slope(w, row, line)
+            of_parabola = self.parabola_slope(w, values[0], values[2], place)
+            du = w.select(self.is_slope(w, known), w.multiply(H, known), of_parabola)
             total = w.fma(of_value, u, w.fma(of_slope, du, total))
             rate = w.fma(rate_of_value, u, w.fma(rate_of_slope, du, rate))
         w.put(w.add(centre, total), value)
         w.put(w.divide(rate, H), slope)
+
+    @staticmethod
+    def is_slope(w: Routine, slope: str) -> str:
+        """Whether an entry of the table is a slope, and not ``NO_SLOPE``."""
+        return w.compare("olt", w.absolute(slope), number_text(NO_SLOPE))
+
+    @staticmethod
+    def parabola_slope(w: Routine, before: str, after: str, place: int) -> str:
+        """Slope at -1, 0 or 1 (``place`` 0, 1, 2) of the parabola with values at -1 and 1, and 0 at 0."""
+        of_before, of_after = ((-1.5, -0.5), (-0.5, 0.5), (0.5, 1.5))[place]
+        return w.fma(number_text(of_before), before, w.multiply(number_text(of_after), after))
 
     @staticmethod
     def middle_basis(w: Routine, s: str, square: str, rest: str) -> tuple[str, str, str, str]:
@@ -185,6 +211,13 @@ class _DelayLines:
         w.put(middle, self.row(w, rows, 1))
         target = self.row(w, rows, 2)
         w.do(f"call void @delay_inputs(ptr %t, ptr %x, ptr {z}, ptr {unknowns}, ptr %p, ptr {target})")
+
+        def hold(line: str) -> None:
+            place = self.row(w, rows, w.word_op("add", line, str(2 + self.count)))
+            slope = w.get(place)
+            w.put(w.select(self.is_slope(w, slope), slope, number_text(NO_SLOPE)), place)
+
+        w.for_each(self.count, hold)
         return rows
 
     def keep(self) -> str:
@@ -219,6 +252,28 @@ class _DelayLines:
         w.do("ret void")
         pointers = "ptr %t, ptr %x, ptr %reals, ptr %counts, ptr %p"
         return w.text(f"define internal void @keep_change({pointers}, double %middle)")
+
+    def strays(self) -> str:
+        w = Routine(self.module)
+        rows = self.fill(w, number_text(0.0))
+        start, centre, end = (w.word_op("sub", rows, str(back)) for back in (3, 2, 1))
+        H = w.multiply(number_text(0.5), w.subtract(w.get(self.row(w, end)), w.get(self.row(w, start))))
+        rtol, atol = (w.get(w.at("%reals", place)) for place in (Real.RTOL, Real.ATOL))
+        value, slope = w.variable("double", number_text(0.0)), w.variable("double", number_text(0.0))
+        found = w.variable("i1", "false")
+
+        def compare(line: str) -> None:
+            self.quintic(w, "%s", H, line, (start, centre, end), value, slope)
+            exact = self.value(w, rows, line)
+            off = w.absolute(w.subtract(w.get(value), exact))
+            tolerance = w.multiply("%factor", w.fma(w.absolute(exact), rtol, atol))
+            beyond = w.compare("ogt", off, tolerance)
+            w.put(w.either(w.get(found, "i1"), beyond), found, "i1")
+
+        w.for_each(self.count, compare)
+        w.do(f"ret i1 {w.get(found, 'i1')}")
+        arguments = "ptr %t, ptr %x, ptr %reals, ptr %counts, ptr %p, double %s, double %factor"
+        return w.text(f"define internal i1 @strays({arguments})")
 
     # Places where a signal jumps.
 
@@ -331,7 +386,8 @@ class _DelayLines:
                 w.put(w.let(f"select i1 {known}, i64 {shifted}, i64 {kept}"), place, "i64")
         # Twice the room where half of it is not free: else it would soon be full again.
         enough = w.word_test("sle", w.word_op("mul", left, "2"), capacity)
-        w.do(f"ret i1 {enough}")
+        fits = w.word_test("sle", w.word_op("add", left, str(ROWS_OF_A_STEP)), capacity)
+        w.do(f"ret i1 {w.both(enough, fits)}")
         w.place(roomy)
         w.do("ret i1 true")
         return w.text("define internal i1 @make_room(double %now, ptr %reals, ptr %counts)")

@@ -22,6 +22,7 @@ zero right after it fired, or at the start, counts with the sign it takes first.
 
 from __future__ import annotations
 
+from armblocks.compiler.delay_lines import MOST_PIECES
 from armblocks.compiler.happenings import SAME_ABOVE, SAME_BELOW, Happenings
 from armblocks.compiler.hybrid_functions import emit_functions
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
@@ -461,20 +462,77 @@ class HybridLoop(Loop):
         w.place(on)
 
     def emit_past(self, time: str, new_time: str, h: str) -> None:
-        """The middle and the end of an accepted step into the table of the past; of both halves of the long
-        steps of a method of high order."""
+        """Write an accepted step into the table of the past, by pieces with a middle and an end.
+
+        A piece is the whole step, a half of the long steps of a method of high order, or shorter where the
+        quintic of a piece strays from a signal.
+
+        From half of the most pieces on, the tolerance grows, so that the rest fits into the other half.
+        """
         w, places = self.w, self.places
         self.emit_extra_stages_once(time, h)
-        halves = self.tableau.order >= HIGH_ORDER
-        for part in (0.25, 0.5, 0.75, 1.0) if halves else (0.5, 1.0):
-            mark, instant, x = 0.0, new_time, places.y
-            if part < 1.0:
-                mark = 0.0 if halves and part == 0.5 else 1.0
-                instant, x = w.fma(number_text(part), w.subtract(new_time, time), time), places.new_x
-                self.step.interpolate(instant, time, h, self.at(x))
+        turn, strayed, shorter, kept, done = (
+            w.fresh(stem) for stem in ("piece", "strayed", "shorter", "kept", "done")
+        )
+        rows = w.at("%counts", Count.PAST, "i64")
+        before = w.get(rows, "i64")
+        most, many = (
+            w.word_op("add", before, str(2 * count)) for count in (MOST_PIECES - 1, MOST_PIECES // 2)
+        )
+        factor = w.variable("double", number_text(1.0))
+        w.put(number_text(1.0), factor)
+        begin, end = w.variable("double", time), w.variable("double", new_time)
+        w.put(time, begin)
+        half = w.fma(number_text(0.5), w.subtract(new_time, time), time)
+        w.put(half if self.tableau.order >= HIGH_ORDER else new_time, end)
+        w.place(turn)
+        a, b = w.get(begin), w.get(end)
+        length, known = w.subtract(b, a), w.get(rows, "i64")
+        # Past the most pieces, all that is left is one.
+        last = w.word_test("sge", known, most)
+        b = w.select(last, new_time, b)
+
+        def point(part: float) -> None:
+            """The state at a part of the piece into ``new_x``, and all that follows from it."""
+            instant = b if part == 1.0 else w.fma(number_text(part), w.subtract(b, a), a)
+            self.step.interpolate(instant, time, h, self.at(places.new_x))
+            if part == 1.0:
+                at_end = w.compare("oge", b, new_time)
+
+                def exact(i: str) -> None:
+                    y, inside = self.step.read(places.y, i), self.step.read(places.new_x, i)
+                    w.put(w.select(at_end, y, inside), self.step.element(places.new_x, i))
+
+                w.for_each(self.n, exact)
             w.put(w.minimum(instant, w.get(self.clamp)), self.instant)
-            self.emit_solve(self.instant, self.at(x))
-            self.keep(self.instant, self.at(x), "keep", mark)
+            self.emit_solve(self.instant, self.at(places.new_x))
+
+        for part, mark in ((0.5, 1.0), (1.0, 0.0)):
+            point(part)
+            self.keep(self.instant, self.at(places.new_x), "keep", mark)
+        w.branch(last, done, strayed)
+        w.place(strayed)
+        arguments = f"ptr {self.instant}, ptr {self.at(places.new_x)}, ptr %reals, ptr %counts, ptr %p"
+        found = "false"
+        for part in (0.25, 0.75):
+            point(part)
+            place = number_text(2.0 * part - 1.0)
+            numbers = f"double {place}, double {w.get(factor)}"
+            found = w.either(found, w.let(f"call i1 @strays({arguments}, {numbers})"))
+        divisible = w.compare("ogt", length, w.multiply(b, number_text(2.0**-48)))
+        w.branch(w.both(found, divisible), shorter, kept)
+        w.place(shorter)
+        w.put(known, rows, "i64")
+        w.put(w.fma(number_text(0.5), length, a), end)
+        w.jump(turn)
+        w.place(kept)
+        growth = w.select(w.word_test("sge", known, many), number_text(1.1), number_text(1.0))
+        w.put(w.multiply(w.get(factor), growth), factor)
+        w.put(b, begin)
+        reached = w.fma(number_text(2.0), length, b)
+        w.put(w.minimum(reached, new_time), end)
+        w.branch(w.compare("oge", b, new_time), done, turn)
+        w.place(done)
 
     def watch_inside(self, instant: str, time: str, h: str) -> str:
         """How many guards have fired at an instant within the step."""

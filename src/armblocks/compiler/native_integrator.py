@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.delay_lines import ROWS_OF_A_STEP
 from armblocks.compiler.elimination import JacobianPattern
 from armblocks.compiler.hybrid_loop import HybridLoop
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
@@ -31,7 +32,7 @@ _ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * POINTERS, ctype
 SAME_INSTANT = 1.0 + 2.0**-50
 """Two times within this factor of one another are one instant, here as in the native loop."""
 
-FIRST_ROOM = 256
+FIRST_ROOM = 2 * ROWS_OF_A_STEP
 """Rows of the past that a run begins with room for."""
 NO_NUMBERS: Vector = np.empty(0)
 
