@@ -35,10 +35,10 @@ def emit_delay_lines(module: Module, workspace: Workspace, sizes: LoopSizes) -> 
     keep_change`` of the same arguments adds one only if it differs from the last. ``i1 strays(ptr t, ptr x,
     ptr reals, ptr counts, ptr p, double s, double factor)``, whether the quintic of the last three rows at
     ``s`` (-1 to 1) is further from a signal at ``t`` than ``factor`` times the tolerances. ``void
-    arrive(double t, ptr reals, ptr counts)`` moves each line past the places that it has come to, and finds the
-    next one. ``double next_arrival(ptr reals, ptr counts)`` is when a line comes to one. ``i1 make_room(double t,
-    ptr reals, ptr counts)`` forgets what no line can reach any more, and tells whether there is room for
-    another step.
+    arrive(double t, ptr reals, ptr counts)`` moves each line past the places that it has come to, and finds
+    the next one. ``double next_arrival(ptr reals, ptr counts)`` is when a line comes to one. ``i1
+    make_room(double t, ptr reals, ptr counts)`` forgets what no line can reach any more, and tells whether
+    there is room for another step.
     """
     writer = _DelayLines(module, workspace, sizes)
     for name in ("look_back", "keep", "keep_change", "strays", "arrive", "next_arrival", "make_room"):
