@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from armblocks.compiler.elimination import JacobianPattern
-from armblocks.compiler.ir_text import Module
-from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations, emit_rate_bound
+from armblocks.compiler.linear_equations import LinearEquations, LinearSpace
 from armblocks.compiler.native import load_code
+from armblocks.routines.llvm import definitions
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Integer, Real, Reals
 
 GAMMA, H = 0.25, 0.1
 
@@ -24,20 +26,28 @@ class Solver:
             states=states, size=len(J), rows=tuple(rows.tolist()), columns=tuple(columns.tolist())
         )
         self.space = LinearSpace(pattern)
-        module = Module()
-        emit_linear_equations(module, self.space, GAMMA)
-        emit_rate_bound(module, self.space)
-        rate = "define double @rate(ptr %s) {\n  %r = call double @rate_bound(ptr %s)\n  ret double %r\n}"
-        module.add("rate", rate)
-        plan = self.space.plan is not None
-        judged = "  %g = call i1 @solved_well(ptr %s, double %h)\n  %r = zext i1 %g to i64\n  ret i64 %r\n}"
-        for name, function in (("sparse", "factor" if plan else "factor_whole"), ("whole", "factor_whole")):
-            module.add(
-                name,
-                f"define i64 @{name}(ptr %s, double %h) {{\n  call void @{function}(ptr %s, double %h)\n"
-                "  call void @solve_linear(ptr %s)\n" + (judged if plan else "  ret i64 1\n}"),
-            )
-        self.code = load_code(("linear equations test", repr(pattern)), lambda: module.text)
+        program = Program()
+        equations = LinearEquations(program, self.space, GAMMA)
+
+        def sparse(r: Routine, scratch: Reals, h: Real) -> Integer:
+            r.call(equations.factor, scratch, h)
+            r.call(equations.solve, scratch)
+            judge = equations.solved_well
+            return r.call(judge, scratch, h).count() if judge else r.integer(1).value
+
+        def whole(r: Routine, scratch: Reals, h: Real) -> Integer:
+            r.call(equations.factor_whole, scratch, h)
+            r.call(equations.solve, scratch)
+            judge = equations.solved_well
+            return r.call(judge, scratch, h).count() if judge else r.integer(1).value
+
+        def rate(r: Routine, scratch: Reals) -> Real:
+            return r.call(equations.rate_bound, scratch)
+
+        for function in (sparse, whole, rate):
+            program.define(function, public=True)
+        text = "\n\n".join(definitions(program).values())
+        self.code = load_code(("linear equations test", text), lambda: text)
         kind = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_double)
         self.functions = {name: kind(self.code.address(name)) for name in ("sparse", "whole")}
         self.rate = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p)(self.code.address("rate"))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from armblocks.compiler.delay_lines import emit_delay_lines
-from armblocks.compiler.implicit_equations import emit_solve
+from armblocks.compiler.implicit_equations import define_solve
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module, number_text
+from armblocks.compiler.program_text import add_program
+from armblocks.routines.routine import Program
 
 MOST_AT_ONCE = 1000
 """Events that may follow one another as good as at one instant."""
@@ -30,7 +32,9 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
     are ``half`` apart, and ``note_slopes`` keeps how fast they change at the last of them.
     """
     if sizes.algebraic:
-        emit_solve(module, workspace, sizes.algebraic)
+        program = Program()
+        define_solve(program, workspace, sizes.algebraic)
+        add_program(module, program)
     if sizes.delays:
         emit_delay_lines(module, workspace, sizes)
     if sizes.directions:

@@ -162,9 +162,10 @@ class Workspace:
     the stretch that is looked at (``guards_before``, ``guards_middle``), how fast they changed at the end of
     the stretch before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet),
     ``fired``, when each fired last (``last``), how long after the time before (``gap``) and how often in a
-    row this became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian``
-    and ``before``. For delayed signals: how long each is delayed (``taus``), between which bounds
-    (``bounds``: all shortest, all longest), the ``longest`` of all; the ``past`` comes behind everything.
+    row this became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian``,
+    ``before``, and ``pivots`` and ``swaps`` (integers) of its elimination. For delayed signals: how long each
+    is delayed (``taus``), between which bounds (``bounds``: all shortest, all longest), the ``longest`` of
+    all; the ``past`` comes behind everything.
     """
 
     def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
@@ -191,7 +192,9 @@ class Workspace:
         self.residual = self.ticking + len(sizes.clocks)
         self.jacobian = self.residual + nw
         self.before = self.jacobian + nw * nw
-        self.size = self.before + nw
+        self.pivots = self.before + nw
+        self.swaps = self.pivots + nw
+        self.size = self.swaps + nw
         lines = len(sizes.delays)
         self.taus = self.size
         self.bounds = self.taus + lines

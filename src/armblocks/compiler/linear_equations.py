@@ -1,4 +1,4 @@
-"""The linear equations of a Rosenbrock step, as LLVM IR: ``(E / gamma - h J) k = right``.
+"""The linear equations of a Rosenbrock step, as routines: ``(E / gamma - h J) k = right``.
 
 ``E`` is one for the rows of the flow and zero for those of implicit equations. A large sparse matrix is
 eliminated in the order that :mod:`armblocks.compiler.elimination` planned, with its pivots on the diagonal
@@ -10,11 +10,13 @@ with row pivoting instead.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Generator, Sequence
 
 from armblocks.compiler.elimination import Elimination, JacobianPattern, plan_elimination
-from armblocks.compiler.ir_routine import Routine
-from armblocks.compiler.ir_text import Module, number_text
+from armblocks.compiler.pivoted_elimination import PivotedElimination
+from armblocks.routines.arithmetic import fma, maximum, select, square_root
+from armblocks.routines.routine import Function, Program, Routine
+from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
 
 SMALL = 8
 """Up to this size the whole matrix is eliminated with pivoting: nothing else is faster."""
@@ -28,7 +30,7 @@ a Jacobian this wrong is still far more accurate than the tolerances that it is 
 
 
 class LinearSpace:
-    """Where the numbers of the linear equations lie in ``%scratch``, memory that no step leaves to the next.
+    """Where the numbers of the linear equations lie in ``scratch``, memory that no step leaves to the next.
 
     ``J`` and ``T`` are what the system's ``flow_jacobian`` writes; ``right`` and ``solution`` are numbered as
     the equations and unknowns are. ``swaps`` and ``whole``, whether the whole matrix was eliminated, are
@@ -56,334 +58,230 @@ class LinearSpace:
         self.length = self.matrix + self.size**2
 
 
-def emit_linear_equations(module: Module, space: LinearSpace, gamma: float) -> None:
-    """Add ``void factor(ptr scratch, double h)``, ``void factor_whole(ptr scratch, double h)``, ``void
-    solve_linear(ptr scratch)`` and, for sparse ones, ``i1 solved_well(ptr scratch, double h)``."""
-    writer = _Writer(module, space, 1.0 / gamma)
-    module.define("factor_whole", writer.factor_whole)
-    if space.plan is not None:
-        sparse = _Sparse(module, space, space.plan, 1.0 / gamma)
-        module.define("factor", sparse.factor)
-        module.define("solved_well", sparse.solved_well)
-        module.define("solve_sparse", sparse.solve)
-    module.define("solve_linear", writer.solve)
+class LinearEquations:
+    """The functions of a program that factor the matrix of a step and solve for its right sides.
 
-
-def emit_rate_bound(module: Module, space: LinearSpace) -> None:
-    """Add ``double rate_bound(ptr scratch)``: no less than the magnitude of any eigenvalue of ``J``.
-
-    For any positive v, that is ``max_i (|J| v)_i / v_i`` (Collatz, Wielandt; Horn, Johnson, Matrix Analysis,
-    8.1.31 and 8.1.18). A few rounds of ``v = sqrt(v |J| v)`` make v fit the scales of the states.
+    ``gamma`` is that of the method. :attr:`factor` is the cheapest elimination, :attr:`factor_whole` the one
+    with pivoting.
     """
 
-    def write() -> str:
-        w, n = Routine(module), str(space.n)
-        rows = constant_integers(module, "jacobian.rows", space.pattern.rows)
-        columns = constant_integers(module, "jacobian.columns", space.pattern.columns)
-        bound, zero = w.variable("double", number_text(0.0)), number_text(0.0)
+    def __init__(self, program: Program, space: LinearSpace, gamma: float) -> None:
+        self.program = program
+        self.space = space
+        whole = _Whole(space, 1.0 / gamma)
+        self.factor_whole = program.define(whole.factor_whole, inlined=False)
+        self.factor: Function[[Reals, Real], None] = self.factor_whole
+        self.solved_well: Function[[Reals, Real], Boolean] | None = None
+        """Whether the solution with ``h`` is good enough: no row leaves more over than a part of its own
+        terms' sizes. None where it is anyway."""
+        if space.plan is not None:
+            sparse = _Sparse(space, space.plan, 1.0 / gamma)
+            self.factor = program.define(sparse.factor, inlined=False)
+            self.solved_well = program.define(sparse.solved_well, inlined=False)
+            whole.solve_sparse = program.define(sparse.solve_sparse, inlined=False)
+        self.solve = program.define(whole.solve_linear, inlined=False)
 
-        def at(place: int, index: str) -> str:
-            return w.at("%scratch", w.word_op("add", index, str(place)))
+    @property
+    def rate_bound(self) -> Function[[Reals], Real]:
+        """No less than the magnitude of any eigenvalue of ``J``.
 
-        def entry(k: str) -> None:
-            row, column = (w.get(w.at(table, k, "i64"), "i64") for table in (rows, columns))
-            weight = w.multiply(w.absolute(w.get(at(space.J, k))), w.get(at(space.right, column)))
-            w.put(w.add(w.get(at(space.work, row)), weight), at(space.work, row))
+        For any positive v, that is ``max_i (|J| v)_i / v_i`` (Collatz, Wielandt; Horn, Johnson, Matrix
+        Analysis, 8.1.31 and 8.1.18). A few rounds of ``v = sqrt(v |J| v)`` make v fit the scales of the
+        states.
+        """
+        space = self.space
 
-        def compare(i: str) -> None:
-            v, u = w.get(at(space.right, i)), w.get(at(space.work, i))
-            w.put(w.maximum(w.get(bound), w.divide(u, v)), bound)
-            middle = w.square_root(w.multiply(v, u))
-            w.put(w.select(w.compare("ogt", middle, zero), middle, v), at(space.right, i))
+        def rate_bound(r: Routine, scratch: Reals) -> Real:
+            n, entries = space.n, len(space.pattern.rows)
+            rows = r.integers("jacobian.rows", space.pattern.rows)
+            columns = r.integers("jacobian.columns", space.pattern.columns)
+            J, v, product = (scratch.after(place) for place in (space.J, space.right, space.work))
+            bound = r.real(0.0)
+            for i in r.range(0, n):
+                v[i] = 1.0
+            for _ in r.range(0, SCALING_ROUNDS):
+                bound.value = 0.0
+                for i in r.range(0, n):
+                    product[i] = 0.0
+                for k in r.range(0, entries):
+                    row = rows[k]
+                    weight = abs(J[k]) * v[columns[k]]
+                    product[row] = product[row] + weight
+                for i in r.range(0, n):
+                    one, other = v[i], product[i]
+                    bound.value = maximum(bound.value, other / one)
+                    middle = square_root(one * other)
+                    v[i] = select(middle > 0.0, middle, one)
+            return bound.value
 
-        def turn(_: str) -> None:
-            w.put(zero, bound)
-            w.count("0", n, lambda i: w.put(zero, at(space.work, i)))
-            w.count("0", str(len(space.pattern.rows)), entry)
-            w.count("0", n, compare)
-
-        w.count("0", n, lambda i: w.put(number_text(1.0), at(space.right, i)))
-        w.count("0", str(SCALING_ROUNDS), turn)
-        w.do(f"ret double {w.get(bound)}")
-        return w.text("define internal double @rate_bound(ptr %scratch) noinline")
-
-    module.define("rate_bound", write)
+        return self.program.define(rate_bound, inlined=False)
 
 
-def constant_integers(module: Module, symbol: str, values: Sequence[int]) -> str:
-    """A constant array of the module; gives its address."""
-    numbers = ", ".join(f"i64 {value}" for value in values) or "i64 0"
-    module.add(symbol, f"@{symbol} = internal constant [{max(1, len(values))} x i64] [{numbers}]")
-    return f"@{symbol}"
-
-
-class _Writer:
+class _Whole:
     """Elimination of the whole matrix, with row pivoting."""
 
-    def __init__(self, module: Module, space: LinearSpace, diagonal: float) -> None:
-        self.module = module
+    def __init__(self, space: LinearSpace, diagonal: float) -> None:
         self.space = space
         self.n, self.size = space.n, space.size
         self.diagonal = diagonal
+        self.solve_sparse: Function[[Reals], None] | None = None
 
-    def at(self, w: Routine, place: int, index: str) -> str:
-        return w.at("%scratch", w.word_op("add", index, str(place)))
+    def factor_whole(self, r: Routine, scratch: Reals, h: Real) -> None:
+        """``E / gamma - h J``, then its factors in place."""
+        space, size = self.space, self.size
+        pattern = space.pattern
+        matrix, J = scratch.after(space.matrix), scratch.after(space.J)
+        places = [row * size + column for row, column in zip(pattern.rows, pattern.columns)]
+        targets = r.integers("jacobian.places", places)
+        scratch.integers[space.whole] = 1
+        for i in r.range(0, size**2):
+            matrix[i] = 0.0
+        for i in r.range(0, self.n):
+            matrix[i * size + i] = self.diagonal
+        minus_h = -h
+        for k in r.range(0, len(places)):
+            target = targets[k]
+            matrix[target] = fma(minus_h, J[k], matrix[target])
+        self.elimination(scratch).factor(r)
 
-    def entry(self, w: Routine, row: str, column: str) -> str:
-        place = w.word_op("add", w.word_op("mul", row, str(self.size)), column)
-        return self.at(w, self.space.matrix, place)
+    def solve_linear(self, r: Routine, scratch: Reals) -> None:
+        """The solution of the right side in ``scratch``, by the factors that were made last."""
+        space = self.space
+        if self.solve_sparse is not None:
+            with r.unless(scratch.integers[space.whole] != 0):
+                r.call(self.solve_sparse, scratch)
+                r.return_()
+        right, y = scratch.after(space.right), scratch.after(space.solution)
+        for i in r.range(0, self.size):
+            y[i] = right[i]
+        self.elimination(scratch).solve(r, y)
 
-    def factor_whole(self) -> str:
-        w, size = Routine(self.module), str(self.size)
-        pattern, space = self.space.pattern, self.space
-        entries = range(len(pattern.rows))
-        targets = constant_integers(
-            self.module,
-            "jacobian.places",
-            [pattern.rows[k] * self.size + pattern.columns[k] for k in entries],
+    def elimination(self, scratch: Reals) -> PivotedElimination:
+        space = self.space
+        return PivotedElimination(
+            size=space.size,
+            matrix=scratch.after(space.matrix),
+            pivots=scratch.after(space.pivots),
+            swaps=scratch.integers.after(space.swaps),
         )
-        w.put("1", w.at("%scratch", space.whole, "i64"), "i64")
-        zero = number_text(0.0)
-        w.count("0", str(self.size**2), lambda i: w.put(zero, self.at(w, space.matrix, i)))
-        diagonal = number_text(self.diagonal)
-        w.count("0", str(self.n), lambda i: w.put(diagonal, self.entry(w, i, i)))
-        minus_h = w.negate("%h")
-
-        def place(k: str) -> None:
-            target = self.at(w, space.matrix, w.get(w.at(targets, k, "i64"), "i64"))
-            w.put(w.fma(minus_h, w.get(self.at(w, space.J, k)), w.get(target)), target)
-
-        w.count("0", str(len(pattern.rows)), place)
-        w.count("0", size, lambda k: self.eliminate(w, k))
-        w.do("ret void")
-        return w.text("define internal void @factor_whole(ptr %scratch, double %h) noinline")
-
-    def eliminate(self, w: Routine, k: str) -> None:
-        """Column ``k``: the largest entry to the diagonal, factors below it in place of the zeros."""
-        size, space = str(self.size), self.space
-        below = w.word_op("add", k, "1")
-        best = w.variable("i64", k)
-
-        def look(i: str) -> None:
-            known = w.get(best, "i64")
-            a, b = (w.absolute(w.get(self.entry(w, row, k))) for row in (i, known))
-            w.put(w.let(f"select i1 {w.compare('ogt', a, b)}, i64 {i}, i64 {known}"), best, "i64")
-
-        w.count(below, size, look)
-        row = w.get(best, "i64")
-        w.put(row, w.at("%scratch", w.word_op("add", k, str(space.swaps)), "i64"), "i64")
-
-        def swap(j: str) -> None:
-            one, other = self.entry(w, k, j), self.entry(w, row, j)
-            a, b = w.get(one), w.get(other)
-            w.put(b, one)
-            w.put(a, other)
-
-        w.count("0", size, swap)
-        inverse = w.divide(number_text(1.0), w.get(self.entry(w, k, k)))
-        w.put(inverse, self.at(w, space.pivots, k))
-
-        def rows(i: str) -> None:
-            place = self.entry(w, i, k)
-            factor = w.multiply(w.get(place), inverse)
-            w.put(factor, place)
-            minus = w.negate(factor)
-            apply, on = w.fresh("apply"), w.fresh("on")
-            w.branch(w.compare("une", factor, number_text(0.0)), apply, on)
-            w.place(apply)
-
-            def subtract(j: str) -> None:
-                target = self.entry(w, i, j)
-                w.put(w.fma(minus, w.get(self.entry(w, k, j)), w.get(target)), target)
-
-            w.count(below, size, subtract)
-            w.place(on)
-
-        w.count(below, size, rows)
-
-    def solve(self) -> str:
-        """Rows of the factors swap along with those of the matrix, so the right side does first."""
-        w, space, size = Routine(self.module), self.space, str(self.size)
-        if space.plan is not None:
-            whole, sparse = w.fresh("whole"), w.fresh("sparse")
-            flag = w.get(w.at("%scratch", space.whole, "i64"), "i64")
-            w.branch(w.word_test("ne", flag, "0"), whole, sparse)
-            w.place(sparse)
-            w.do("call void @solve_sparse(ptr %scratch)")
-            w.do("ret void")
-            w.place(whole)
-        y: Callable[[str], str] = lambda i: self.at(w, space.solution, i)  # noqa: E731
-        w.count("0", size, lambda i: w.put(w.get(self.at(w, space.right, i)), y(i)))
-
-        def swap(k: str) -> None:
-            row = w.get(w.at("%scratch", w.word_op("add", k, str(space.swaps)), "i64"), "i64")
-            a, b = w.get(y(k)), w.get(y(row))
-            w.put(b, y(k))
-            w.put(a, y(row))
-
-        def forward(i: str) -> None:
-            self.subtract_products(w, i, "0", i)
-
-        def backward(turn: str) -> None:
-            i = w.word_op("sub", str(self.size - 1), turn)
-            self.subtract_products(w, i, w.word_op("add", i, "1"), size)
-            w.put(w.multiply(w.get(y(i)), w.get(self.at(w, space.pivots, i))), y(i))
-
-        w.count("0", size, swap)
-        w.count("0", size, forward)
-        w.count("0", size, backward)
-        w.do("ret void")
-        return w.text("define internal void @solve_linear(ptr %scratch) noinline")
-
-    def subtract_products(self, w: Routine, row: str, start: str, stop: str) -> None:
-        """``solution[row] -= sum_j matrix[row][j] solution[j]`` for ``j = start … stop - 1``."""
-        target = self.at(w, self.space.solution, row)
-        total = w.variable("double", w.get(target))
-
-        def term(j: str) -> None:
-            known = w.negate(w.get(self.at(w, self.space.solution, j)))
-            w.put(w.fma(w.get(self.entry(w, row, j)), known, w.get(total)), total)
-
-        w.count(start, stop, term)
-        w.put(w.get(total), target)
 
 
 class _Sparse:
-    """Elimination along a plan: its places are constants of the module, its loops run over them."""
+    """Elimination along a plan: its places are constants of the program, its loops run over them."""
 
-    def __init__(self, module: Module, space: LinearSpace, plan: Elimination, diagonal: float) -> None:
-        self.module = module
+    def __init__(self, space: LinearSpace, plan: Elimination, diagonal: float) -> None:
         self.space = space
-        self.size = str(space.size)
-        flat = [pair for row in plan.entries for pair in row]
-        self.entry = constant_integers(module, "entry.of", [entry for entry, _ in flat])
-        self.entry_place = constant_integers(module, "entry.place", [place for _, place in flat])
-        self.entry_ends = constant_integers(module, "entry.ends", _ends(plan.entries))
-        self.lower = constant_integers(module, "lower.place", [k for row in plan.lower for k in row])
-        self.lower_ends = constant_integers(module, "lower.ends", _ends(plan.lower))
-        # Numbers of U lie after those of L.
-        first = sum(map(len, plan.lower))
-        self.upper = constant_integers(
-            module, "upper.place", [0] * first + [k for row in plan.upper for k in row]
+        self.plan = plan
+        self.diagonal = [diagonal if column < space.n else 0.0 for column in plan.columns]
+
+    def entries(self, r: Routine) -> Rows:
+        """The entries of J in each row: their numbers, and their places in the row."""
+        flat = [pair for row in self.plan.entries for pair in row]
+        numbers = r.integers("entry.of", [number for number, _ in flat])
+        places = r.integers("entry.place", [place for _, place in flat])
+        return Rows(r, places, r.integers("entry.ends", _ends(self.plan.entries)), numbers)
+
+    def lower(self, r: Routine) -> Rows:
+        """The entries of L in each row, beside the diagonal."""
+        places = r.integers("lower.place", [k for row in self.plan.lower for k in row])
+        return Rows(r, places, r.integers("lower.ends", _ends(self.plan.lower)))
+
+    def upper(self, r: Routine) -> Rows:
+        """The entries of U in each row, beside the diagonal: their numbers lie after those of L."""
+        first = sum(map(len, self.plan.lower))
+        places = r.integers("upper.place", [0] * first + [k for row in self.plan.upper for k in row])
+        return Rows(r, places, r.integers("upper.ends", [first + end for end in _ends(self.plan.upper)]))
+
+    def factor(self, r: Routine, scratch: Reals, h: Real) -> None:
+        """The factors of ``E / gamma - h J``, row by row."""
+        space = self.space
+        J, work, pivots, factors = (
+            scratch.after(place) for place in (space.J, space.work, space.pivots, space.lower)
         )
-        self.upper_ends = constant_integers(module, "upper.ends", [first + end for end in _ends(plan.upper)])
-        self.equations = constant_integers(module, "equation.of", plan.equations)
-        self.columns = constant_integers(module, "unknown.of", plan.columns)
-        numbers = (number_text(diagonal if column < space.n else 0.0) for column in plan.columns)
-        parts = ", ".join(f"double {number}" for number in numbers)
-        module.add("diagonal.of", f"@diagonal.of = internal constant [{space.size} x double] [{parts}]")
+        entries, lower, upper = self.entries(r), self.lower(r), self.upper(r)
+        diagonal = r.reals("diagonal.of", self.diagonal)
+        scratch.integers[space.whole] = 0
+        minus_h = -h
+        for i in r.range(0, space.size):
+            for part in (lower, upper):
+                for k in part.of(i):
+                    work[part.places[k]] = 0.0
+            work[i] = diagonal[i]
+            for k in entries.of(i):
+                target = entries.places[k]
+                work[target] = fma(minus_h, J[entries.numbers[k]], work[target])
+            for k in lower.of(i):
+                before = lower.places[k]
+                factor = work[before] * pivots[before]
+                factors[k] = factor
+                minus = -factor
+                for m in upper.of(before):
+                    target = upper.places[m]
+                    work[target] = fma(minus, factors[m], work[target])
+            for k in upper.of(i):
+                factors[k] = work[upper.places[k]]
+            pivots[i] = 1.0 / work[i]
 
-    def at(self, w: Routine, place: int, index: str) -> str:
-        return w.at("%scratch", w.word_op("add", index, str(place)))
+    def solve_sparse(self, r: Routine, scratch: Reals) -> None:
+        """Forward and backward substitution."""
+        space = self.space
+        y, pivots, factors = (scratch.after(place) for place in (space.work, space.pivots, space.lower))
+        right, solution = scratch.after(space.right), scratch.after(space.solution)
+        equations, unknowns = self.order(r)
+        lower, upper = self.lower(r), self.upper(r)
 
-    def integer(self, w: Routine, array: str, index: str) -> str:
-        return w.get(w.at(array, index, "i64"), "i64")
+        def subtract_all(part: Rows, i: Integer, start: Real) -> Real:
+            total = r.real(start)
+            for k in part.of(i):
+                known = -y[part.places[k]]
+                total.value = fma(factors[k], known, total.value)
+            return total.value
 
-    def along(self, w: Routine, ends: str, row: str, write: Callable[[str], None]) -> None:
-        """For every entry of a row."""
-        w.count(self.integer(w, ends, row), self.integer(w, ends, w.word_op("add", row, "1")), write)
+        for i in r.range(0, space.size):
+            y[i] = subtract_all(lower, i, right[equations[i]])
+        for turn in r.range(0, space.size):
+            i = space.size - 1 - turn
+            value = subtract_all(upper, i, y[i]) * pivots[i]
+            y[i] = value
+            solution[unknowns[i]] = value
 
-    def factor(self) -> str:
-        w, space = Routine(self.module), self.space
-        w.put("0", w.at("%scratch", space.whole, "i64"), "i64")
-        minus_h = w.negate("%h")
-        work: Callable[[str], str] = lambda place: self.at(w, space.work, place)  # noqa: E731
-        zero = number_text(0.0)
-
-        def row(i: str) -> None:
-            for places, ends in ((self.lower, self.lower_ends), (self.upper, self.upper_ends)):
-                self.along(w, ends, i, lambda k: w.put(zero, work(self.integer(w, places, k))))  # noqa: B023
-            w.put(w.get(w.at("@diagonal.of", i)), work(i))
-
-            def take(k: str) -> None:
-                target = work(self.integer(w, self.entry_place, k))
-                value = w.get(self.at(w, space.J, self.integer(w, self.entry, k)))
-                w.put(w.fma(minus_h, value, w.get(target)), target)
-
-            def eliminate(k: str) -> None:
-                before = self.integer(w, self.lower, k)
-                factor = w.multiply(w.get(work(before)), w.get(self.at(w, space.pivots, before)))
-                w.put(factor, self.at(w, space.lower, k))
-                minus = w.negate(factor)
-
-                def subtract(m: str) -> None:
-                    target = work(self.integer(w, self.upper, m))
-                    w.put(w.fma(minus, w.get(self.at(w, space.lower, m)), w.get(target)), target)
-
-                self.along(w, self.upper_ends, before, subtract)
-
-            def keep(k: str) -> None:
-                w.put(w.get(work(self.integer(w, self.upper, k))), self.at(w, space.lower, k))
-
-            self.along(w, self.entry_ends, i, take)
-            self.along(w, self.lower_ends, i, eliminate)
-            self.along(w, self.upper_ends, i, keep)
-            w.put(w.divide(number_text(1.0), w.get(work(i))), self.at(w, space.pivots, i))
-
-        w.count("0", self.size, row)
-        w.do("ret void")
-        return w.text("define internal void @factor(ptr %scratch, double %h) noinline")
-
-    def solve(self) -> str:
-        w, space = Routine(self.module), self.space
-        y: Callable[[str], str] = lambda place: self.at(w, space.work, place)  # noqa: E731
-
-        def subtract_all(i: str, ends: str, places: str, start: str) -> str:
-            total = w.variable("double", start)
-
-            def term(k: str) -> None:
-                known = w.negate(w.get(y(self.integer(w, places, k))))
-                w.put(w.fma(w.get(self.at(w, space.lower, k)), known, w.get(total)), total)
-
-            self.along(w, ends, i, term)
-            return w.get(total)
-
-        def forward(i: str) -> None:
-            right = w.get(self.at(w, space.right, self.integer(w, self.equations, i)))
-            w.put(subtract_all(i, self.lower_ends, self.lower, right), y(i))
-
-        def backward(turn: str) -> None:
-            i = w.word_op("sub", str(space.size - 1), turn)
-            total = subtract_all(i, self.upper_ends, self.upper, w.get(y(i)))
-            value = w.multiply(total, w.get(self.at(w, space.pivots, i)))
-            w.put(value, y(i))
-            w.put(value, self.at(w, space.solution, self.integer(w, self.columns, i)))
-
-        w.count("0", self.size, forward)
-        w.count("0", self.size, backward)
-        w.do("ret void")
-        return w.text("define internal void @solve_sparse(ptr %scratch) noinline")
-
-    def solved_well(self) -> str:
+    def solved_well(self, r: Routine, scratch: Reals, h: Real) -> Boolean:
         """Whether no row of the solved equations leaves more over than a part of its own terms' sizes."""
-        w, space = Routine(self.module), self.space
-        good = w.variable("i1", "true")
-        minus_h = w.negate("%h")
+        space = self.space
+        J, right, solution = (scratch.after(place) for place in (space.J, space.right, space.solution))
+        entries, diagonal = self.entries(r), r.reals("diagonal.of", self.diagonal)
+        equations, unknowns = self.order(r)
+        good = r.boolean(True)
+        minus_h = -h
+        for i in r.range(0, space.size):
+            known, own = right[equations[i]], solution[unknowns[i]]
+            product = diagonal[i] * own
+            rest, terms = r.real(known - product), r.real(abs(known) + abs(product))
+            for k in entries.of(i):
+                coefficient = minus_h * J[entries.numbers[k]]
+                part = coefficient * solution[unknowns[entries.places[k]]]
+                rest.value = rest.value - part
+                terms.value = terms.value + abs(part)
+            good.value = good.value & (abs(rest.value) <= LEFT_OVER * terms.value)
+        return good.value
 
-        def row(i: str) -> None:
-            right = w.get(self.at(w, space.right, self.integer(w, self.equations, i)))
-            own = w.get(self.at(w, space.solution, self.integer(w, self.columns, i)))
-            product = w.multiply(w.get(w.at("@diagonal.of", i)), own)
-            rest = w.variable("double", w.subtract(right, product))
-            terms = w.variable("double", w.add(w.absolute(right), w.absolute(product)))
+    def order(self, r: Routine) -> tuple[Integers, Integers]:
+        """The equation and the unknown of each row."""
+        return r.integers("equation.of", self.plan.equations), r.integers("unknown.of", self.plan.columns)
 
-            def term(k: str) -> None:
-                coefficient = w.multiply(minus_h, w.get(self.at(w, space.J, self.integer(w, self.entry, k))))
-                place = self.integer(w, self.entry_place, k)
-                value = w.get(self.at(w, space.solution, self.integer(w, self.columns, place)))
-                part = w.multiply(coefficient, value)
-                w.put(w.subtract(w.get(rest), part), rest)
-                w.put(w.add(w.get(terms), w.absolute(part)), terms)
 
-            self.along(w, self.entry_ends, i, term)
-            small = w.compare(
-                "ole", w.absolute(w.get(rest)), w.multiply(number_text(LEFT_OVER), w.get(terms))
-            )
-            w.put(w.both(w.get(good, "i1"), small), good, "i1")
+class Rows:
+    """Entries of a sparse matrix row by row: the ``places`` of all, and where each row ends."""
 
-        w.count("0", self.size, row)
-        w.do(f"ret i1 {w.get(good, 'i1')}")
-        return w.text("define internal i1 @solved_well(ptr %scratch, double %h) noinline")
+    def __init__(self, r: Routine, places: Integers, ends: Integers, numbers: Integers | None = None) -> None:
+        self._routine = r
+        self._ends = ends
+        self.places = places
+        self.numbers = places if numbers is None else numbers
+
+    def of(self, row: Integer) -> Generator[Integer]:
+        """``for k in rows.of(i)``: every entry of a row."""
+        return self._routine.range(self._ends[row], self._ends[row + 1])
 
 
 def _ends(rows: Sequence[Sequence[object]]) -> list[int]:

@@ -15,9 +15,11 @@ from armblocks.compiler.butcher_tableau import Row
 from armblocks.compiler.integrator_workspace import Workspace
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import number_text
-from armblocks.compiler.linear_equations import LinearSpace, emit_linear_equations, emit_rate_bound
+from armblocks.compiler.linear_equations import LinearEquations, LinearSpace
+from armblocks.compiler.program_text import add_program
 from armblocks.compiler.rosenbrock_tableau import RosenbrockTableau
 from armblocks.compiler.step_writer import StepWriter
+from armblocks.routines.routine import Program
 
 
 class RosenbrockStep(StepWriter):
@@ -42,7 +44,11 @@ class RosenbrockStep(StepWriter):
         self.space = space
         self._jacobian = jacobian
         self._time = ""
-        emit_linear_equations(routine.module, space, tableau.gamma)
+        program = Program()
+        self.equations = LinearEquations(program, space, tableau.gamma)
+        if space.size == self.n:
+            _ = self.equations.rate_bound
+        add_program(routine.module, program)
 
     def prepare(self, time: str) -> None:
         """The Jacobian at the step's start."""
@@ -120,7 +126,6 @@ class RosenbrockStep(StepWriter):
 
     def fastest_rate(self) -> str:
         """No less than the fastest rate of the flow at the step's start, 1/s."""
-        emit_rate_bound(self.w.module, self.space)
         return self.w.let("call double @rate_bound(ptr %scratch)")
 
     def extra_stages(self, time: str, h: str) -> None:

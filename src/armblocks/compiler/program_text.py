@@ -1,0 +1,13 @@
+"""Routines as functions of a module of LLVM IR."""
+
+from __future__ import annotations
+
+from armblocks.compiler.ir_text import Module
+from armblocks.routines.llvm import definitions
+from armblocks.routines.routine import Program
+
+
+def add_program(module: Module, program: Program) -> None:
+    """Add all functions and tables of a program. The functions that it only names are the module's own."""
+    for symbol, text in definitions(program).items():
+        module.add(symbol, text)

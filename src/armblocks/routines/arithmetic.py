@@ -1,0 +1,93 @@
+"""Functions of the values of a routine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+from armblocks.routines.tree import Kind, Operation
+from armblocks.routines.values import (
+    Boolean,
+    Integer,
+    Real,
+    integer_operand,
+    real_operand,
+)
+
+
+def square_root(a: Real) -> Real:
+    """The square root, exactly rounded."""
+    return Real(a.writer, a.writer.compute(Kind.REAL, Operation.SQUARE_ROOT, a.operand))
+
+
+def fma(a: Real | float, b: Real | float, c: Real | float) -> Real:
+    """``a b + c``, rounded once; at least one of them is a value of a routine."""
+    writer = next(value.writer for value in (a, b, c) if isinstance(value, Real))
+    operands = (real_operand(value) for value in (a, b, c))
+    return Real(writer, writer.compute(Kind.REAL, Operation.FMA, *operands))
+
+
+@overload
+def select(condition: Boolean, yes: Integer, no: Integer | int) -> Integer: ...
+@overload
+def select(condition: Boolean, yes: int, no: Integer) -> Integer: ...
+@overload
+def select(condition: Boolean, yes: Real | float, no: Real | float) -> Real: ...
+def select(condition: Boolean, yes: Real | Integer | float, no: Real | Integer | float) -> Real | Integer:
+    """``yes`` where the condition holds, else ``no``; both are evaluated. Two Python numbers are reals."""
+    writer = condition.writer
+    if isinstance(yes, Integer) or isinstance(no, Integer):
+        operands = (integer_operand(x if isinstance(x, Integer) else int(_number(x))) for x in (yes, no))
+        return Integer(writer, writer.compute(Kind.INTEGER, Operation.SELECT, condition.operand, *operands))
+    operands = (real_operand(x) for x in (yes, no))
+    return Real(writer, writer.compute(Kind.REAL, Operation.SELECT, condition.operand, *operands))
+
+
+def minimum(a: Real, b: Real | float) -> Real:
+    """The smaller one; ``b`` where either is NaN."""
+    return select(a < b, a, b)
+
+
+def maximum(a: Real, b: Real | float) -> Real:
+    """The larger one; ``b`` where either is NaN."""
+    return select(a > b, a, b)
+
+
+def sign(a: Real) -> Real:
+    """-1, 0 or 1; 0 for NaN."""
+    return select(a > 0.0, 1.0, select(a < 0.0, -1.0, 0.0))
+
+
+def polynomial(x: Real, coefficients: Sequence[float]) -> Real | float:
+    """Horner's rule; coefficients from the constant term upwards. One alone is the result itself."""
+    result: Real | float = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        result = fma(result, x, coefficient)
+    return result
+
+
+def inverse_root(a: Real, k: int) -> Real:
+    """``a^(-1/k)`` for ``a`` in 1e-300 … 1e300, to the last place or so.
+
+    A first guess from the divided bits, its excess centred by 0.064, then twice ``y (1 - r)^(-1/k)`` with
+    ``r = 1 - a y^k`` (below 0.25, then 1e-3), as its Taylor polynomial of degree 4. All operations are
+    exactly rounded: no library's ``pow`` decides a step.
+    """
+    one = 1023 << 52
+    offset = one + one // k - int(0.064 * (1 << 52))
+    y = (offset - a.bits().unsigned_quotient(k)).from_bits()
+    coefficients = [1.0]
+    for m in range(4):
+        coefficients.append(coefficients[-1] * (1 / k + m) / (m + 1))
+    for _ in range(2):
+        power = y
+        for _ in range(k - 1):
+            power = power * y
+        r = 1.0 - a * power
+        y = y * polynomial(r, coefficients)
+    return y
+
+
+def _number(value: Real | Integer | float) -> float:
+    assert not isinstance(value, Real | Integer)
+    return value

@@ -1,0 +1,315 @@
+"""Routines as LLVM IR text.
+
+A temporary is a name that is assigned once; a local variable is a stack slot, which LLVM turns into a
+register. Parts of the tree become basic blocks in the order in which they were written. No fast-math flag is
+ever set and ``fma`` stands only where it was asked for, so the same operations give the same bits everywhere.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+
+from armblocks.routines.routine import Program
+from armblocks.routines.tree import (
+    Call,
+    Compute,
+    Constant,
+    Copy,
+    Function,
+    Jump,
+    Kind,
+    Load,
+    Local,
+    Locate,
+    Mark,
+    Operand,
+    Operation,
+    Region,
+    Return,
+    Stage,
+    Statement,
+    Store,
+    Table,
+    Temporary,
+    When,
+)
+
+_TYPES = {Kind.REAL: "double", Kind.INTEGER: "i64", Kind.BOOLEAN: "i1", Kind.ADDRESS: "ptr"}
+
+_TWO_REALS = {
+    Operation.ADD: "fadd",
+    Operation.SUBTRACT: "fsub",
+    Operation.MULTIPLY: "fmul",
+    Operation.DIVIDE: "fdiv",
+    Operation.LESS: "fcmp olt",
+    Operation.LESS_EQUAL: "fcmp ole",
+    Operation.EQUAL: "fcmp oeq",
+    Operation.NOT_EQUAL: "fcmp une",
+    Operation.GREATER: "fcmp ogt",
+    Operation.GREATER_EQUAL: "fcmp oge",
+    Operation.ORDERED: "fcmp ord",
+}
+_TWO_INTEGERS = {
+    Operation.ADD: "add",
+    Operation.SUBTRACT: "sub",
+    Operation.MULTIPLY: "mul",
+    Operation.DIVIDE: "sdiv",
+    Operation.DIVIDE_UNSIGNED: "udiv",
+    Operation.AND: "and",
+    Operation.LESS: "icmp slt",
+    Operation.LESS_EQUAL: "icmp sle",
+    Operation.EQUAL: "icmp eq",
+    Operation.NOT_EQUAL: "icmp ne",
+    Operation.GREATER: "icmp sgt",
+    Operation.GREATER_EQUAL: "icmp sge",
+}
+_TWO_BOOLEANS = {Operation.AND: "and", Operation.OR: "or"}
+_INTRINSICS = {Operation.SQUARE_ROOT: "sqrt", Operation.ABSOLUTE: "fabs"}
+_CONVERSIONS = {
+    (Operation.TO_REAL, Kind.INTEGER): "sitofp i64 {} to double",
+    (Operation.TO_INTEGER, Kind.REAL): "fptosi double {} to i64",
+    (Operation.TO_INTEGER, Kind.BOOLEAN): "zext i1 {} to i64",
+    (Operation.BITS, Kind.REAL): "bitcast double {} to i64",
+    (Operation.FROM_BITS, Kind.INTEGER): "bitcast i64 {} to double",
+    (Operation.NEGATE, Kind.REAL): "fneg double {}",
+    (Operation.NOT, Kind.BOOLEAN): "xor i1 {}, true",
+}
+
+
+def number_text(value: float) -> str:
+    """A double, exact, as LLVM writes it."""
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+
+
+def definitions(program: Program) -> dict[str, str]:
+    """The text of every function, table and intrinsic of a program by its symbol."""
+    texts: dict[str, str] = {}
+    for symbol, part in program.parts.items():
+        if isinstance(part, Table):
+            texts[symbol] = _table(part)
+        else:
+            writer = _FunctionText()
+            texts[symbol] = writer.text(part)
+            texts.update(writer.declared)
+    return texts
+
+
+def _table(table: Table) -> str:
+    kind = _TYPES[table.element]
+    numbers = ", ".join(f"{kind} {_literal(table.element, number)}" for number in table.numbers)
+    # An array without elements has no address of its own.
+    numbers = numbers or f"{kind} {_literal(table.element, 0)}"
+    return f"@{table.symbol} = internal constant [{max(1, len(table.numbers))} x {kind}] [{numbers}]"
+
+
+def _literal(kind: Kind, value: float | None) -> str:
+    if value is None:
+        return "null"
+    if kind is Kind.REAL:
+        return number_text(value)
+    return str(value).lower() if kind is Kind.BOOLEAN else str(int(value))
+
+
+class _FunctionText:
+    """The text of one function."""
+
+    def __init__(self) -> None:
+        self.declared: dict[str, str] = {}
+        self._lines: list[str] = []
+        self._slots: list[str] = []
+        self._names: dict[Temporary | Local, str] = {}
+        self._labels: dict[Mark, str] = {}
+        self._count = 0
+        self._ended = False
+        """Whether nothing follows the last line: a branch or a return."""
+
+    def text(self, function: Function) -> str:
+        """The whole definition."""
+        for parameter in function.parameters:
+            self._names[parameter] = f"%{parameter.name}"
+        self._part(function.body)
+        result = "void" if function.result is None else _TYPES[function.result]
+        alias = " noalias" if function.distinct else ""
+        arguments = ", ".join(
+            f"{_TYPES[parameter.kind]}{alias if parameter.kind is Kind.ADDRESS else ''} %{parameter.name}"
+            for parameter in function.parameters
+        )
+        linkage = "" if function.public else "internal "
+        inlined = "" if function.inlined else " noinline"
+        head = f"define {linkage}{result} @{function.symbol}({arguments}){inlined} {{"
+        return "\n".join([head, "entry:", *self._slots, *self._lines, "}"])
+
+    # Names.
+
+    def _operand(self, operand: Operand) -> str:
+        if isinstance(operand, Constant):
+            return _literal(operand.kind, operand.value)
+        if isinstance(operand, Table):
+            return f"@{operand.symbol}"
+        name = self._names.get(operand)
+        if name is None:  # the first use of a variable; a temporary is named where it is computed
+            assert isinstance(operand, Local), "a value is used where it is not valid"
+            name = self._names[operand] = f"%x{len(self._slots) + 1}"
+            self._slots.append(f"  {name} = alloca {_TYPES[operand.kind]}")
+        return name
+
+    def _new(self, temporary: Temporary, text: str) -> str:
+        """Append the line that computes a temporary; gives its name."""
+        self._count += 1
+        name = self._names[temporary] = f"%v{self._count}"
+        self._lines.append(f"  {name} = {text}")
+        return name
+
+    def _label(self, mark: Mark) -> str:
+        label = self._labels.get(mark)
+        if label is None:
+            label = self._labels[mark] = self._fresh(mark.name)
+        return label
+
+    def _fresh(self, name: str) -> str:
+        self._count += 1
+        return f"{name.replace(' ', '.')}{self._count}"
+
+    # Blocks.
+
+    def _place(self, label: str) -> None:
+        """Begin a basic block; the block before goes on into it, unless it has ended."""
+        if not self._ended:
+            self._lines.append(f"  br label %{label}")
+        self._lines.append(f"{label}:")
+        self._ended = False
+
+    def _end(self, line: str) -> None:
+        self._lines.append(f"  {line}")
+        self._ended = True
+
+    def _part(self, statements: Sequence[Statement]) -> None:
+        for statement in statements:
+            if not self._ended or isinstance(statement, Stage):  # what nothing leads to is left out
+                self._statement(statement)
+
+    def _statement(self, statement: Statement) -> None:
+        match statement:
+            case Jump(mark):
+                self._end(f"br label %{self._label(mark)}")
+            case Return(value):
+                self._end("ret void" if value is None else f"ret {_typed(value)} {self._operand(value)}")
+            case Stage(mark):
+                self._place(self._label(mark))
+            case Region():
+                self._region(statement)
+            case When():
+                self._when(statement)
+            case _:
+                self._plain(statement)
+
+    def _region(self, region: Region) -> None:
+        used = set(_jumps(region.body))
+        if region.start in used:
+            self._place(self._label(region.start))
+        self._part(region.body)
+        if region.end in used:
+            self._place(self._label(region.end))
+
+    def _when(self, when: When) -> None:
+        """A part that only jumps is no block of its own: the branch goes there at once."""
+        condition = self._operand(when.condition)
+        places = [self._only_jump(when.yes), self._only_jump(when.no)]
+        after = self._fresh("after")
+        parts: list[tuple[str, list[Statement]]] = []
+        for k, (name, part) in enumerate((("when", when.yes), ("otherwise", when.no))):
+            if not part:
+                places[k] = after
+            elif not places[k]:
+                places[k] = self._fresh(name)
+                parts.append((places[k], part))
+        self._end(f"br i1 {condition}, label %{places[0]}, label %{places[1]}")
+        joined = after in places
+        for label, part in parts:
+            self._place(label)
+            self._part(part)
+            if not self._ended:
+                joined = True
+                self._end(f"br label %{after}")
+        if joined:
+            self._place(after)
+
+    def _only_jump(self, part: Sequence[Statement]) -> str:
+        return self._label(part[0].mark) if part and isinstance(part[0], Jump) else ""
+
+    # Statements.
+
+    def _plain(self, statement: Statement) -> None:
+        match statement:
+            case Compute(result, operation, operands):
+                self._new(result, self._operation(operation, operands))
+            case Locate(result, base, index, element):
+                text = f"getelementptr inbounds {_TYPES[element]}, ptr {self._operand(base)}"
+                self._new(result, f"{text}, i64 {self._operand(index)}")
+            case Load(result, address):
+                self._new(result, f"load {_TYPES[result.kind]}, ptr {self._operand(address)}")
+            case Store(value, address):
+                self._line(f"store {_typed(value)} {self._operand(value)}, ptr {self._operand(address)}")
+            case Copy(source, target, size):
+                self._declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
+                target, source, size = (self._operand(operand) for operand in (target, source, size))
+                arguments = f"ptr {target}, ptr {source}, i64 {size}, i1 false"
+                self._line(f"call void @llvm.memcpy.p0.p0.i64({arguments})")
+            case Call(result, symbol, arguments):
+                texts = [f"{_typed(argument)} {self._operand(argument)}" for argument in arguments]
+                call = f"@{symbol}({', '.join(texts)})"
+                if result is None:
+                    self._line(f"call void {call}")
+                else:
+                    self._new(result, f"call {_TYPES[result.kind]} {call}")
+            case _:
+                raise AssertionError(statement)
+
+    def _line(self, text: str) -> None:
+        self._lines.append(f"  {text}")
+
+    def _operation(self, operation: Operation, operands: Sequence[Operand]) -> str:
+        kind = operands[0].kind if not isinstance(operands[0], Table) else Kind.ADDRESS
+        texts = [self._operand(operand) for operand in operands]
+        if operation is Operation.SELECT:
+            chosen = _typed(operands[1])
+            return f"select i1 {texts[0]}, {chosen} {texts[1]}, {chosen} {texts[2]}"
+        if operation is Operation.FMA:
+            # For -(a b + c) LLVM selects FNMADD of ARM64, which is (-a) b + (-c): where the sum is exactly
+            # zero that gives +0 instead of -0. The fence keeps the two operations apart.
+            product = self._new(Temporary(Kind.REAL), self._intrinsic("fma", *texts))
+            return self._intrinsic("arithmetic.fence", product)
+        if operation in _INTRINSICS:
+            return self._intrinsic(_INTRINSICS[operation], *texts)
+        if (operation, kind) in _CONVERSIONS:
+            return _CONVERSIONS[operation, kind].format(texts[0])
+        table = {Kind.REAL: _TWO_REALS, Kind.INTEGER: _TWO_INTEGERS, Kind.BOOLEAN: _TWO_BOOLEANS}[kind]
+        return f"{table[operation]} {_TYPES[kind]} {texts[0]}, {texts[1]}"
+
+    def _intrinsic(self, name: str, *operands: str) -> str:
+        symbol = f"llvm.{name}.f64"
+        self._declare("double", symbol, *["double"] * len(operands))
+        return f"call double @{symbol}({', '.join(f'double {operand}' for operand in operands)})"
+
+    def _declare(self, result: str, symbol: str, *arguments: str) -> None:
+        self.declared[symbol] = f"declare {result} @{symbol}({', '.join(arguments)})"
+
+
+def _typed(operand: Operand) -> str:
+    """The type of an operand; a variable or a table stands for its address."""
+    return "ptr" if isinstance(operand, Local | Table) else _TYPES[operand.kind]
+
+
+def _jumps(statements: Sequence[Statement]) -> Iterator[Mark]:
+    for statement in statements:
+        match statement:
+            case Jump(mark):
+                yield mark
+            case When(_, yes, no):
+                yield from _jumps(yes)
+                yield from _jumps(no)
+            case Region(body):
+                yield from _jumps(body)
+            case _:
+                pass

@@ -1,0 +1,366 @@
+"""The routine language: functions with variables, memory and structured control flow, written in Python.
+
+A function of a program is a Python function whose first parameter is the :class:`Routine` that it writes
+into; the annotations of the others are its signature::
+
+    def norm(r: Routine, x: Reals, n: Integer) -> Real:
+        total = r.real(0.0)
+        for i in r.range(0, n):
+            total.value = fma(x[i], x[i], total.value)
+        return square_root(total.value)
+
+    program = Program()
+    length = program.define(norm)          # elsewhere: r.call(length, x, n)
+
+Python runs the function once, and what it does to values is written down: a Python ``if`` decides what is
+written, ``with r.when(condition):`` what happens when the routine runs. A value that is computed inside a
+``when`` or a loop is valid only there; one that outlives it is kept in a variable.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Concatenate, Generic, ParamSpec, TypeVar, cast, get_type_hints
+
+from armblocks.routines import tree
+from armblocks.routines.tree import Constant, Jump, Kind, Local, Mark, Operand, Statement, Table, Temporary
+from armblocks.routines.values import (
+    Boolean,
+    BooleanVariable,
+    Integer,
+    Integers,
+    IntegerVariable,
+    Real,
+    Reals,
+    RealVariable,
+    Value,
+    Writer,
+    boolean_operand,
+    integer_operand,
+    real_operand,
+)
+
+UNROLL = 8
+"""Loops of at most this many turns are written out, which keeps the vectors of small systems in registers."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_KINDS: dict[type, Kind] = {
+    Real: Kind.REAL,
+    Integer: Kind.INTEGER,
+    Boolean: Kind.BOOLEAN,
+    Reals: Kind.ADDRESS,
+    Integers: Kind.ADDRESS,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Function(Generic[P, R]):
+    """A function that routines call; the type parameters are those of the Python function that wrote it."""
+
+    symbol: str
+    write: Callable[Concatenate[Routine, P], R]
+    result: type[Value] | None
+
+
+def external(write: Callable[Concatenate[Routine, P], R]) -> Function[P, R]:
+    """A function that stands elsewhere, by its name and annotations; ``write`` is never run."""
+    return Function(write.__name__, write, _result(write))
+
+
+class Program:
+    """Functions and tables in the order in which they were first named."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, tree.Function | Table] = {}
+
+    def define(
+        self,
+        write: Callable[Concatenate[Routine, P], R],
+        symbol: str = "",
+        *,
+        public: bool = False,
+        inlined: bool = True,
+        distinct: bool = False,
+    ) -> Function[P, R]:
+        """The function that ``write`` writes, under its own name where no ``symbol`` is said.
+
+        ``public``: it is called from outside the program. ``inlined``: it may be written into its callers.
+        ``distinct``: arrays that are passed to it do not overlap. Where the symbol is defined already, that
+        definition stays.
+        """
+        symbol = symbol or write.__name__
+        if symbol not in self.parts:
+            types = _parameters(write)
+            parameters = {name: Temporary(_KINDS[kind], name) for name, kind in types.items()}
+            result = _result(write)
+            function = tree.Function(
+                symbol,
+                tuple(parameters.values()),
+                None if result is None else _KINDS[result],
+                public=public,
+                inlined=inlined,
+                distinct=distinct,
+            )
+            self.parts[symbol] = function
+            routine = Routine(self, function.body)
+            arguments = [types[name](routine, operand) for name, operand in parameters.items()]
+            given = cast("Callable[..., Value | None]", write)(routine, *arguments)
+            assert routine.statements is function.body, "Python's break has left a loop of the routine"
+            routine.return_(given)
+        return Function(symbol, write, _result(write))
+
+    def integers(self, symbol: str, numbers: Sequence[int]) -> Table:
+        """A table of integer constants."""
+        return self._table(Table(symbol, tuple(numbers), Kind.INTEGER))
+
+    def reals(self, symbol: str, numbers: Sequence[float]) -> Table:
+        """A table of constant doubles."""
+        return self._table(Table(symbol, tuple(numbers), Kind.REAL))
+
+    def _table(self, table: Table) -> Table:
+        self.parts.setdefault(table.symbol, table)
+        return table
+
+
+class Part:
+    """A part of a routine that can be left early, and repeated from its start."""
+
+    def __init__(self, routine: Routine, start: Mark, end: Mark) -> None:
+        self._routine = routine
+        self._start = start
+        self._end = end
+
+    def leave(self) -> None:
+        """Go on behind this part."""
+        self._routine.jump(self._end)
+
+    def leave_when(self, condition: Boolean) -> None:
+        """Go on behind this part where the condition holds."""
+        with self._routine.when(condition):
+            self.leave()
+
+    def leave_unless(self, condition: Boolean) -> None:
+        """Go on behind this part where the condition fails."""
+        with self._routine.unless(condition):
+            self.leave()
+
+    def again(self) -> None:
+        """Go back to the start of this part."""
+        self._routine.jump(self._start)
+
+    def again_when(self, condition: Boolean) -> None:
+        """Go back to the start of this part where the condition holds."""
+        with self._routine.when(condition):
+            self.again()
+
+
+class Routine(Writer):
+    """Writes the body of one function: variables, control flow, calls."""
+
+    def __init__(self, program: Program, statements: list[Statement]) -> None:
+        super().__init__()
+        self.program = program
+        self.statements = statements
+
+    # Variables and constants.
+
+    def real(self, initial: Real | float) -> RealVariable:
+        """A variable double. It gets its initial value here, at every passage."""
+        variable = RealVariable(self, Local(Kind.REAL))
+        variable.value = initial
+        return variable
+
+    def integer(self, initial: Integer | int) -> IntegerVariable:
+        """A variable integer. It gets its initial value here, at every passage."""
+        variable = IntegerVariable(self, Local(Kind.INTEGER))
+        variable.value = initial
+        return variable
+
+    def boolean(self, initial: Boolean | bool) -> BooleanVariable:
+        """A variable condition. It gets its initial value here, at every passage."""
+        variable = BooleanVariable(self, Local(Kind.BOOLEAN))
+        variable.value = initial
+        return variable
+
+    def constant(self, value: float) -> Real:
+        """A constant double, for where a Python number does not do."""
+        return Real(self, real_operand(value))
+
+    def reals(self, symbol: str, numbers: Sequence[float]) -> Reals:
+        """A table of constant doubles of the program."""
+        return Reals(self, self.program.reals(symbol, numbers))
+
+    def integers(self, symbol: str, numbers: Sequence[int]) -> Integers:
+        """A table of integer constants of the program."""
+        return Integers(self, self.program.integers(symbol, numbers))
+
+    @property
+    def nowhere(self) -> Reals:
+        """An array without an address, for functions that do not read it."""
+        return Reals(self, Constant(Kind.ADDRESS, None))
+
+    # Control flow.
+
+    @contextmanager
+    def when(self, condition: Boolean) -> Generator[None]:
+        """What stands inside happens where the condition holds."""
+        statement = tree.When(condition.operand, [], [])
+        self.statements.append(statement)
+        with self._inside(statement.yes):
+            yield
+
+    @contextmanager
+    def unless(self, condition: Boolean) -> Generator[None]:
+        """What stands inside happens where the condition fails, as where it compares with NaN."""
+        statement = tree.When(condition.operand, [], [])
+        self.statements.append(statement)
+        with self._inside(statement.no):
+            yield
+
+    @contextmanager
+    def otherwise(self) -> Generator[None]:
+        """The other part of the :meth:`when` that ends right before."""
+        statement = self.statements[-1] if self.statements else None
+        if not isinstance(statement, tree.When) or statement.no:
+            raise SyntaxError("'otherwise' has no 'when' right before it. Fix: put it behind one.")
+        with self._inside(statement.no):
+            yield
+
+    @contextmanager
+    def part(self) -> Generator[Part]:
+        """Statements that can be left early, or repeated: at their end they are over."""
+        region = tree.Region([], Mark("again"), Mark("behind"))
+        self.statements.append(region)
+        region.start.open = region.end.open = True
+        with self._inside(region.body):
+            yield Part(self, region.start, region.end)
+        region.start.open = region.end.open = False
+
+    @contextmanager
+    def loop(self) -> Generator[Part]:
+        """A part that is repeated until it is left."""
+        with self.part() as part:
+            yield part
+            part.again()
+
+    def each(self, count: int) -> Generator[Integer | int]:
+        """``for i in r.each(n)``: what stands inside, for ``i = 0 … n-1``; a few turns are written out.
+
+        Where the loop is written out, ``i`` is a Python number.
+        """
+        if count <= UNROLL:
+            yield from range(count)
+            return
+        index = self.integer(0)
+        with self.part() as turn:
+            i = index.value
+            yield i
+            following = i + 1
+            index.value = following
+            turn.again_when(following < count)
+
+    def range(self, start: Integer | int, stop: Integer | int) -> Generator[Integer]:
+        """``for i in r.range(a, b)``: what stands inside, for ``i = a … b-1``, as a loop."""
+        index = self.integer(start)
+        with self.loop() as turn:
+            i = index.value
+            turn.leave_unless(i < stop)
+            yield i
+            index.value = i + 1
+
+    def stages(self, *names: str) -> Stages:
+        """A part made of stages that follow one another and can be gone to from any of them."""
+        return Stages(self, names)
+
+    def return_(self, value: Value | None = None) -> None:
+        """Leave the function; its last value is returned by Python's ``return``."""
+        self.statements.append(tree.Return(None if value is None else value.operand))
+
+    # Calls.
+
+    def call(self, function: Function[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """Call a function; gives its result."""
+        bound = inspect.signature(function.write).bind(self, *args, **kwargs)
+        operands = tuple(self._argument(value) for value in list(bound.arguments.values())[1:])
+        if function.result is None:
+            self.statements.append(tree.Call(None, function.symbol, operands))
+            return cast("R", None)
+        found = Temporary(_KINDS[function.result])
+        self.statements.append(tree.Call(found, function.symbol, operands))
+        return cast("R", function.result(self, found))
+
+    def copy(self, source: Reals | Integers, target: Reals | Integers, count: Integer | int) -> None:
+        """Copy so many numbers from one place to another; the two do not overlap."""
+        size = integer_operand(8 * count if isinstance(count, int) else count * 8)
+        self.statements.append(tree.Copy(source.address(0), target.address(0), size))
+
+    def jump(self, mark: Mark) -> None:
+        """Go on at a mark of a part around this place."""
+        assert mark.open, "a part is left or repeated from inside"
+        self.statements.append(Jump(mark))
+
+    def _argument(self, value: object) -> Operand:
+        if isinstance(value, Reals | Integers):
+            return value.address(0)
+        if isinstance(value, Value):
+            return value.operand
+        assert isinstance(value, bool), value
+        return boolean_operand(value)
+
+    @contextmanager
+    def _inside(self, statements: list[Statement]) -> Generator[None]:
+        around = self.statements
+        self.statements = statements
+        yield
+        self.statements = around
+
+
+class Stages:
+    """Stages of a routine, such as those of a run: ``with stages:`` around all of them.
+
+    What stands before the first stage chooses one by :meth:`go`. A stage goes on into the one written behind
+    it, or ends with :meth:`go`.
+    """
+
+    def __init__(self, routine: Routine, names: Sequence[str]) -> None:
+        self._routine = routine
+        self._marks = {name: Mark(name) for name in names}
+        self._region = tree.Region([], Mark("again"), Mark("behind"))
+        self._around: list[Statement] = []
+
+    def __enter__(self) -> Stages:
+        self._routine.statements.append(self._region)
+        self._around = self._routine.statements
+        self._routine.statements = self._region.body
+        for mark in self._marks.values():
+            mark.open = True
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for mark in self._marks.values():
+            mark.open = False
+        self._routine.statements = self._around
+
+    def begin(self, name: str) -> None:
+        """What follows belongs to this stage."""
+        assert self._routine.statements is self._region.body, "a stage is not inside a loop or a condition"
+        self._routine.statements.append(tree.Stage(self._marks[name]))
+
+    def go(self, name: str) -> None:
+        """Go on at a stage."""
+        self._routine.jump(self._marks[name])
+
+
+def _parameters(write: Callable[..., object]) -> dict[str, type[Value]]:
+    hints = get_type_hints(write)
+    return {name: hints[name] for name in list(inspect.signature(write).parameters)[1:]}
+
+
+def _result(write: Callable[..., object]) -> type[Value] | None:
+    found = get_type_hints(write)["return"]
+    return None if found is type(None) else found

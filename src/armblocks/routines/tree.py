@@ -1,0 +1,219 @@
+"""The structured form of a function: data without behaviour, between the language and its back ends.
+
+A function is a tree of statements: operations in their order, conditional parts, and regions that may be left
+or repeated. :class:`~armblocks.routines.Routine` builds the tree; a back end such as
+:mod:`armblocks.routines.llvm` turns it into text. A value that differs between two paths lives in a
+:class:`Local`, so nothing merges where paths meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class Kind(Enum):
+    """Type of a value; ``ADDRESS`` points to doubles or to integers, as the operation that uses it says."""
+
+    REAL = "real"
+    """An IEEE double."""
+    INTEGER = "integer"
+    """A 64-bit signed integer; sums and products wrap around."""
+    BOOLEAN = "boolean"
+    ADDRESS = "address"
+
+
+class Operation(Enum):
+    """An operation without side effects. Real operations round once, to nearest."""
+
+    ADD = "add"
+    SUBTRACT = "subtract"
+    MULTIPLY = "multiply"
+    DIVIDE = "divide"
+    """Reals; integers toward zero."""
+    DIVIDE_UNSIGNED = "divide unsigned"
+    NEGATE = "negate"
+    ABSOLUTE = "absolute"
+    SQUARE_ROOT = "square root"
+    FMA = "fma"
+    """``a b + c``, rounded once."""
+    LESS = "less"
+    LESS_EQUAL = "less or equal"
+    EQUAL = "equal"
+    NOT_EQUAL = "not equal"
+    """Reals: true also where either is NaN, unlike every other comparison."""
+    GREATER = "greater"
+    GREATER_EQUAL = "greater or equal"
+    ORDERED = "ordered"
+    """Neither is NaN."""
+    AND = "and"
+    """Of Booleans, or of the bits of integers."""
+    OR = "or"
+    NOT = "not"
+    SELECT = "select"
+    """The second operand where the first holds, else the third."""
+    TO_REAL = "to real"
+    """An integer as a double."""
+    TO_INTEGER = "to integer"
+    """A double cut to an integer, a Boolean as 0 or 1."""
+    BITS = "bits"
+    """The bits of a double as an integer."""
+    FROM_BITS = "from bits"
+    """The double with these bits."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Temporary:
+    """The result of one statement, or a parameter where it has a ``name``."""
+
+    kind: Kind
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Local:
+    """A variable of a function; as an operand it is the address of the variable."""
+
+    kind: Kind
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number; an address only as ``None``, the null address."""
+
+    kind: Kind
+    value: float | int | bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Constants of the program under a symbol; as an operand it is their address."""
+
+    symbol: str
+    numbers: tuple[float, ...] | tuple[int, ...]
+    element: Kind
+
+
+Operand = Temporary | Local | Constant | Table
+
+
+@dataclass(frozen=True, slots=True)
+class Compute:
+    """``result = operation(operands)``."""
+
+    result: Temporary
+    operation: Operation
+    operands: tuple[Operand, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Locate:
+    """``result`` is the address ``index`` elements of a kind after ``base``."""
+
+    result: Temporary
+    base: Operand
+    index: Operand
+    element: Kind
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """``result`` is the number at an address."""
+
+    result: Temporary
+    address: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class Store:
+    """Write a number to an address."""
+
+    value: Operand
+    address: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """Copy so many bytes from one address to another; the two do not overlap."""
+
+    source: Operand
+    target: Operand
+    size: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Call a function of the program, or one that the program only names."""
+
+    result: Temporary | None
+    symbol: str
+    arguments: tuple[Operand, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """Leave the function."""
+
+    value: Operand | None
+
+
+@dataclass(slots=True, eq=False)
+class Mark:
+    """A place of the tree that a :class:`Jump` can go to: the start or the end of a region, or a stage."""
+
+    name: str
+    open: bool = False
+    """Whether statements that are written now may jump to it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """Go on at a mark of a region around this statement."""
+
+    mark: Mark
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """Run one of two parts, either of which may be empty."""
+
+    condition: Operand
+    yes: list[Statement]
+    no: list[Statement]
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Statements whose start and end are marks. The end of the body goes on behind the region."""
+
+    body: list[Statement]
+    start: Mark
+    end: Mark
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A mark between the statements of a region: jumps of the same region go here, and so does what stands
+    before it."""
+
+    mark: Mark
+
+
+Statement = Compute | Locate | Load | Store | Copy | Call | Return | Jump | When | Region | Stage
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """One function.
+
+    ``public``: its address is asked for from outside. ``inlined``: it may be written into its callers.
+    ``distinct``: its addresses never point to the same numbers.
+    """
+
+    symbol: str
+    parameters: tuple[Temporary, ...]
+    result: Kind | None
+    body: list[Statement] = field(default_factory=list[Statement])
+    public: bool = False
+    inlined: bool = True
+    distinct: bool = False

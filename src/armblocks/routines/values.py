@@ -1,0 +1,384 @@
+"""Typed values of a routine: numbers with operators, arrays in memory, variables.
+
+Each operation appends a statement to the routine that the value belongs to, at the place where Python
+evaluates it. Python numbers stand for constants. The types are those of the routine: a type checker tells a
+double from an integer and both from an array, and Python's ``if`` refuses a :class:`Boolean`, whose value is
+not known yet.
+"""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from armblocks.routines.tree import (
+    Compute,
+    Constant,
+    Kind,
+    Load,
+    Local,
+    Locate,
+    Operand,
+    Operation,
+    Statement,
+    Store,
+    Temporary,
+)
+
+
+class Writer:
+    """Where statements are appended; ``statements`` is the part of the tree that is being written."""
+
+    def __init__(self) -> None:
+        self.statements: list[Statement] = []
+
+    def compute(self, kind: Kind, operation: Operation, *operands: Operand) -> Temporary:
+        """Append an operation; gives its result."""
+        result = Temporary(kind)
+        self.statements.append(Compute(result, operation, operands))
+        return result
+
+    def load(self, address: Operand, kind: Kind) -> Temporary:
+        """Append the reading of a number."""
+        result = Temporary(kind)
+        self.statements.append(Load(result, address))
+        return result
+
+    def store(self, value: Operand, address: Operand) -> None:
+        """Append the writing of a number."""
+        self.statements.append(Store(value, address))
+
+    def locate(self, base: Operand, index: Operand, element: Kind) -> Temporary:
+        """Append the address of an element."""
+        result = Temporary(Kind.ADDRESS)
+        self.statements.append(Locate(result, base, index, element))
+        return result
+
+
+class Value:
+    """A value of a routine, at the place where it was computed."""
+
+    __slots__ = ("operand", "writer")
+
+    def __init__(self, writer: Writer, operand: Operand) -> None:
+        self.writer = writer
+        self.operand = operand
+
+    __hash__ = object.__hash__
+
+    def __bool__(self) -> NoReturn:
+        raise TypeError(
+            "A value of a routine is not known while the routine is written. "
+            "Fix: use 'with r.when(condition):' or 'select' in place of Python's if, and, or, not."
+        )
+
+
+class Boolean(Value):
+    """A condition."""
+
+    def __and__(self, other: Boolean) -> Boolean:
+        return self._with(Operation.AND, other)
+
+    def __or__(self, other: Boolean) -> Boolean:
+        return self._with(Operation.OR, other)
+
+    def __invert__(self) -> Boolean:
+        return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, Operation.NOT, self.operand))
+
+    def _with(self, operation: Operation, other: Boolean) -> Boolean:
+        return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, operation, self.operand, other.operand))
+
+    def count(self) -> Integer:
+        """1 where it holds, else 0."""
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
+
+
+class Real(Value):
+    """A double. Each operation is rounded once; comparisons with NaN fail, except ``!=``."""
+
+    def __add__(self, other: Real | float) -> Real:
+        return self._real(Operation.ADD, self, other)
+
+    def __radd__(self, other: float) -> Real:
+        return self._real(Operation.ADD, other, self)
+
+    def __sub__(self, other: Real | float) -> Real:
+        return self._real(Operation.SUBTRACT, self, other)
+
+    def __rsub__(self, other: float) -> Real:
+        return self._real(Operation.SUBTRACT, other, self)
+
+    def __mul__(self, other: Real | float) -> Real:
+        return self._real(Operation.MULTIPLY, self, other)
+
+    def __rmul__(self, other: float) -> Real:
+        return self._real(Operation.MULTIPLY, other, self)
+
+    def __truediv__(self, other: Real | float) -> Real:
+        return self._real(Operation.DIVIDE, self, other)
+
+    def __rtruediv__(self, other: float) -> Real:
+        return self._real(Operation.DIVIDE, other, self)
+
+    def __neg__(self) -> Real:
+        return self._real(Operation.NEGATE, self)
+
+    def __abs__(self) -> Real:
+        return self._real(Operation.ABSOLUTE, self)
+
+    def __lt__(self, other: Real | float) -> Boolean:
+        return self._compare(Operation.LESS, other)
+
+    def __le__(self, other: Real | float) -> Boolean:
+        return self._compare(Operation.LESS_EQUAL, other)
+
+    def __gt__(self, other: Real | float) -> Boolean:
+        return self._compare(Operation.GREATER, other)
+
+    def __ge__(self, other: Real | float) -> Boolean:
+        return self._compare(Operation.GREATER_EQUAL, other)
+
+    def __eq__(self, other: Real | float) -> Boolean:  # type: ignore[override]  # as in NumPy: element by element
+        return self._compare(Operation.EQUAL, other)
+
+    def __ne__(self, other: Real | float) -> Boolean:  # type: ignore[override]
+        return self._compare(Operation.NOT_EQUAL, other)
+
+    __hash__ = object.__hash__
+
+    @property
+    def ordered(self) -> Boolean:
+        """Whether it is not NaN."""
+        return self._compare(Operation.ORDERED, self)
+
+    @property
+    def finite(self) -> Boolean:
+        """Whether it is neither infinite nor NaN: ``0 a`` is zero."""
+        return self * 0.0 == 0.0
+
+    def to_integer(self) -> Integer:
+        """Cut to an integer, which must be within 64 bits."""
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
+
+    def bits(self) -> Integer:
+        """The bits as an integer: one more is the next double, away from zero."""
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.BITS, self.operand))
+
+    def _real(self, operation: Operation, *operands: Real | float) -> Real:
+        places = [real_operand(operand) for operand in operands]
+        return Real(self.writer, self.writer.compute(Kind.REAL, operation, *places))
+
+    def _compare(self, operation: Operation, other: Real | float) -> Boolean:
+        found = self.writer.compute(Kind.BOOLEAN, operation, self.operand, real_operand(other))
+        return Boolean(self.writer, found)
+
+
+class Integer(Value):
+    """A 64-bit signed integer; sums and products wrap around, ``//`` cuts toward zero."""
+
+    def __add__(self, other: Integer | int) -> Integer:
+        return self._integer(Operation.ADD, self, other)
+
+    def __radd__(self, other: int) -> Integer:
+        return self._integer(Operation.ADD, other, self)
+
+    def __sub__(self, other: Integer | int) -> Integer:
+        return self._integer(Operation.SUBTRACT, self, other)
+
+    def __rsub__(self, other: int) -> Integer:
+        return self._integer(Operation.SUBTRACT, other, self)
+
+    def __mul__(self, other: Integer | int) -> Integer:
+        return self._integer(Operation.MULTIPLY, self, other)
+
+    def __rmul__(self, other: int) -> Integer:
+        return self._integer(Operation.MULTIPLY, other, self)
+
+    def __floordiv__(self, other: Integer | int) -> Integer:
+        return self._integer(Operation.DIVIDE, self, other)
+
+    def __and__(self, other: Integer | int) -> Integer:
+        return self._integer(Operation.AND, self, other)
+
+    def unsigned_quotient(self, divisor: int) -> Integer:
+        """The quotient where both are read as numbers without a sign."""
+        return self._integer(Operation.DIVIDE_UNSIGNED, self, divisor)
+
+    def __lt__(self, other: Integer | int) -> Boolean:
+        return self._compare(Operation.LESS, other)
+
+    def __le__(self, other: Integer | int) -> Boolean:
+        return self._compare(Operation.LESS_EQUAL, other)
+
+    def __gt__(self, other: Integer | int) -> Boolean:
+        return self._compare(Operation.GREATER, other)
+
+    def __ge__(self, other: Integer | int) -> Boolean:
+        return self._compare(Operation.GREATER_EQUAL, other)
+
+    def __eq__(self, other: Integer | int) -> Boolean:  # type: ignore[override]
+        return self._compare(Operation.EQUAL, other)
+
+    def __ne__(self, other: Integer | int) -> Boolean:  # type: ignore[override]
+        return self._compare(Operation.NOT_EQUAL, other)
+
+    __hash__ = object.__hash__
+
+    def to_real(self) -> Real:
+        """As a double, to nearest."""
+        return Real(self.writer, self.writer.compute(Kind.REAL, Operation.TO_REAL, self.operand))
+
+    def from_bits(self) -> Real:
+        """The double that has these bits."""
+        return Real(self.writer, self.writer.compute(Kind.REAL, Operation.FROM_BITS, self.operand))
+
+    def _integer(self, operation: Operation, *operands: Integer | int) -> Integer:
+        places = [integer_operand(operand) for operand in operands]
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, operation, *places))
+
+    def _compare(self, operation: Operation, other: Integer | int) -> Boolean:
+        found = self.writer.compute(Kind.BOOLEAN, operation, self.operand, integer_operand(other))
+        return Boolean(self.writer, found)
+
+
+class Array(Value):
+    """Numbers of one kind that follow one another in memory, from an address on.
+
+    The view begins ``first`` elements after its operand, so that a vector of a workspace costs no address of
+    its own until one of its elements is used.
+    """
+
+    __slots__ = ("first",)
+    element: Kind
+
+    def __init__(self, writer: Writer, operand: Operand, first: int = 0) -> None:
+        super().__init__(writer, operand)
+        self.first = first
+
+    def address(self, index: Integer | int) -> Operand:
+        """Address of an element."""
+        place: Operand
+        if isinstance(index, int):
+            if not self.first + index:
+                return self.operand
+            place = Constant(Kind.INTEGER, self.first + index)
+        else:
+            place = integer_operand(index + self.first if self.first else index)
+        return self.writer.locate(self.operand, place, self.element)
+
+
+class Reals(Array):
+    """Doubles in memory; ``v[i]`` reads one, ``v[i] = x`` writes one. No bounds are checked."""
+
+    __slots__ = ()
+    element = Kind.REAL
+
+    def __getitem__(self, index: Integer | int) -> Real:
+        return Real(self.writer, self.writer.load(self.address(index), Kind.REAL))
+
+    def __setitem__(self, index: Integer | int, value: Real | float) -> None:
+        self.writer.store(real_operand(value), self.address(index))
+
+    def after(self, index: Integer | int) -> Reals:
+        """The doubles from an element on."""
+        if isinstance(index, int):
+            return Reals(self.writer, self.operand, self.first + index)
+        return Reals(self.writer, self.address(index))
+
+    @property
+    def integers(self) -> Integers:
+        """The same memory, read and written as integers."""
+        return Integers(self.writer, self.operand, self.first)
+
+
+class Integers(Array):
+    """Integers in memory; ``v[i]`` reads one, ``v[i] = x`` writes one. No bounds are checked."""
+
+    __slots__ = ()
+    element = Kind.INTEGER
+
+    def __getitem__(self, index: Integer | int) -> Integer:
+        return Integer(self.writer, self.writer.load(self.address(index), Kind.INTEGER))
+
+    def __setitem__(self, index: Integer | int, value: Integer | int) -> None:
+        self.writer.store(integer_operand(value), self.address(index))
+
+    def after(self, index: Integer | int) -> Integers:
+        """The integers from an element on."""
+        if isinstance(index, int):
+            return Integers(self.writer, self.operand, self.first + index)
+        return Integers(self.writer, self.address(index))
+
+
+class Variable:
+    """A variable of a routine, read and written as ``value``. A back end keeps it in a register if it can."""
+
+    __slots__ = ("local", "writer")
+
+    def __init__(self, writer: Writer, local: Local) -> None:
+        self.writer = writer
+        self.local = local
+
+
+class RealVariable(Variable):
+    """A variable double."""
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> Real:
+        """The value that was written last."""
+        return Real(self.writer, self.writer.load(self.local, Kind.REAL))
+
+    @value.setter
+    def value(self, value: Real | float) -> None:
+        self.writer.store(real_operand(value), self.local)
+
+    @property
+    def memory(self) -> Reals:
+        """The variable as an array of one element, for functions that take one."""
+        return Reals(self.writer, self.local)
+
+
+class IntegerVariable(Variable):
+    """A variable integer."""
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> Integer:
+        """The value that was written last."""
+        return Integer(self.writer, self.writer.load(self.local, Kind.INTEGER))
+
+    @value.setter
+    def value(self, value: Integer | int) -> None:
+        self.writer.store(integer_operand(value), self.local)
+
+
+class BooleanVariable(Variable):
+    """A variable condition."""
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> Boolean:
+        """The value that was written last."""
+        return Boolean(self.writer, self.writer.load(self.local, Kind.BOOLEAN))
+
+    @value.setter
+    def value(self, value: Boolean | bool) -> None:
+        self.writer.store(boolean_operand(value), self.local)
+
+
+def real_operand(value: Real | float) -> Operand:
+    """The operand of a double; a Python number is a constant."""
+    return value.operand if isinstance(value, Real) else Constant(Kind.REAL, float(value))
+
+
+def integer_operand(value: Integer | int) -> Operand:
+    """The operand of an integer; a Python number is a constant."""
+    return value.operand if isinstance(value, Integer) else Constant(Kind.INTEGER, int(value))
+
+
+def boolean_operand(value: Boolean | bool) -> Operand:
+    """The operand of a condition; ``True`` and ``False`` are constants."""
+    return value.operand if isinstance(value, Boolean) else Constant(Kind.BOOLEAN, value)

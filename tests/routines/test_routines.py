@@ -1,0 +1,293 @@
+"""Routines mean in machine code what their structured form means in plain Python, and what Python means."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from tree_interpreter import Interpreter
+
+from armblocks.compiler.native import load_code
+from armblocks.routines.arithmetic import (
+    fma,
+    inverse_root,
+    maximum,
+    minimum,
+    polynomial,
+    select,
+    sign,
+    square_root,
+)
+from armblocks.routines.llvm import definitions
+from armblocks.routines.routine import UNROLL, Program, Routine, external
+from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
+
+CTYPES = {float: ctypes.c_double, int: ctypes.c_int64, list: ctypes.c_void_p, None: None}
+
+
+def both(write: Callable[..., Any], *arguments: Any, result: type | None = None) -> Any:
+    """Run a function in machine code and in the interpreter; gives what both give, lists written in place."""
+    program = Program()
+    program.define(write, "run", public=True)
+    parts = definitions(program)
+    code = load_code(("routines test", *parts.values()), lambda: "\n\n".join(parts.values()))
+    arrays = [np.array(a, dtype=type(a[0])) if isinstance(a, list) else None for a in arguments]
+    kinds = [CTYPES[type(argument)] for argument in arguments]
+    function = ctypes.CFUNCTYPE(CTYPES[result], *kinds)(code.address("run"))
+    native = function(*(x if a is None else a.ctypes.data for x, a in zip(arguments, arrays)))
+    copies = [list(argument) if isinstance(argument, list) else argument for argument in arguments]
+    found = Interpreter(program).call("run", *((c, 0) if isinstance(c, list) else c for c in copies))
+    np.testing.assert_equal(native, found)
+    for array, copy, argument in zip(arrays, copies, arguments):
+        if array is not None:
+            np.testing.assert_array_equal(array, copy)
+            argument[:] = copy
+    return native
+
+
+def test_arithmetic_is_that_of_doubles() -> None:
+    def run(r: Routine, a: Real, b: Real, out: Reals) -> None:
+        values = [
+            a + b,
+            a - b,
+            2.0 - a,
+            a * b,
+            a / b,
+            1.0 / b,
+            -a,
+            abs(a),
+            square_root(abs(b)),
+            fma(a, b, 0.5),
+        ]
+        values += [minimum(a, b), maximum(a, 0.25), sign(b), select(a < b, a, -1.0)]
+        values += [fma(2.0, b, polynomial(a, (1.0, 2.0, 3.0))), polynomial(a, (7.0,)) * b, r.constant(4.0)]
+        for k, value in enumerate(values):
+            out[k] = value
+
+    out = [0.0] * 17
+    a, b = 1.25, -3.0
+    both(run, a, b, out)
+    assert out == [
+        *(a + b, a - b, 2.0 - a, a * b, a / b, 1.0 / b, -a, abs(a), math.sqrt(3.0), a * b + 0.5),
+        *(b, a, -1.0, -1.0, 2.0 * b + 1.0 + 2.0 * a + 3.0 * a * a, 7.0 * b, 4.0),
+    ]
+
+
+def test_comparisons_with_nan_fail_except_not_equal() -> None:
+    def run(r: Routine, a: Real, b: Real, out: Integers) -> None:
+        tests: list[Boolean] = [a < b, a <= b, a == b, a >= b, a > b, b.ordered, b.finite, a != b]
+        tests += [~(a == b), (a < b) | (a != b), (a == a) & (b != b)]
+        for k, condition in enumerate(tests):
+            out[k] = condition.count()
+
+    out = [0] * 11
+    both(run, 1.0, math.nan, out)
+    assert out == [0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1]
+
+
+def test_integers_wrap_around_and_divide_toward_zero() -> None:
+    def run(r: Routine, i: Integer, out: Integers) -> None:
+        values = [i + 1, 1 + i, i - 3, 3 - i, i * i, 2 * i, i // 2, i & 6, i.to_real().to_integer()]
+        values += [select(i < 0, i, 5), select(i >= 0, 1, i), i.unsigned_quotient(2)]
+        values += [((1 << 62) + (i - i)) * 4 + 1, (i.to_real().bits() + 0).from_bits().to_integer()]
+        tests = [i < 0, i <= -7, i == -7, i != -7, i > 0, i >= 0]
+        for k, value in enumerate([*values, *(test.count() for test in tests)]):
+            out[k] = value
+
+    out = [0] * 20
+    both(run, -7, out)
+    half = ((1 << 64) - 7) // 2
+    assert out == [-6, -6, -10, 10, 49, -14, -3, 0, -7, -7, -7, half, 1, -7, 1, 1, 1, 0, 0, 0]
+
+
+@pytest.mark.parametrize("n", [0, 1, UNROLL, UNROLL + 1, 30])
+def test_each_counts_the_same_written_out_and_as_a_loop(n: int) -> None:
+    def run(r: Routine, x: Reals, y: Reals) -> Real:
+        total = r.real(0.0)
+        for i in r.each(n):
+            y[i] = 2.0 * x[i]
+            total.value = total.value + x.after(i)[0]
+        return total.value
+
+    x = [float(k + 1) for k in range(max(n, 1))]
+    y = [0.0] * len(x)
+    assert both(run, x, y, result=float) == n * (n + 1) / 2
+    assert y[:n] == [2.0 * value for value in x[:n]]
+
+
+def test_a_loop_is_left_and_repeated_from_inside() -> None:
+    """Numbers up to ``n`` without those that 3 divides, until their sum passes 100."""
+
+    def run(r: Routine, n: Integer) -> Integer:
+        total, k = r.integer(0), r.integer(0)
+        with r.loop() as loop:
+            k.value = k.value + 1
+            loop.leave_unless(k.value <= n)
+            loop.again_when(k.value - k.value // 3 * 3 == 0)
+            total.value = total.value + k.value
+            with r.when(total.value > 100):
+                loop.leave()
+        return total.value
+
+    for n in (0, 2, 10, 1000):
+        total = 0
+        for k in range(1, n + 1):
+            if k % 3:
+                total += k
+                if total > 100:
+                    break
+        assert both(run, n, result=int) == total
+
+
+def test_parts_nest_and_an_outer_one_is_left_from_an_inner_one() -> None:
+    def run(r: Routine, x: Reals, wanted: Real) -> Integer:
+        place = r.integer(-1)
+        with r.part() as search:
+            for row in r.range(0, 3):
+                for column in r.range(row, 3):
+                    with r.when(x[row * 3 + column] == wanted):
+                        place.value = row * 3 + column
+                        search.leave()
+            place.value = -2
+        with r.when(place.value >= 0), r.when(wanted < 0.0):
+            r.return_(place.value * 100)
+        with r.otherwise():
+            place.value = place.value * 10
+        return place.value
+
+    x = [1.0, 5.0, -2.0, 9.0, 4.0, 7.0, 9.0, 9.0, 8.0]
+    assert [both(run, x, wanted, result=int) for wanted in (5.0, -2.0, 9.0, 8.0)] == [1, 200, -20, 8]
+
+
+def test_stages_are_entered_at_any_of_them_and_follow_one_another() -> None:
+    def run(r: Routine, first: Integer, out: Integers) -> None:
+        count = r.integer(0)
+
+        def note(number: int) -> None:
+            out[count.value] = number
+            count.value = count.value + 1
+
+        with r.stages("one", "two", "three") as stages:
+            with r.when(first == 1):
+                stages.go("one")
+            with r.when(first == 2):
+                stages.go("two")
+            stages.go("three")
+            stages.begin("one")
+            note(1)
+            stages.begin("two")
+            note(2)
+            with r.when(count.value < 4):
+                stages.go("one")
+            stages.begin("three")
+            note(3)
+
+    for first, expected in ((1, [1, 2, 1, 2, 3, 0]), (2, [2, 1, 2, 1, 2, 3]), (3, [3, 0, 0, 0, 0, 0])):
+        out = [0] * 6
+        both(run, first, out)
+        assert out == expected
+
+
+def test_functions_call_one_another_and_read_tables() -> None:
+    def run(r: Routine, x: Reals, n: Integer) -> Real:
+        def weighted(r: Routine, x: Reals, flip: Boolean) -> Real:
+            weights, places = r.reals("weights", [2.0, 3.0]), r.integers("places", [1, 0])
+            first = fma(weights[0], x[places[0]], weights[1] * x[places[1]])
+            return select(flip, -first, first)
+
+        def store(r: Routine, x: Reals, value: Real) -> None:
+            x[0] = value
+
+        function = r.program.define(weighted, inlined=False)
+        keep = r.program.define(store)
+        assert r.program.define(weighted) == r.program.define(weighted)
+        last = r.real(0.0)
+        for i in r.range(0, n):
+            r.call(keep, last.memory, r.call(function, x.after(i), i > 0))
+        r.copy(x.after(1), x, 2)
+        return last.value + r.call(function, x=x, flip=False)
+
+    x = [1.0, 10.0, 100.0]
+    assert both(run, x, 2, result=float) == -(2.0 * 100.0 + 3.0 * 10.0) + 2.0 * 100.0 + 3.0 * 10.0
+    assert x == [10.0, 100.0, 100.0]
+
+
+def test_functions_that_stand_elsewhere_are_called_by_their_names() -> None:
+    @external
+    def derivative(r: Routine, t: Real, x: Reals) -> Real: ...
+
+    def run(r: Routine, x: Reals) -> Real:
+        return r.call(derivative, x[1], x) + 1.0
+
+    program = Program()
+    program.define(run)
+    interpreter = Interpreter(program, derivative=lambda t, x: t * x[0][0])
+    assert interpreter.call("run", ([3.0, 4.0], 0)) == 13.0
+    assert "call double @derivative(double %v" in definitions(program)["run"]
+
+
+def test_null_addresses_and_repeated_declarations() -> None:
+    @external
+    def take(r: Routine, x: Reals) -> None: ...
+
+    def run(r: Routine, a: Real) -> Real:
+        r.call(take, r.nowhere)
+        return abs(abs(a))
+
+    program = Program()
+    program.define(run)
+    text = definitions(program)
+    assert "call void @take(ptr null)" in text["run"]
+    assert text["llvm.fabs.f64"] == "declare double @llvm.fabs.f64(double)"
+
+
+def test_python_does_not_decide_on_a_value_of_the_routine() -> None:
+    def run(r: Routine, a: Real) -> Real:
+        return -a if a > 0.0 else a
+
+    with pytest.raises(TypeError, match="not known while the routine is written"):
+        Program().define(run)
+
+
+def test_otherwise_needs_a_when() -> None:
+    def run(r: Routine, a: Real) -> None:
+        with r.when(a > 0.0):
+            pass
+        r.real(1.0)
+        with r.otherwise():
+            pass
+
+    with pytest.raises(SyntaxError, match="'otherwise' has no 'when' right before it"):
+        Program().define(run)
+
+
+def test_a_loop_that_python_leaves_is_noticed() -> None:
+    def run(r: Routine, n: Integer) -> None:
+        for _ in r.range(0, n):
+            break
+
+    with pytest.raises(AssertionError, match="break"):
+        Program().define(run)
+
+
+@pytest.mark.parametrize("k", [2, 3, 5, 8])
+def test_inverse_root_is_right_to_the_last_place_over_all_magnitudes(k: int) -> None:
+    def run(r: Routine, a: Real) -> Real:
+        return inverse_root(a, k)
+
+    program = Program()
+    program.define(run, public=True)
+    text = "\n\n".join(definitions(program).values())
+    code = load_code(("inverse root test", text), lambda: text)
+    root = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(code.address("run"))
+    numbers = np.concatenate([np.logspace(-300, 300, 601), np.random.default_rng(1).uniform(0.5, 20.0, 400)])
+    # In exact arithmetic, so that only the root itself is judged: one unit in its last place, k times.
+    worst = max(abs(Fraction(a) * Fraction(root(a)) ** k - 1) for a in numbers.tolist())
+    assert worst < 1.5 * k * 2.0**-52
+    for a in numbers[::97].tolist():
+        assert Interpreter(program).call("run", a) == root(a)

@@ -1,0 +1,169 @@
+"""Runs the structured form of a routine in plain Python: the second opinion on its back ends.
+
+Memory is lists of numbers; an address is a list and a place in it. A jump is an exception that the region
+around it catches.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from armblocks.routines import tree
+from armblocks.routines.routine import Program
+from armblocks.routines.tree import Kind, Operation
+
+Address = tuple[list[Any], int]
+
+
+@dataclass
+class Jumped(Exception):  # noqa: N818
+    mark: tree.Mark
+
+
+@dataclass
+class Returned(Exception):  # noqa: N818
+    value: Any
+
+
+def _wrapped(value: int) -> int:
+    return (value + (1 << 63)) % (1 << 64) - (1 << 63)
+
+
+def _divided(a: Any, b: Any) -> Any:
+    if isinstance(a, float):
+        if b == 0.0:
+            nan = math.isnan(a) or a == 0.0
+            return math.nan if nan else math.copysign(math.inf, a) * math.copysign(1.0, b)
+        return a / b
+    return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+
+
+OPERATIONS: dict[Operation, Callable[..., Any]] = {
+    Operation.ADD: lambda a, b: a + b,
+    Operation.SUBTRACT: lambda a, b: a - b,
+    Operation.MULTIPLY: lambda a, b: a * b,
+    Operation.DIVIDE: _divided,
+    Operation.DIVIDE_UNSIGNED: lambda a, b: (a % (1 << 64)) // b,
+    Operation.NEGATE: lambda a: -a,
+    Operation.ABSOLUTE: abs,
+    Operation.SQUARE_ROOT: lambda a: math.sqrt(a) if a >= 0.0 else math.nan,
+    Operation.FMA: lambda a, b, c: math.fma(a, b, c) if hasattr(math, "fma") else _fma(a, b, c),
+    Operation.LESS: lambda a, b: a < b,
+    Operation.LESS_EQUAL: lambda a, b: a <= b,
+    Operation.EQUAL: lambda a, b: a == b,
+    Operation.NOT_EQUAL: lambda a, b: a != b,
+    Operation.GREATER: lambda a, b: a > b,
+    Operation.GREATER_EQUAL: lambda a, b: a >= b,
+    Operation.ORDERED: lambda a, b: a == a and b == b,
+    Operation.AND: lambda a, b: a & b,
+    Operation.OR: lambda a, b: a | b,
+    Operation.NOT: lambda a: not a,
+    Operation.SELECT: lambda condition, a, b: a if condition else b,
+    Operation.TO_REAL: float,
+    Operation.TO_INTEGER: int,
+    Operation.BITS: lambda a: struct.unpack("<q", struct.pack("<d", a))[0],
+    Operation.FROM_BITS: lambda a: struct.unpack("<d", struct.pack("<q", a))[0],
+}
+
+
+def _fma(a: float, b: float, c: float) -> float:
+    from fractions import Fraction
+
+    if not all(map(math.isfinite, (a, b, c))):
+        return a * b + c
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    return float(exact) if exact else a * b + c
+
+
+class Interpreter:
+    """Calls functions of a program. ``functions`` are those that it only names, over lists of arguments."""
+
+    def __init__(self, program: Program, **functions: Callable[..., Any]) -> None:
+        self.program = program
+        self.functions = functions
+
+    def call(self, symbol: str, *arguments: Any) -> Any:
+        function = self.program.parts.get(symbol)
+        if not isinstance(function, tree.Function):
+            return self.functions[symbol](*arguments)
+        return _Call(self, function, arguments).run()
+
+
+class _Call:
+    def __init__(self, interpreter: Interpreter, function: tree.Function, arguments: Sequence[Any]) -> None:
+        self.interpreter = interpreter
+        self.function = function
+        self.values: dict[tree.Operand, Any] = dict(zip(function.parameters, arguments))
+
+    def run(self) -> Any:
+        try:
+            self.part(self.function.body)
+        except Returned as returned:
+            return returned.value
+        raise AssertionError("a function ends with a return")
+
+    def value(self, operand: tree.Operand) -> Any:
+        match operand:
+            case tree.Constant(_, value):
+                return value
+            case tree.Local():
+                return self.values.setdefault(operand, ([None], 0))
+            case tree.Table(_, numbers):
+                return (list(numbers), 0)
+            case _:
+                return self.values[operand]
+
+    def part(self, statements: Sequence[tree.Statement], start: int = 0) -> None:
+        for statement in statements[start:]:
+            self.statement(statement)
+
+    def statement(self, statement: tree.Statement) -> None:
+        match statement:
+            case tree.Compute(result, operation, operands):
+                found = OPERATIONS[operation](*map(self.value, operands))
+                self.values[result] = _wrapped(found) if result.kind is Kind.INTEGER else found
+            case tree.Locate(result, base, index, _):
+                memory, place = self.value(base)
+                self.values[result] = (memory, place + self.value(index))
+            case tree.Load(result, address):
+                memory, place = self.value(address)
+                self.values[result] = memory[place]
+            case tree.Store(value, address):
+                memory, place = self.value(address)
+                memory[place] = self.value(value)
+            case tree.Copy(source, target, size):
+                (given, first), (taken, place) = self.value(source), self.value(target)
+                count = self.value(size) // 8
+                taken[place : place + count] = given[first : first + count]
+            case tree.Call(result, symbol, arguments):
+                found = self.interpreter.call(symbol, *map(self.value, arguments))
+                if result is not None:
+                    self.values[result] = found
+            case tree.Return(value):
+                raise Returned(None if value is None else self.value(value))
+            case tree.Jump(mark):
+                raise Jumped(mark)
+            case tree.When(condition, yes, no):
+                self.part(yes if self.value(condition) else no)
+            case tree.Region():
+                self.region(statement)
+            case tree.Stage():
+                pass
+
+    def region(self, region: tree.Region) -> None:
+        stages = {part.mark: k for k, part in enumerate(region.body) if isinstance(part, tree.Stage)}
+        start = 0
+        while True:
+            try:
+                self.part(region.body, start)
+                return
+            except Jumped as jumped:
+                if jumped.mark is region.end:
+                    return
+                if jumped.mark is not region.start and jumped.mark not in stages:
+                    raise
+                start = stages.get(jumped.mark, 0)
