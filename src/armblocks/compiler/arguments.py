@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.compiler.result_memory import new_result
 from armblocks.equations import Shape, Signature, Slot
 from armblocks.errors import InputError
 
@@ -80,7 +81,7 @@ def new_outputs(
     writable; a tuple of these where there are several outputs.
     """
     if out is None:
-        fresh = [np.empty(shape) for shape in shapes]
+        fresh = [new_result(shape) for shape in shapes]
         return fresh, fresh
     given = cast("tuple[object, ...]", out) if isinstance(out, tuple) else (out,)
     if len(given) != len(signature):

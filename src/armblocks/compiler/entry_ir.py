@@ -25,6 +25,7 @@ from armblocks.compiler.entry import (
 )
 from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Module
+from armblocks.compiler.result_memory import LARGE
 from armblocks.equations import Shape, Signature
 
 _OPTIONS = "entry.options"
@@ -49,6 +50,7 @@ def emit_entry(module: Module, inputs: Signature, outputs: Signature, evaluate: 
     batched = body.let(f"icmp ne i64 {samples}, {_NO_SAMPLES}")
     batch = body.batch_function(arguments, batched)
     shapes = [slot.shape for slot in outputs]
+    body.require_small(shapes, samples, out)
     if len(shapes) == 1:
         results = [body.given_or_new(shapes[0], samples, batched, out, arguments)]
     else:  # a tuple of arrays for the results is left to the Python callable
@@ -213,6 +215,13 @@ class _EntryBody(Routine):
         return self.get(function, "ptr")
 
     # ---- results -----------------------------------------------------------------------------------------
+    def require_small(self, shapes: Sequence[Shape], samples: str, out: str) -> None:
+        """Go on only where no new array is large: the memory of large ones is used again."""
+        size = max((math.prod(shape) for shape in shapes), default=0)
+        if size:
+            few = self.word_test("slt", samples, str(-(-LARGE // size)))
+            self.require(self.either(few, self.let(f"icmp ne ptr {out}, null")))
+
     def new_result(self, shape: Shape, samples: str, batched: str) -> _Result:
         """A new array, or room for one number."""
         made, target = self.variable("ptr", "null"), self.variable("ptr", "null")

@@ -1,0 +1,117 @@
+"""Memory of large results: used again when no array refers to it, never before, and never much of it."""
+
+import gc
+import threading
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from small_functions import mixed, same_bits
+
+from armblocks.compiler import compile_function
+from armblocks.compiler.result_memory import LARGE, ResultMemory, new_result, result_memory
+
+
+def address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def test_memory_is_used_again_once_no_array_refers_to_it() -> None:
+    pool = ResultMemory(limit=1 << 20)
+    first = pool.new_array((50, 4, 5))
+    assert first.shape == (50, 4, 5)
+    assert first.dtype == np.float64
+    assert first.flags.c_contiguous
+    assert first.flags.writeable
+    assert first.flags.aligned
+    first[...] = 7.0
+    place, view = address(first), memoryview(first[3:4])
+    del first
+    assert pool.idle == 0  # the view refers to it
+    second = pool.new_array((1000,))
+    second[...] = 8.0
+    assert address(second) != place
+    assert (np.asarray(view) == 7.0).all()
+    del view
+    assert 8000 <= pool.idle <= 9000
+    assert address(pool.new_array((25, 40))) == place
+
+
+def test_memory_of_another_size_is_not_used() -> None:
+    pool = ResultMemory(limit=1 << 20)
+    kept = pool.new_array((1000,))
+    del kept
+    assert pool.new_array((2000,)).size == 2000  # too small for it
+    assert pool.new_array((100,)).size == 100  # a waste
+    assert pool.idle > 8 * 3000
+
+
+def test_what_is_kept_is_bounded_and_can_be_freed() -> None:
+    pool = ResultMemory(limit=50_000)
+    results = [pool.new_array((1000,)) for _ in range(20)]
+    results.clear()
+    assert 40_000 < pool.idle <= 50_000
+    assert pool.new_array((10_000,)).size == 10_000  # does not fit into what is there
+    assert pool.idle <= 50_000  # and is more than may be kept
+    pool.clear()
+    assert pool.idle == 0
+
+
+def test_no_two_results_share_memory() -> None:
+    """Random sizes, taken and dropped by four threads at random, each result checked when it is dropped."""
+    pool = ResultMemory(limit=200_000)
+    wrong: list[float] = []
+
+    def work(seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        held: list[np.ndarray] = []
+        for turn in range(400):
+            if len(held) > rng.integers(6):
+                dropped = held.pop(rng.integers(len(held)))
+                wrong.extend(dropped[dropped != dropped[0]])
+            result = pool.new_array((int(rng.integers(1, 3000)),))
+            result[...] = 1000 * seed + turn
+            held.append(result)
+
+    workers = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert wrong == []
+    assert pool.idle <= 200_000
+
+
+def test_small_results_own_their_memory() -> None:
+    assert new_result((LARGE - 1,)).flags.owndata
+    assert not new_result((LARGE,)).flags.owndata
+
+
+@pytest.fixture
+def no_collection() -> Iterator[None]:
+    """A full garbage collection would free what the test expects to find."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("no_collection")
+def test_large_batches_are_those_of_small_ones() -> None:
+    kernel = compile_function(mixed())
+    rng = np.random.default_rng(1)
+    count = LARGE // 11 + 100
+    a, b = rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
+    expected = kernel.entry(a, b, out=np.empty((count, 11)))
+    first = kernel.entry(a, b)
+    place = address(first)
+    assert not first.flags.owndata
+    assert same_bits(first, expected)
+    second = kernel.entry(b, a)
+    assert not np.shares_memory(first, second)
+    assert same_bits(first, expected)
+    del first
+    assert address(kernel.entry(a, b, threads=2)) == place
+    del second
+    assert result_memory().idle > 0
+    gc.collect()
+    assert result_memory().idle == 0
