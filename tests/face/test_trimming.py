@@ -18,6 +18,7 @@ from armblocks.blocks import (
     Integrator,
     LookupTable1D,
     Saturation,
+    StateSpace,
     Sum,
     Switch,
     UnitDelay,
@@ -45,6 +46,25 @@ def test_a_pendulum_hangs_down_and_stands_up_by_where_the_search_starts() -> Non
     assert up.largest_residual < 1e-13
     unstable = ab.linearize(pendulum(), "torque", "q", at=up.point)
     assert unstable.poles().real.max() == pytest.approx(-0.05 + math.sqrt(0.05**2 + 9.81), rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_values_that_are_zero_to_their_accuracy_are_shown_as_zero(seed: int) -> None:
+    """x' = A x + b rests at (1, 0, 1e-9): of the numbers found, the middle one is a rounding error."""
+    random = np.random.default_rng(seed)
+    A = random.normal(size=(3, 3)) - 3.0 * np.eye(3)
+    rest = np.array([1.0, 0.0, 1e-9])
+    block = StateSpace(A=A, B=-A @ rest[:, None], C=np.eye(3), D=np.zeros((3, 1)), initial=[0.3, -0.2, 0.1])
+    builder = ab.DiagramBuilder("rest")
+    builder.add("plant", block, builder.add("one", Constant(value=1.0)))
+    found = ab.trim(builder.build())
+    (name,) = found.point.states
+    value, least = found.point.states[name], found.accuracies[name]
+    assert (np.abs(value - rest) <= least).all()
+    assert least.max() < 1e-13
+    shown = found.shown(name, value)
+    assert shown.tolist() == [value[0], 0.0, value[2]]
+    assert np.array2string(shown, precision=8) in repr(found)
 
 
 def test_a_free_torque_holds_a_given_angle() -> None:

@@ -288,7 +288,9 @@ def bandwidth(system: LinearSystem, drop: float) -> float:
             allowed="one of each",
             fix="choose with system.select(output, input)",
         )
-    rest = abs(float(system.dcgain()[0, 0]))
+    from armblocks.analysis.shown_values import shown_dcgain
+
+    rest = abs(float(shown_dcgain(system)[0, 0]))
     if not math.isfinite(rest) or rest == 0.0:
         raise InputError(
             f"the gain at rest is {rest:g}",

@@ -91,9 +91,13 @@ class LinearSystem:
 
     @property
     def is_stable(self) -> bool:
-        """Whether every free motion dies away: poles left of the imaginary axis, or in the unit circle."""
-        poles = self.poles()
-        return bool((np.abs(poles) < 1.0).all() if self.is_discrete else (poles.real < 0.0).all())
+        """Whether every free motion dies away: poles left of the imaginary axis, or in the unit circle.
+
+        A pole that is on that edge to the accuracy of the computation does not die away.
+        """
+        from armblocks.analysis.shown_values import growth
+
+        return growth(self) < 0.0
 
     def select(
         self, outputs: str | Sequence[str] | None = None, inputs: str | Sequence[str] | None = None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from armblocks.analysis.linear_system import LinearSystem
 
+Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
@@ -28,12 +29,25 @@ class Mode:
 
 
 def poles(system: LinearSystem) -> Complex:
-    """Eigenvalues of A, slowest first, conjugates side by side with the positive one first."""
+    """Eigenvalues of A, slowest first, conjugates side by side with the positive one first.
+
+    They are those of the irreducible diagonal blocks of A: a state in no loop has its eigenvalue without
+    rounding, and a fast part of a system costs a slow one no digits.
+    """
     from scipy.linalg import eigvals
 
     if not system.order:
         return np.empty(0, dtype=np.complex128)
-    return in_order(eigvals(system.A), discrete=system.is_discrete)
+    parts = [eigvals(system.A[np.ix_(part, part)]) for part in irreducible_parts(system.A)]
+    return in_order(np.concatenate(parts), discrete=system.is_discrete)
+
+
+def irreducible_parts(A: Array) -> list[list[int]]:
+    """The states that act on each other, directly or through others: A is block triangular in these parts."""
+    from scipy.sparse.csgraph import connected_components
+
+    count, labels = connected_components(A != 0.0, directed=True, connection="strong")
+    return [np.flatnonzero(labels == label).tolist() for label in range(count)]
 
 
 def in_order(roots: Complex, *, discrete: bool = False) -> Complex:

@@ -34,7 +34,7 @@ class OperatingPoint:
         head = f"<OperatingPoint of {self.name} at {self.time:g} s>"
         parts = (*self.states.items(), *self.discrete.items())
         width = max((len(name) for name, _ in parts), default=0)
-        lines = [f"  {name:<{width}}  {np.array2string(value, precision=6)}" for name, value in parts]
+        lines = [f"  {name:<{width}}  {np.array2string(value + 0.0, precision=6)}" for name, value in parts]
         return "\n".join([head, *lines])
 
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.analysis.shown_values import growth, shown_matrices, shown_modes, shown_poles
+
 if TYPE_CHECKING:
     from armblocks.analysis.linear_system import LinearSystem
 
@@ -58,12 +60,10 @@ def heading(system: LinearSystem) -> str:
 
 def stability(system: LinearSystem) -> str:
     """In words; a pole on the edge is neither stable nor growing."""
-    poles = system.poles()
-    growth = np.abs(poles) - 1.0 if system.is_discrete else poles.real
-    if (growth < 0.0).all():
+    largest = growth(system)
+    if largest < 0.0:
         return "stable"
-    size = max(1.0, float(np.abs(poles).max(initial=0.0)))
-    return "on the edge of stability" if growth.max() <= 1e-9 * size else "unstable"
+    return "on the edge of stability" if largest == 0.0 else "unstable"
 
 
 def matrix_lines(matrix: Array, rows: tuple[str, ...], columns: tuple[str, ...]) -> list[str]:
@@ -90,12 +90,13 @@ def _shown(count: int) -> list[int | None]:
 
 
 def matrices(system: LinearSystem) -> list[tuple[str, Array, tuple[str, ...], tuple[str, ...]]]:
-    """Letter, matrix, names of rows and of columns; only those that have entries."""
+    """Letter, matrix as it is shown, names of rows and of columns; only those that have entries."""
+    A, B, C, D = shown_matrices(system)
     all_four = [
-        ("A", system.A, system.states, system.states),
-        ("B", system.B, system.states, system.inputs),
-        ("C", system.C, system.outputs, system.states),
-        ("D", system.D, system.outputs, system.inputs),
+        ("A", A, system.states, system.states),
+        ("B", B, system.states, system.inputs),
+        ("C", C, system.outputs, system.states),
+        ("D", D, system.outputs, system.inputs),
     ]
     return [entry for entry in all_four if entry[1].size]
 
@@ -107,7 +108,9 @@ def system_text(system: LinearSystem) -> str:
         lines.append(f"  {letter}")
         lines += [f"    {line}" for line in matrix_lines(matrix, rows, columns)]
     if system.order:
-        lines.append("  poles: " + ", ".join(complex_number(pole) for pole in system.poles().tolist()[:30]))
+        lines.append(
+            "  poles: " + ", ".join(complex_number(pole) for pole in shown_poles(system).tolist()[:30])
+        )
     return "\n".join(lines)
 
 
@@ -133,7 +136,7 @@ def system_html(system: LinearSystem) -> str:
         rows_html = "".join(
             f"<tr><td>{complex_number(mode.pole)}</td><td>{number(mode.frequency)}</td>"
             f"<td>{number(mode.damping)}</td><td>{_time(mode.time_constant)}</td></tr>"
-            for mode in system.damp()
+            for mode in shown_modes(system)
         )
         parts.append(
             "<table><caption>Poles</caption><tr><th>pole</th><th>frequency, rad/s</th><th>damping</th>"

@@ -52,7 +52,9 @@ class TimeResponse:
 
     def measures(self, output: int = 0, column: int = 0) -> StepMeasures:
         """Rise, settling and overshoot of one step response."""
-        final = float(self.system.dcgain()[output, column]) if self.system.is_stable else math.nan
+        from armblocks.analysis.shown_values import shown_dcgain
+
+        final = float(shown_dcgain(self.system)[output, column]) if self.system.is_stable else math.nan
         return step_measures(self.time, self.values[:, output, column], final)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -45,7 +46,8 @@ class TransferFunction:
 
     def __repr__(self) -> str:
         letter = "z" if self.dt else "s"
-        above, below = polynomial(self.numerator, letter), polynomial(self.denominator, letter)
+        above = polynomial(self.numerator, letter, self.zeros)
+        below = polynomial(self.denominator, letter, self.poles)
         width = max(len(above), len(below))
         return f"{above.center(width).rstrip()}\n{'-' * width}\n{below.center(width).rstrip()}"
 
@@ -78,13 +80,18 @@ def _multiplied_out(roots: Complex) -> Array:
     return np.atleast_1d(np.poly(roots)).real.astype(np.float64)
 
 
-def polynomial(coefficients: Array, letter: str) -> str:
-    """``3 s^2 + s - 2``: six digits; what is rounding beside the largest coefficient is left out."""
-    size = float(np.abs(coefficients).max(initial=0.0))
+def polynomial(coefficients: Array, letter: str, roots: Complex) -> str:
+    """``3 s^2 + s - 2``: six digits. A coefficient that rounding of the roots alone explains is left out.
+
+    The k-th coefficient is the sum of all products of k roots: an error of each root by a share of the
+    largest one, ``r``, changes it by at most that share of ``k`` times the count of products times ``r^k``.
+    """
+    largest = float(np.abs(roots).max(initial=0.0))
     parts: list[str] = []
     for place, value in enumerate(coefficients.tolist()):
         power = len(coefficients) - 1 - place
-        if abs(value) <= 1e-14 * size:
+        rounding = 4e-15 * place * math.comb(len(coefficients) - 1, place) * largest**place
+        if abs(value) <= rounding * abs(float(coefficients[0])):
             continue
         number = f"{abs(value):.6g}"
         unit = "" if power == 0 else letter if power == 1 else f"{letter}^{power}"

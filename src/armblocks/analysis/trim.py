@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint, operating_point, solved
 from armblocks.equations import HybridSystem, Signature
-from armblocks.equations.evaluation import EvaluatedSystem, Point
+from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
 from armblocks.errors import SimulationError
 
 Array = NDArray[np.float64]
@@ -30,6 +30,8 @@ Places = NDArray[np.intp]
 MOST_ITERATIONS = 200
 MOST_MODES = 20
 """How often the modes may change before it is said that they do not settle."""
+ROUNDOFFS = 4.0 * float(np.finfo(np.float64).eps)
+"""Rounding error of a term of an equation, as a share of it."""
 NAMED = 6
 """How many culprits a message names."""
 
@@ -58,12 +60,14 @@ class TrimProblem:
 class TrimResult:
     """An operating point and how well it rests.
 
-    ``free``: the parameters that were found, as ``simulate(parameters=…)`` takes them. ``residuals``: what is
-    left of every equation, by name. ``at_bounds``: unknowns that ended at an end of their range.
+    ``free``: the parameters that were found, as ``simulate(parameters=…)`` takes them. ``accuracies``: bound
+    of the rounding error of everything that was sought, by name and in its shape. ``residuals``: what is left
+    of every equation, by name. ``at_bounds``: unknowns that ended at an end of their range.
     """
 
     point: OperatingPoint
     free: Mapping[str, Array]
+    accuracies: Mapping[str, Array]
     residuals: Mapping[str, float]
     at_bounds: tuple[str, ...]
     iterations: int
@@ -73,6 +77,11 @@ class TrimResult:
         """Magnitude of what is farthest from resting."""
         return max((abs(value) for value in self.residuals.values()), default=0.0)
 
+    def shown(self, name: str, value: Array) -> Array:
+        """A value of the point or of ``free`` with 0 for every number that is 0 to its accuracy."""
+        least = self.accuracies.get(name)
+        return value + 0.0 if least is None else np.where(np.abs(value) <= least, 0.0, value)
+
     def __repr__(self) -> str:
         head = (
             f"<TrimResult of {self.point.name} at {self.point.time:g} s: {len(self.residuals)} equations to "
@@ -80,9 +89,11 @@ class TrimResult:
         )
         parts = [*self.point.states.items(), *self.point.discrete.items(), *self.free.items()]
         width = max((len(name) for name, _ in parts), default=0)
-        return "\n".join(
-            [head, *(f"  {name:<{width}}  {np.array2string(value, precision=8)}" for name, value in parts)]
+        lines = (
+            f"  {name:<{width}}  {np.array2string(self.shown(name, value), precision=8)}"
+            for name, value in parts
         )
+        return "\n".join([head, *lines])
 
 
 def trim_system(problem: TrimProblem) -> TrimResult:
@@ -189,12 +200,12 @@ class _Search:
         parts += [evaluated.residual(point), evaluated.signals(point) - problem.targets]
         return np.concatenate(parts)
 
-    def slopes(self, point: Point) -> Array:
-        """Derivatives of the equations by the unknowns."""
+    def _slope_blocks(self, point: Point) -> list[tuple[Slopes, Places, Places]]:
+        """Derivatives of the equations in their order: slopes, their rows, and which of z is taken off each
+        of these."""
         problem, evaluated = self.problem, self.evaluated
         flow = evaluated.derivative_slopes(point)
         nobody = np.zeros(0, dtype=np.intp)
-        # Slopes, their rows, and which of z is taken off each of these.
         blocks = [(flow, problem.resting, nobody)]
         if self.ticked.size:
             blocks.append((evaluated.update_slopes(point, self.ticking), self.ticked, self.ticked))
@@ -203,14 +214,40 @@ class _Search:
             blocks.append((going_in, np.arange(self.delayed.size), self.delayed))
         blocks.append((evaluated.residual_slopes(point), np.arange(point.w.size), nobody))
         blocks.append((evaluated.signal_slopes(point), np.arange(problem.rows.size), nobody))
+        return blocks
+
+    def slopes(self, point: Point) -> Array:
+        """Derivatives of the equations by the unknowns."""
+        problem = self.problem
         rows: list[Array] = []
-        for slopes, chosen, taken_off in blocks:
+        for slopes, chosen, taken_off in self._slope_blocks(point):
             by_z = slopes.z[np.ix_(chosen, self.moved)]
             if taken_off.size:
                 by_z = by_z - (taken_off[:, None] == self.moved)
             by_x = slopes.x[np.ix_(chosen, problem.free_states)]
             rows.append(np.hstack([by_x, by_z, slopes.w[chosen], slopes.p[chosen]]))
         return np.vstack(rows)
+
+    def errors(self, point: Point) -> Array:
+        """Bound of the rounding error of every unknown at a solution.
+
+        Each equation is a sum whose terms are the slopes times the values, each with a few roundings; its
+        error and what is left of it move the unknowns by the inverse of the slopes (Golub and Van Loan,
+        Matrix Computations, 4th ed., 2.6).
+        """
+        matrix = self.slopes(point)
+        if not np.isfinite(matrix).all():  # of a search that failed
+            return np.zeros(len(self.unknowns))
+        free = point.p[self.problem.free_parameters]
+        sizes: list[Array] = []
+        for slopes, chosen, taken_off in self._slope_blocks(point):
+            terms = np.abs(slopes.x[chosen]) @ np.abs(point.x) + np.abs(slopes.z[chosen]) @ np.abs(point.z)
+            terms += np.abs(slopes.w[chosen]) @ np.abs(point.w) + np.abs(slopes.p[chosen]) @ np.abs(free)
+            if taken_off.size:
+                terms += np.abs(point.z[taken_off])
+            sizes.append(terms)
+        equations = ROUNDOFFS * np.concatenate(sizes) + np.abs(self.residuals(point))
+        return np.abs(np.linalg.pinv(matrix)) @ equations
 
     def rests(self, point: Point) -> bool:
         """Whether every equation holds to the tolerance."""
@@ -290,9 +327,17 @@ class _Search:
             for name, place in system.parameters.ranges.items()
             if chosen & set(range(*place.indices(system.parameters.size)))
         }
+        nothing = Point(t=0.0, **{part: np.zeros_like(getattr(point, part)) for part in "xzwp"})
+        least = self.spread(self.errors(point), nothing)
         return TrimResult(
             point=known,
             free=free,
+            accuracies={
+                **system.states.unpack(least.x),
+                **system.discrete.unpack(least.z),
+                **system.algebraic.unpack(least.w),
+                **{name: system.parameters.unpack(least.p)[name] for name in free},
+            },
             residuals=dict(zip(self.equations, self.residuals(point).tolist())),
             at_bounds=tuple(self.unknowns[k] for k in np.flatnonzero(bounded).tolist()),
             iterations=iterations,

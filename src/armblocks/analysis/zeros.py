@@ -22,9 +22,17 @@ def invariant_zeros(A: Array, B: Array, C: Array, D: Array) -> Complex:
     """The finite numbers at which ``[[A - s I, B], [C, D]]`` has less than its usual rank."""
     from scipy.linalg import eigvals
 
-    nothing = np.empty(0, dtype=np.complex128)
+    pencil = zero_pencil(A, B, C, D)
+    return np.empty(0, dtype=np.complex128) if pencil is None else in_order(eigvals(*pencil[:2]))
+
+
+def zero_pencil(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, float] | None:
+    """``M``, ``N`` and the size of their rounding errors: the zeros are the roots of ``det(M - s N)``.
+
+    ``None`` where there are no zeros.
+    """
     if not A.size or not B.size or not C.size:
-        return nothing
+        return None
     a, b, c = balanced(A, B, C)
     # Inputs and outputs are scaled to one size: this moves no zero.
     b, d = _columns_scaled(b, D)
@@ -37,13 +45,13 @@ def invariant_zeros(A: Array, B: Array, C: Array, D: Array) -> Complex:
         a, c, b, d = (part.T for part in _reduced(a.T, c.T, b.T, d.T, tolerance))
     n = a.shape[0]
     if not n:
-        return nothing
+        return None
     if not d.size:
-        return in_order(eigvals(a))
+        return a, np.eye(n), tolerance
     # [C D] W = [0 *] takes the inputs out without dividing by D.
     _, _, right = np.linalg.svd(np.hstack([c, d]))
     free = right[d.shape[0] :].T
-    return in_order(eigvals(np.hstack([a, b]) @ free, free[:n]))
+    return np.hstack([a, b]) @ free, free[:n], tolerance
 
 
 def _columns_scaled(upper: Array, lower: Array) -> tuple[Array, Array]:

@@ -101,6 +101,7 @@ def linearize(
 
 def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: bool) -> None:
     """Heading, matrices, poles, zeros and, of a single channel, what is told by numbers."""
+    from armblocks.analysis.shown_values import shown_dcgain, shown_zeros
     from armblocks.analysis.text import complex_number, heading, matrices, matrix_lines
 
     console.print(heading(system), style=STRONG)
@@ -111,27 +112,29 @@ def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: b
     if system.order:
         _print_poles(system, console, hertz=hertz)
     if system.inputs and system.outputs:
-        zeros = ", ".join(complex_number(zero) for zero in system.zeros().tolist()[:SECTION])
+        zeros = ", ".join(complex_number(zero) for zero in shown_zeros(system).tolist()[:SECTION])
         console.print(f"zeros: {zeros or 'none'}", soft_wrap=True)
     if not system.is_siso:
         return
-    console.print(f"gain at rest: {float(system.dcgain()[0, 0]):.6g}")
+    gain = float(shown_dcgain(system)[0, 0])
+    console.print(f"gain at rest: {gain:.6g}")
     if loop:
         _print_margins(system, console, hertz=hertz)
-    elif system.is_stable and math.isfinite(float(system.dcgain()[0, 0])) and system.dcgain()[0, 0]:
+    elif system.is_stable and math.isfinite(gain) and gain:
         width = system.bandwidth()
         if math.isfinite(width):
             console.print(f"bandwidth (3 dB): {_frequency(width, hertz)}")
 
 
 def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None:
+    from armblocks.analysis.shown_values import shown_modes
     from armblocks.analysis.text import complex_number
 
     unit = "Hz" if hertz else "rad/s"
     rows = table(
         ("pole", "left"), (f"frequency, {unit}", "right"), ("damping", "right"), ("time constant, s", "right")
     )
-    modes = system.damp()
+    modes = shown_modes(system)
     for mode in modes[:SECTION]:
         rows.add_row(
             complex_number(mode.pole),
@@ -147,7 +150,9 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
 
 
 def _print_margins(system: LinearSystem, console: Console, *, hertz: bool) -> None:
-    found = system.margins()
+    from armblocks.analysis.shown_values import shown_margins
+
+    found = shown_margins(system)
     rows = table(("margin of 1 + L", "left"), ("", "right"), ("at", "right"))
     if math.isfinite(found.gain):
         text = f"{found.gain_decibels:.4g} dB (factor {found.gain:.4g})"

@@ -14,7 +14,7 @@ from rich.text import Text
 from armblocks.cli.progress import factor_text
 from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind, diagram_views
-from armblocks.report.analysis import JointSummary, LimitKind, people_unit, summarise
+from armblocks.report.analysis import JointSummary, LimitKind, people_unit, shown_summary, summarise
 from armblocks.report.motion import motions
 from armblocks.report.numbers import wall_time
 
@@ -60,7 +60,7 @@ def print_displays(diagram: Diagram, result: SimulationResult, console: Console)
 
 def _value_text(value: NDArray[np.float64]) -> str:
     """Nine digits: more than a Display shows, and what a person needs to compare two runs."""
-    rows = [[f"{number:.9g}" for number in row] for row in np.atleast_2d(value)]
+    rows = [[f"{number + 0.0:.9g}" for number in row] for row in np.atleast_2d(value)]
     widths = [max(len(cell) for cell in column) for column in zip(*rows)]
     return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in rows)
 
@@ -70,7 +70,9 @@ def print_motions(diagram: Diagram, result: SimulationResult, console: Console) 
     if not result.time.size:
         return
     for motion in motions(diagram, result):
-        whole = summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
+        whole = shown_summary(
+            summarise(motion.robot, motion.time, motion.q, motion.qd, motion.qdd, motion.tau, motion.tool)
+        )
         broken = {(finding.joint, finding.kind) for finding in whole.findings}
         console.print()
         console.print(Text(motion.robot.name, STRONG))
@@ -126,7 +128,7 @@ def _span(low: float, high: float) -> str:
 
 
 def _short(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"
+    return "" if value is None else f"{value + 0.0:.4g}"
 
 
 def print_files(files: ReportFiles, console: Console) -> None:

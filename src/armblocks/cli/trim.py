@@ -134,7 +134,8 @@ def print_trim(found: TrimResult, console: Console) -> None:
             continue
         rows = table((title, "left"), ("value", "left"))
         for name, value in values.items():
-            rows.add_row(name, " ".join(f"{number:.9g}" for number in np.ravel(value).tolist()))
+            numbers = np.ravel(found.shown(name, value)).tolist()
+            rows.add_row(name, " ".join(f"{number:.9g}" for number in numbers))
         console.print()
         console.print(rows)
     if found.at_bounds:

@@ -6,6 +6,7 @@ changes sign, for instance, gives its positive and its negative work without err
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import warnings
 from collections.abc import Sequence
@@ -151,6 +152,45 @@ def summarise(
         tool_speed_peak=float((strides / spans).max()) if len(spans) else 0.0,
         findings=limit_findings(robot, time, q, qd, tau),
     )
+
+
+SHOWN_AS_ZERO = 64.0 * float(np.finfo(np.float64).eps)
+"""Share of the largest joint's value below which a value of another joint is rounding."""
+_COMPARED = (
+    ("position_min", "position_max"),
+    ("position_margin",),
+    ("speed_peak",),
+    ("acceleration_peak",),
+    ("torque_peak", "torque_rms"),
+    ("motor_torque_peak", "motor_torque_rms"),
+    ("motor_speed_peak",),
+    ("power_peak",),
+    ("work_done", "work_taken"),
+)
+"""Quantities of joints that are computed from those of all joints alike."""
+
+
+def shown_summary(summary: MotionSummary) -> MotionSummary:
+    """The same summary as it is shown: 0 for what is a rounding error beside the same quantity of the joint,
+    of those with its unit, where it is largest.
+
+    The torque of a joint is a sum over forces that act on the whole arm: where they cancel, what is left has
+    the rounding errors of the largest.
+    """
+    joints: list[JointSummary] = []
+    for joint in summary.joints:
+        alike = [other for other in summary.joints if other.unit == joint.unit]
+        changes: dict[str, float] = {}
+        for names in _COMPARED:
+            sizes = [abs(getattr(other, name) or 0.0) for other in alike for name in names]
+            if names == ("position_margin",):  # the difference of a position and its limit
+                sizes += [abs(end) for other in alike for end in other.position_limits or ()]
+            for name in names:
+                value: float | None = getattr(joint, name)
+                if value is not None and abs(value) <= SHOWN_AS_ZERO * max(sizes):
+                    changes[name] = 0.0
+        joints.append(dataclasses.replace(joint, **changes))
+    return dataclasses.replace(summary, joints=tuple(joints))
 
 
 def limit_findings(

@@ -17,6 +17,7 @@ from armblocks.analysis.frequency import (
     gain_and_phase,
 )
 from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.shown_values import shown_margins
 from armblocks.report.axes import (
     BOTTOM,
     LEFT,
@@ -63,7 +64,7 @@ def bode_picture(
     The phase is continuous; for a sampled system up to the Nyquist frequency, which is marked.
     """
     low, high = frequency_range(system)
-    found = system.margins() if margins else None
+    found = shown_margins(system) if margins else None
     if found is not None:
         marked = [w for w in (found.gain_frequency, found.phase_frequency) if 0.0 < w < math.inf]
         low = min([low, *(w / 3.0 for w in marked)])
@@ -203,7 +204,7 @@ def nyquist_picture(system: LinearSystem, *, width: float = 620.0) -> Picture:
     x, y = _plane_range(every)
     x, y = equal_box(x, y, box)
     field = straight_field(x, y, box)
-    found = system.margins() if system.is_siso else None
+    found = shown_margins(system) if system.is_siso else None
     names = [name for name, _ in lines]
     picture = Picture(
         width=width,

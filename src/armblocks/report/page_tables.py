@@ -104,7 +104,7 @@ def tool_table(summary: MotionSummary) -> str:
 
 
 def _fixed(value: float) -> str:
-    return f"{value:.6f}".replace("-", MINUS)
+    return f"{round(value, 6) + 0.0:.6f}".replace("-", MINUS)
 
 
 def html_table(

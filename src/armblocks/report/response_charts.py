@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.shown_values import shown_measures
 from armblocks.analysis.time_response import StepMeasures, TimeResponse
 from armblocks.report.axes import BOTTOM, LEFT, RIGHT, TOP, Field, headed, straight_field, within
 from armblocks.report.frequency_charts import channels
@@ -29,7 +30,7 @@ def step_picture(
     response = system.step_response(stop_time)
     picture, field = _response_picture(response, "Step response", width)
     if system.is_siso:
-        measures = response.measures()
+        measures = shown_measures(response)
         picture.description += f" {measures_text(measures)}"
         picture.extend(_measure_marks(measures, field))
     return headed(picture, _names(system))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.analysis.root_locus import extent, root_locus
+from armblocks.analysis.shown_values import shown_poles, shown_zeros
 from armblocks.report.axes import BOTTOM, LEFT, RIGHT, TOP, Field, equal_box, straight_field, within
 from armblocks.report.numbers import axis_number
 from armblocks.report.picture import Disc, Mark, Picture, Polyline, Text
@@ -23,7 +24,7 @@ _DAMPINGS = (0.2, 0.4, 0.6, 0.8)
 
 def pole_zero_picture(system: LinearSystem, *, width: float = 560.0) -> Picture:
     """Poles as crosses, zeros as rings, over lines of equal damping and equal frequency."""
-    poles, zeros = system.poles(), system.zeros()
+    poles, zeros = shown_poles(system), shown_zeros(system)
     field, box = _plane(np.concatenate([poles, zeros]), system, width)
     picture = _framed(system, field, box, width, "Poles and zeros")
     picture.description = f"{len(poles)} poles (crosses) and {len(zeros)} zeros (rings)."

@@ -1,0 +1,247 @@
+"""Poles, zeros, gains, margins and matrices as they are shown: rounding errors are shown as 0.
+
+A computed number near zero may be zero for all that the computation can tell. This module decides which ones
+are. What is computed and stored is not changed; text, tables and figures show what is returned here.
+
+An eigenvalue computed in floating point is an exact eigenvalue of a matrix ``A + E``, ``|E| <= eta``, with
+``eta`` a small multiple of the unit roundoff times ``|A|`` (Golub and Van Loan, Matrix Computations, 4th ed.,
+7.5.6). The numbers that are so are the pseudospectrum of A: those ``mu`` with
+``sigma_min(A - mu I) <= eta`` (Trefethen and Embree, Spectra and Pseudospectra, 2005, ch. 2). A root is
+shown as 0, as real or as imaginary where the straight line from it to 0, to the real or to the imaginary axis
+stays inside the pseudospectrum: rounding alone can then move it there. This holds for multiple roots, too,
+whose rounding errors are as large as a root of ``eta``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.frequency import Margins, evaluate, on_the_edge
+from armblocks.analysis.modes import Mode, in_order, irreducible_parts, mode_of
+from armblocks.analysis.scaling import balanced
+from armblocks.analysis.zeros import zero_pencil
+
+if TYPE_CHECKING:
+    from armblocks.analysis.linear_system import LinearSystem
+    from armblocks.analysis.time_response import StepMeasures, TimeResponse
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+ROUNDOFFS = 10.0
+"""Rounding errors that every one of n rows may contribute, in units of the roundoff."""
+EPSILON = float(np.finfo(np.float64).eps)
+SHARES = (1.0, 0.75, 0.5, 0.25)
+"""Places on the line from a root to its candidate at which the pseudospectrum is checked."""
+FAR = 100.0
+"""Candidates farther from a root than this many times its first-order error are not checked."""
+
+
+class _Pencil:
+    """The roots of ``det(M - s N)`` and how sure they are."""
+
+    def __init__(self, M: Array, N: Array, tolerance: float) -> None:
+        from scipy.linalg import eig
+
+        self.M, self.N, self.tolerance = M, N, tolerance
+        self.known, left, right = eig(M, N, left=True, right=True)
+        cosines = np.abs(np.einsum("ik,ij,jk->k", left.conj(), N, right))
+        lengths = np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
+        with np.errstate(divide="ignore"):
+            self.reaches = FAR * tolerance * lengths / cosines
+
+    def shown(self, root: complex, candidates: Sequence[complex]) -> complex:
+        """The first candidate that cannot be told from the root, else the root."""
+        reach = float(self.reaches[int(np.argmin(np.abs(self.known - root)))])
+        for candidate in candidates:
+            if candidate == root or (
+                abs(candidate - root) <= reach
+                and all(self._holds(root + share * (candidate - root)) for share in SHARES)
+            ):
+                return candidate
+        return root
+
+    def _holds(self, place: complex) -> bool:
+        """Whether rounding alone makes this number a root."""
+        sizes = np.linalg.svd(self.M - place * self.N, compute_uv=False)
+        return bool(sizes[-1] <= self.tolerance)
+
+
+def _candidates(root: complex, discrete: bool) -> tuple[complex, ...]:
+    real = complex(root.real, 0.0)
+    if not discrete:
+        return 0j, real, complex(0.0, root.imag)
+    on_circle = (root / abs(root),) if root else ()
+    return 0j, 1 + 0j, real, *on_circle
+
+
+def shown_poles(system: LinearSystem) -> Complex:
+    """:meth:`LinearSystem.poles` (nx,), without rounding errors about 0, 1, the axes and the unit circle."""
+    from scipy.linalg import eigvals
+
+    shown: list[complex] = []
+    for part in irreducible_parts(system.A):
+        block = system.A[np.ix_(part, part)]
+        if len(part) == 1:
+            shown.append(complex(block[0, 0]))  # exact
+            continue
+        nothing = np.empty((0, len(part)))
+        matrix, _, _ = balanced(block, nothing.T, nothing)
+        unit = float(np.linalg.norm(matrix))
+        pencil = _Pencil(matrix, np.eye(len(part)), ROUNDOFFS * len(part) * EPSILON * unit)
+        roots = eigvals(block).tolist()
+        shown += [pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]
+    return in_order(np.array(shown, dtype=np.complex128), discrete=system.is_discrete)
+
+
+def shown_zeros(system: LinearSystem) -> Complex:
+    """:meth:`LinearSystem.zeros`; likewise."""
+    found = zero_pencil(system.A, system.B, system.C, system.D)
+    if found is None:
+        return np.empty(0, dtype=np.complex128)
+    pencil = _Pencil(*found)
+    roots = system.zeros().tolist()
+    return in_order(np.array([pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]))
+
+
+def shown_modes(system: LinearSystem) -> tuple[Mode, ...]:
+    """:meth:`LinearSystem.damp` of the poles that are shown."""
+    found: list[Mode] = []
+    for pole in shown_poles(system).tolist():
+        mode = mode_of(complex(pole), system.dt)
+        if system.is_discrete and on_edge(pole, discrete=True):
+            # On the unit circle nothing decays; log(|z|) would say so only but for rounding.
+            mode = dataclasses.replace(mode, damping=0.0 if mode.frequency else 1.0, time_constant=math.inf)
+        found.append(mode)
+    return tuple(found)
+
+
+def on_edge(pole: complex, *, discrete: bool) -> bool:
+    """Whether a pole that is shown lies on the imaginary axis, or on the unit circle."""
+    return abs(abs(pole) - 1.0) <= 2.0 * EPSILON if discrete else pole.real == 0.0
+
+
+def growth(system: LinearSystem) -> float:
+    """Of the poles that are shown the largest real part, or ``|z| - 1``: 0 on the edge of stability, ``-inf``
+    without poles."""
+    discrete = system.is_discrete
+    rates = [
+        0.0 if on_edge(pole, discrete=discrete) else (abs(pole) - 1.0 if discrete else pole.real)
+        for pole in shown_poles(system).tolist()
+    ]
+    return max(rates, default=-math.inf)
+
+
+def _response_errors(system: LinearSystem, place: complex) -> tuple[float, float]:
+    """Of a system with one input and one output: bound of the rounding error of its response at a complex
+    number, and the magnitude of the derivative of the response there."""
+    n = system.order
+    direct = abs(float(system.D[0, 0]))
+    if not n:
+        return EPSILON * direct, 0.0
+    a, b, c = balanced(system.A, system.B, system.C)
+    matrix = place * np.eye(n) - a
+    try:
+        right, left = np.linalg.solve(matrix, b)[:, 0], np.linalg.solve(matrix.T, c[0])
+    except np.linalg.LinAlgError:
+        return math.inf, math.inf
+    v, w = float(np.linalg.norm(left)), float(np.linalg.norm(right))
+    size = v * w * float(np.linalg.norm(matrix)) + v * float(np.linalg.norm(b)) + w * float(np.linalg.norm(c))
+    return ROUNDOFFS * n * EPSILON * (size + direct), abs(complex(left @ right))
+
+
+def shown_dcgain(system: LinearSystem) -> Array:
+    """:meth:`LinearSystem.dcgain` (ny, nu); 0 where it is 0 to the accuracy of the computation."""
+    gains = system.dcgain().copy()
+    place = 1.0 if system.is_discrete else 0.0
+    for row, column in np.argwhere(np.isfinite(gains) & (gains != 0.0)).tolist():
+        part = system.select([system.outputs[row]], [system.inputs[column]]).minimal()
+        if abs(gains[row, column]) <= _response_errors(part, place)[0]:
+            gains[row, column] = 0.0
+    return gains
+
+
+def shown_margins(system: LinearSystem) -> Margins:
+    """:meth:`LinearSystem.margins`; 0 dB, 0 deg, 0 s and a distance of 0 where the loop goes through -1 to
+    the accuracy of the computation."""
+    found = system.margins()
+    loop = system.minimal()
+
+    def accuracy(frequency: float) -> tuple[float, float]:
+        """Error of the response at a frequency that was sought, relative to the response; the response."""
+        if math.isinf(frequency):
+            return EPSILON, abs(float(loop.D[0, 0]))
+        place = complex(on_the_edge(loop, np.array([frequency]))[0])
+        value = abs(complex(evaluate(loop, np.array([place]))[0, 0, 0]))
+        error, derivative = _response_errors(loop, place)
+        # The frequency itself was found to this error of the response and to its own last bits.
+        return (2.0 * error + 4.0 * EPSILON * frequency * derivative) / max(value, 1e-300), value
+
+    gains = [(f, 1.0 if abs(k - 1.0) <= accuracy(f)[0] else k) for f, k in found.gain_crossings]
+    phases = [
+        (f, 0.0 if abs(angle) <= math.degrees(accuracy(f)[0]) else angle)
+        for f, angle in found.phase_crossings
+    ]
+    gain = min(gains, key=lambda pair: abs(math.log(pair[1])), default=(math.nan, math.inf))
+    phase = min(phases, key=lambda pair: abs(pair[1]), default=(math.nan, math.inf))
+    delays = [(f, math.radians(angle % 360.0) / f) for f, angle in phases]
+    delay = min(delays, key=lambda pair: pair[1], default=(math.nan, math.inf))
+    touching = found.modulus <= math.prod(accuracy(found.modulus_frequency))
+    return dataclasses.replace(
+        found,
+        gain=gain[1],
+        gain_frequency=gain[0],
+        phase=phase[1],
+        phase_frequency=phase[0],
+        delay=delay[1],
+        delay_frequency=delay[0],
+        modulus=0.0 if touching else found.modulus,
+        gain_crossings=tuple(gains),
+        phase_crossings=tuple(phases),
+    )
+
+
+def shown_measures(response: TimeResponse, output: int = 0, column: int = 0) -> StepMeasures:
+    """:meth:`TimeResponse.measures`; overshoot and undershoot are 0 where rounding alone makes them."""
+    found = response.measures(output, column)
+    system = response.system
+    if not found.final or not math.isfinite(found.final):
+        return found
+    # Every instant is a product with the same matrix, and the output a sum over the states.
+    terms = np.abs(response.states[:, :, column]) @ np.abs(system.C[output]) + abs(system.D[output, column])
+    errors = max(system.order, 1) * response.time.size * EPSILON * float(terms.max())
+    least = 100.0 * ROUNDOFFS * errors / abs(found.final)
+    return dataclasses.replace(
+        found,
+        overshoot=found.overshoot if found.overshoot > least else 0.0,
+        undershoot=found.undershoot if found.undershoot > least else 0.0,
+    )
+
+
+def shown_matrices(system: LinearSystem) -> tuple[Array, Array, Array, Array]:
+    """A, B, C and D; an entry is 0 where it is a rounding error beside the others of its row and its column.
+
+    States, inputs and outputs are compared in units in which all numbers are of one size: no choice of units
+    hides an entry.
+    """
+    n = system.order
+    a, b, c, d = system.A, system.B, system.C, system.D
+    for _ in range(2):
+        a, b, c = balanced(a, b, c)
+        size = float(np.linalg.norm(a)) or 1.0
+        lengths, heights = np.linalg.norm(b, axis=0), np.linalg.norm(c, axis=1, keepdims=True)
+        columns = size / np.where(lengths > 0.0, lengths, size)
+        rows = size / np.where(heights > 0.0, heights, size)
+        b, c, d = b * columns, c * rows, d * columns * rows / size
+    scaled = np.block([[a, b], [c, d]])
+    rows = np.linalg.norm(scaled, axis=1, keepdims=True)
+    columns = np.linalg.norm(scaled, axis=0, keepdims=True)
+    whole = np.block([[system.A, system.B], [system.C, system.D]])
+    shown = np.where(np.abs(scaled) <= EPSILON * np.minimum(rows, columns), 0.0, whole)
+    return shown[:n, :n], shown[:n, n:], shown[n:, :n], shown[n:, n:]
