@@ -14,9 +14,12 @@ from __future__ import annotations
 
 import sys
 
-from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Workspace
-from armblocks.compiler.ir_routine import Routine
-from armblocks.compiler.ir_text import Module, number_text
+from armblocks.compiler import system_functions
+from armblocks.compiler.integrator_workspace import Count, LoopSizes, Workspace
+from armblocks.compiler.integrator_workspace import Real as Number
+from armblocks.routines.arithmetic import fma, select
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals, RealVariable
 
 SAME_ABOVE = 1.0 + 2.0**-50
 MOST_PIECES = 256
@@ -27,368 +30,316 @@ NO_SLOPE = sys.float_info.max
 """Stands in the table for a slope that is not finite."""
 
 
-def emit_delay_lines(module: Module, workspace: Workspace, sizes: LoopSizes) -> None:
-    """Add the functions.
+class DelayLines:
+    """The functions of a program for the delayed signals of a system, and the table that they share.
 
-    ``void look_back(ptr t, ptr x, ptr reals, ptr counts, ptr p)`` writes the delayed values at ``t`` into
-    ``z``. ``void keep(ptr t, ptr x, ptr reals, ptr counts, ptr p, double middle)`` adds a row; ``void
-    keep_change`` of the same arguments adds one only if it differs from the last. ``i1 strays(ptr t, ptr x,
-    ptr reals, ptr counts, ptr p, double s, double factor)``, whether the quintic of the last three rows at
-    ``s`` (-1 to 1) is further from a signal at ``t`` than ``factor`` times the tolerances. ``void
-    arrive(double t, ptr reals, ptr counts)`` moves each line past the places that it has come to, and finds
-    the next one. ``double next_arrival(ptr reals, ptr counts)`` is when a line comes to one. ``i1
-    make_room(double t, ptr reals, ptr counts)`` forgets what no line can reach any more, and tells whether
-    there is room for another step.
+    All have ``reals`` and ``counts``, the arrays of the run; ``t``, ``x`` are a point whose unknowns are
+    solved.
     """
-    writer = _DelayLines(module, workspace, sizes)
-    for name in ("look_back", "keep", "keep_change", "strays", "arrive", "next_arrival", "make_room"):
-        module.define(name, getattr(writer, name))
 
-
-class _DelayLines:
-    def __init__(self, module: Module, workspace: Workspace, sizes: LoopSizes) -> None:
-        self.module = module
+    def __init__(self, program: Program, workspace: Workspace, sizes: LoopSizes) -> None:
         self.places = workspace
         self.lines = sizes.delays
         self.count = len(sizes.delays)
         self.first = int(Count.END) + len(sizes.clocks)
+        self.look_back = program.define(self._look_back, "look_back")
+        self.keep = program.define(self._keep, "keep")
+        self.keep_change = program.define(self._keep_change, "keep_change")
+        self.strays = program.define(self._strays, "strays")
+        self.arrive = program.define(self._arrive, "arrive")
+        self.next_arrival = program.define(self._next_arrival, "next_arrival")
+        self.make_room = program.define(self._make_room, "make_room")
 
-    # Places.
+    # The table.
 
-    def row(self, w: Routine, index: str, column: int | str = 0) -> str:
-        """Address of an entry of the table."""
-        start = w.word_op("mul", index, str(self.places.past_width))
-        return w.at("%reals", w.word_op("add", w.word_op("add", start, str(self.places.past)), str(column)))
+    def entry(self, row: Integer, column: Integer | int) -> Integer:
+        """Where an entry of the table lies in ``reals``."""
+        return row * self.places.past_width + self.places.past + column
 
-    def of_line(self, w: Routine, what: int, line: str) -> str:
-        """Address of a line's first row (0) or last row (1) that it looks at."""
-        return w.at("%counts", w.word_op("add", line, str(self.first + what * self.count)), "i64")
+    def time(self, reals: Reals, row: Integer) -> Real:
+        """The time of a row."""
+        return reals[self.entry(row, 0)]
 
-    def value(self, w: Routine, index: str, line: str) -> str:
-        return w.get(self.row(w, index, w.word_op("add", line, "2")))
+    def middle(self, reals: Reals, row: Integer) -> Real:
+        """Whether a row is the middle of a piece: 1, else 0."""
+        return reals[self.entry(row, 1)]
 
-    def slope(self, w: Routine, index: str, line: str) -> str:
-        return w.get(self.row(w, index, w.word_op("add", line, str(2 + self.count))))
+    def value(self, reals: Reals, row: Integer, line: Integer | int) -> Real:
+        """The signal of a line in a row."""
+        return reals[self.entry(row, line + 2)]
 
-    def rows(self, w: Routine) -> str:
-        return w.at("%counts", Count.PAST, "i64")
+    def slope(self, reals: Reals, row: Integer, line: Integer | int) -> Real:
+        """The derivative of the signal of a line in a row, by the time."""
+        return reals[self.entry(row, line + (2 + self.count))]
+
+    def first_rows(self, counts: Integers) -> Integers:
+        """The first row that each line looks at."""
+        return counts.after(self.first)
+
+    def last_rows(self, counts: Integers) -> Integers:
+        """The last row that each line looks at: a place where its signal jumps; -1 for the newest row."""
+        return counts.after(self.first + self.count)
 
     # Looking back.
 
-    def look_back(self) -> str:
-        w, places = Routine(self.module), self.places
+    def _look_back(self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals) -> None:
+        """The delayed values at a point, into ``z``."""
+        places = self.places
+        z, unknowns, taus = (reals.after(place) for place in (places.z, places.trial_w, places.taus))
         if not all(line.fixed for line in self.lines):
-            z, unknowns, tau = (w.at("%reals", place) for place in (places.z, places.trial_w, places.taus))
-            w.do(f"call void @delay_times(ptr %t, ptr %x, ptr {z}, ptr {unknowns}, ptr %p, ptr {tau})")
-        t = w.get("%t")
+            r.call(system_functions.delay_times, t, x, z, unknowns, p, taus)
+        now = t[0]
         for k, line in enumerate(self.lines):
-            instant = w.subtract(t, w.get(w.at("%reals", places.taus + k)))
-            value, slope = self.at_instant(w, instant, str(k))
-            w.put(value, w.at("%reals", places.z + line.value))
-            w.put(slope, w.at("%reals", places.z + line.slope))
-        w.do("ret void")
-        return w.text("define internal void @look_back(ptr %t, ptr %x, ptr %reals, ptr %counts, ptr %p)")
+            instant = now - taus[k]
+            value, slope = self.at_instant(r, reals, counts, instant, k)
+            z[line.value] = value
+            z[line.slope] = slope
 
-    def at_instant(self, w: Routine, instant: str, line: str) -> tuple[str, str]:
+    def at_instant(
+        self, r: Routine, reals: Reals, counts: Integers, instant: Real, line: int
+    ) -> tuple[Real, Real]:
         """Value and slope of a line's signal at an instant of the past."""
-        first = w.get(self.of_line(w, 0, line), "i64")
-        last = w.get(self.of_line(w, 1, line), "i64")
-        newest = w.word_op("sub", w.get(self.rows(w), "i64"), "1")
+        first, last = self.first_rows(counts)[line], self.last_rows(counts)[line]
+        newest = counts[Count.PAST] - 1
         # A middle whose end is still to come is no place to look from.
-        loose = w.let(f"fptosi double {w.get(self.row(w, newest, 1))} to i64")
-        newest = w.word_op("sub", newest, loose)
-        last = w.let(f"select i1 {w.word_test('slt', last, '0')}, i64 {newest}, i64 {last}")
-        low, high = w.variable("i64", "0"), w.variable("i64", "0")
-        w.put(first, low, "i64")
-        w.put(last, high, "i64")
-        turn, half, later, sooner, found = (
-            w.fresh(stem) for stem in ("turn", "half", "later", "sooner", "found")
-        )
+        newest = newest - self.middle(reals, newest).to_integer()
+        last = select(last < 0, newest, last)
         # The last row not after the instant, by bisection; the first one if there is none.
-        w.place(turn)
-        a, b = w.get(low, "i64"), w.get(high, "i64")
-        w.branch(w.word_test("slt", a, b), half, found)
-        w.place(half)
-        middle = w.word_op("sub", b, w.word_op("sdiv", w.word_op("sub", b, a), "2"))
-        w.branch(w.compare("ole", w.get(self.row(w, middle)), instant), later, sooner)
-        w.place(later)
-        w.put(middle, low, "i64")
-        w.jump(turn)
-        w.place(sooner)
-        w.put(w.word_op("sub", middle, "1"), high, "i64")
-        w.jump(turn)
-        w.place(found)
-        value, slope = w.variable("double", number_text(0.0)), w.variable("double", number_text(0.0))
-        i = w.get(low, "i64")
-        beyond, between, done = w.fresh("beyond"), w.fresh("between"), w.fresh("done")
-        before = w.compare("olt", instant, w.get(self.row(w, i)))
-        w.branch(w.either(before, w.word_test("sge", i, last)), beyond, between)
-        w.place(beyond)
-        # A rounding error past the last row, or before anything was: straight on.
-        past = w.subtract(instant, w.get(self.row(w, i)))
-        known = self.slope(w, i, line)
-        known = w.select(self.is_slope(w, known), known, number_text(0.0))
-        w.put(w.fma(known, past, self.value(w, i, line)), value)
-        w.put(self.slope(w, i, line), slope)
-        w.jump(done)
-        w.place(between)
-        in_middle = w.let(f"fptosi double {w.get(self.row(w, i, 1))} to i64")
-        centre = w.word_op("sub", w.word_op("add", i, "1"), in_middle)
-        ends = w.word_op("sub", centre, "1"), w.word_op("add", centre, "1")
-        H = w.multiply(number_text(0.5), w.subtract(w.get(self.row(w, ends[1])), w.get(self.row(w, ends[0]))))
-        theta = w.divide(w.subtract(instant, w.get(self.row(w, centre))), H)
-        self.quintic(w, theta, H, line, (ends[0], centre, ends[1]), value, slope)
-        w.place(done)
-        return w.get(value), w.get(slope)
+        low, high = r.integer(first), r.integer(last)
+        with r.loop() as bisection:
+            a, b = low.value, high.value
+            bisection.leave_unless(a < b)
+            half = b - (b - a) // 2
+            with r.when(self.time(reals, half) <= instant):
+                low.value = half
+            with r.otherwise():
+                high.value = half - 1
+        value, slope = r.real(0.0), r.real(0.0)
+        i = low.value
+        before = instant < self.time(reals, i)
+        with r.when(before | (i >= last)):
+            # A rounding error past the last row, or before anything was: straight on.
+            past = instant - self.time(reals, i)
+            known = self.slope(reals, i, line)
+            known = select(is_slope(known), known, 0.0)
+            value.value = fma(known, past, self.value(reals, i, line))
+            slope.value = self.slope(reals, i, line)
+        with r.otherwise():
+            centre = i + 1 - self.middle(reals, i).to_integer()
+            rows = centre - 1, centre, centre + 1
+            H = 0.5 * (self.time(reals, rows[2]) - self.time(reals, rows[0]))
+            theta = (instant - self.time(reals, centre)) / H
+            self.quintic(reals, theta, H, line, rows, value, slope)
+        return value.value, slope.value
 
     def quintic(
-        self, w: Routine, s: str, H: str, line: str, rows: tuple[str, str, str], value: str, slope: str
+        self,
+        reals: Reals,
+        s: Real,
+        H: Real,
+        line: Integer | int,
+        rows: tuple[Integer, Integer, Integer],
+        value: RealVariable,
+        slope: RealVariable,
     ) -> None:
         """Hermite's quintic through values and slopes at -1, 0 and 1, at ``s``; its own slope too."""
-        minus = w.multiply(number_text(-1.0), s)
-        square = w.multiply(s, s)
-        rest = w.subtract(number_text(1.0), square)
+        minus = -1.0 * s
+        square = s * s
+        rest = 1.0 - square
         # Over the differences from the middle: a constant is then itself, to the bit.
-        centre = self.value(w, rows[1], line)
-        values = [w.subtract(self.value(w, row, line), centre) for row in rows]
-        bases = (
-            self.end_basis(w, minus, -1.0),
-            self.middle_basis(w, s, square, rest),
-            self.end_basis(w, s, 1.0),
-        )
-        total, rate = number_text(0.0), number_text(0.0)
+        centre = self.value(reals, rows[1], line)
+        values = [self.value(reals, row, line) - centre for row in rows]
+        bases = end_basis(minus, -1.0), middle_basis(s, square, rest), end_basis(s, 1.0)
+        total: Real | float = 0.0
+        rate: Real | float = 0.0
         for place, (row, u, parts) in enumerate(zip(rows, values, bases)):
             of_value, of_slope, rate_of_value, rate_of_slope = parts
-            known = self.slope(w, row, line)
-            of_parabola = self.parabola_slope(w, values[0], values[2], place)
-            du = w.select(self.is_slope(w, known), w.multiply(H, known), of_parabola)
-            total = w.fma(of_value, u, w.fma(of_slope, du, total))
-            rate = w.fma(rate_of_value, u, w.fma(rate_of_slope, du, rate))
-        w.put(w.add(centre, total), value)
-        w.put(w.divide(rate, H), slope)
-
-    @staticmethod
-    def is_slope(w: Routine, slope: str) -> str:
-        """Whether an entry of the table is a slope, and not ``NO_SLOPE``."""
-        return w.compare("olt", w.absolute(slope), number_text(NO_SLOPE))
-
-    @staticmethod
-    def parabola_slope(w: Routine, before: str, after: str, place: int) -> str:
-        """Slope at -1, 0 or 1 (``place`` 0, 1, 2) of the parabola with values at -1 and 1, and 0 at 0."""
-        of_before, of_after = ((-1.5, -0.5), (-0.5, 0.5), (0.5, 1.5))[place]
-        return w.fma(number_text(of_before), before, w.multiply(number_text(of_after), after))
-
-    @staticmethod
-    def middle_basis(w: Routine, s: str, square: str, rest: str) -> tuple[str, str, str, str]:
-        """(1 - s^2)^2, s (1 - s^2)^2 and their derivatives."""
-        of_value = w.multiply(rest, rest)
-        rate_of_value = w.multiply(w.multiply(number_text(-4.0), s), rest)
-        five = w.fma(number_text(-5.0), square, number_text(1.0))
-        return of_value, w.multiply(s, of_value), rate_of_value, w.multiply(rest, five)
-
-    @staticmethod
-    def end_basis(w: Routine, s: str, side: float) -> tuple[str, str, str, str]:
-        """s^2 (1 + s)^2 (4 - 3 s) / 4, s^2 (1 + s)^2 (s - 1) / 4 and their derivatives; or mirrored."""
-        up = w.add(number_text(1.0), s)
-        common = w.multiply(w.multiply(number_text(0.25), s), up)
-        outer = w.multiply(common, w.multiply(s, up))
-        of_value = w.multiply(outer, w.fma(number_text(-3.0), s, number_text(4.0)))
-        of_slope = w.multiply(outer, w.subtract(s, number_text(1.0)))
-        down = w.subtract(number_text(1.0), s)
-        rate_of_value = w.multiply(common, w.multiply(down, w.fma(number_text(15.0), s, number_text(8.0))))
-        inner = w.fma(w.fma(number_text(5.0), s, number_text(-1.0)), s, number_text(-2.0))
-        rate_of_slope = w.multiply(common, inner)
-        sign = number_text(side)
-        return of_value, w.multiply(sign, of_slope), w.multiply(sign, rate_of_value), rate_of_slope
+            known = self.slope(reals, row, line)
+            of_parabola = parabola_slope(values[0], values[2], place)
+            du = select(is_slope(known), H * known, of_parabola)
+            total = fma(of_value, u, fma(of_slope, du, total))
+            rate = fma(rate_of_value, u, fma(rate_of_slope, du, rate))
+        value.value = centre + total
+        slope.value = rate / H
 
     # Keeping.
 
-    def fill(self, w: Routine, middle: str) -> str:
+    def fill(
+        self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real | float
+    ) -> Integer:
         """Write the row after the last one, without counting it; its number."""
-        places = self.places
-        rows = w.get(self.rows(w), "i64")
-        z, unknowns = (w.at("%reals", place) for place in (places.z, places.trial_w))
-        w.put(w.get("%t"), self.row(w, rows))
-        w.put(middle, self.row(w, rows, 1))
-        target = self.row(w, rows, 2)
-        w.do(f"call void @delay_inputs(ptr %t, ptr %x, ptr {z}, ptr {unknowns}, ptr %p, ptr {target})")
-
-        def hold(line: str) -> None:
-            place = self.row(w, rows, w.word_op("add", line, str(2 + self.count)))
-            slope = w.get(place)
-            w.put(w.select(self.is_slope(w, slope), slope, number_text(NO_SLOPE)), place)
-
-        w.for_each(self.count, hold)
+        rows = counts[Count.PAST]
+        z, unknowns = (reals.after(place) for place in (self.places.z, self.places.trial_w))
+        reals[self.entry(rows, 0)] = t[0]
+        reals[self.entry(rows, 1)] = middle
+        values, slopes = (reals.after(self.entry(rows, first)) for first in (2, 2 + self.count))
+        r.call(system_functions.delay_inputs, t, x, z, unknowns, p, values, slopes)
+        for k in r.each(self.count):
+            slope = slopes[k]
+            slopes[k] = select(is_slope(slope), slope, NO_SLOPE)
         return rows
 
-    def keep(self) -> str:
-        w = Routine(self.module)
-        self.fill(w, "%middle")
-        w.increase(self.rows(w))
-        w.do("ret void")
-        return w.text(
-            "define internal void @keep(ptr %t, ptr %x, ptr %reals, ptr %counts, ptr %p, double %middle)"
-        )
+    def _keep(
+        self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
+    ) -> None:
+        """Add a row for a point, which is the ``middle`` of a piece (1) or not (0)."""
+        self.fill(r, t, x, reals, counts, p, middle)
+        counts[Count.PAST] = counts[Count.PAST] + 1
 
-    def keep_change(self) -> str:
-        w = Routine(self.module)
-        rows = self.fill(w, "%middle")
-        before = w.word_op("sub", rows, "1")
-        same = w.variable("double", number_text(1.0))
-        w.put(number_text(1.0), same)
+    def _keep_change(
+        self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
+    ) -> None:
+        """Add a row for a point only if it differs from the last one."""
+        rows = self.fill(r, t, x, reals, counts, p, middle)
+        before = rows - 1
+        same = r.real(1.0)
+        for column in r.each(2 * self.count):
+            place = column + 2
+            old, new = reals[self.entry(before, place)], reals[self.entry(rows, place)]
+            same.value = select(old == new, same.value, 0.0)
+        with r.when(same.value == 0.0):
+            # What comes after stands at the very time of what was before.
+            reals[self.entry(rows, 0)] = self.time(reals, before)
+            counts[Count.PAST] = counts[Count.PAST] + 1
 
-        def compare(column: str) -> None:
-            place = w.word_op("add", column, "2")
-            old, new = (w.get(self.row(w, row, place)) for row in (before, rows))
-            w.put(w.select(w.compare("oeq", old, new), w.get(same), number_text(0.0)), same)
-
-        w.for_each(2 * self.count, compare)
-        change, on = w.fresh("change"), w.fresh("on")
-        w.branch(w.compare("oeq", w.get(same), number_text(0.0)), change, on)
-        w.place(change)
-        # What comes after stands at the very time of what was before.
-        w.put(w.get(self.row(w, before)), self.row(w, rows))
-        w.increase(self.rows(w))
-        w.place(on)
-        w.do("ret void")
-        pointers = "ptr %t, ptr %x, ptr %reals, ptr %counts, ptr %p"
-        return w.text(f"define internal void @keep_change({pointers}, double %middle)")
-
-    def strays(self) -> str:
-        w = Routine(self.module)
-        rows = self.fill(w, number_text(0.0))
-        start, centre, end = (w.word_op("sub", rows, str(back)) for back in (3, 2, 1))
-        H = w.multiply(number_text(0.5), w.subtract(w.get(self.row(w, end)), w.get(self.row(w, start))))
-        rtol, atol = (w.get(w.at("%reals", place)) for place in (Real.RTOL, Real.ATOL))
-        value, slope = w.variable("double", number_text(0.0)), w.variable("double", number_text(0.0))
-        found = w.variable("i1", "false")
-
-        def compare(line: str) -> None:
-            self.quintic(w, "%s", H, line, (start, centre, end), value, slope)
-            exact = self.value(w, rows, line)
-            off = w.absolute(w.subtract(w.get(value), exact))
-            tolerance = w.multiply("%factor", w.fma(w.absolute(exact), rtol, atol))
-            beyond = w.compare("ogt", off, tolerance)
-            w.put(w.either(w.get(found, "i1"), beyond), found, "i1")
-
-        w.for_each(self.count, compare)
-        w.do(f"ret i1 {w.get(found, 'i1')}")
-        arguments = "ptr %t, ptr %x, ptr %reals, ptr %counts, ptr %p, double %s, double %factor"
-        return w.text(f"define internal i1 @strays({arguments})")
+    def _strays(
+        self,
+        r: Routine,
+        t: Reals,
+        x: Reals,
+        reals: Reals,
+        counts: Integers,
+        p: Reals,
+        s: Real,
+        factor: Real,
+    ) -> Boolean:
+        """Whether the quintic of the last three rows at ``s`` (-1 to 1) is further from a signal at the point
+        than ``factor`` times the tolerances."""
+        rows = self.fill(r, t, x, reals, counts, p, 0.0)
+        start, centre, end = (rows - back for back in (3, 2, 1))
+        H = 0.5 * (self.time(reals, end) - self.time(reals, start))
+        rtol, atol = (reals[place] for place in (Number.RTOL, Number.ATOL))
+        value, slope = r.real(0.0), r.real(0.0)
+        found = r.boolean(False)
+        for line in r.each(self.count):
+            self.quintic(reals, s, H, line, (start, centre, end), value, slope)
+            exact = self.value(reals, rows, line)
+            off = abs(value.value - exact)
+            tolerance = factor * fma(abs(exact), rtol, atol)
+            beyond = off > tolerance
+            found.value = found.value | beyond
+        return found.value
 
     # Places where a signal jumps.
 
-    def arrive(self) -> str:
-        w, places = Routine(self.module), self.places
-        until = w.multiply("%now", number_text(SAME_ABOVE))
+    def _arrive(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> None:
+        """Move each line past the places that it has come to, and find the next one."""
+        until = now * SAME_ABOVE
+        first_rows, last_rows = self.first_rows(counts), self.last_rows(counts)
         for k, line in enumerate(self.lines):
             if not line.fixed:
                 continue
-            first, last = self.of_line(w, 0, str(k)), self.of_line(w, 1, str(k))
-            turn, known, passed, seek, look, next_row, mark, done = (
-                w.fresh(stem) for stem in ("turn", "known", "passed", "seek", "look", "next", "mark", "done")
-            )
-            i = w.variable("i64", "0")
-            w.place(turn)
-            w.branch(w.word_test("sge", w.get(last, "i64"), "0"), known, seek)
-            w.place(known)
-            tau = w.get(w.at("%reals", places.taus + k))
-            arrival = w.add(w.get(self.row(w, w.get(last, "i64"))), tau)
-            w.branch(w.compare("ole", arrival, until), passed, done)
-            w.place(passed)
-            w.put(w.word_op("add", w.get(last, "i64"), "1"), first, "i64")
-            w.place(seek)
-            w.put("-1", last, "i64")
-            w.put(w.get(first, "i64"), i, "i64")
-            w.place(look)
-            here = w.get(i, "i64")
-            after = w.word_op("add", here, "1")
-            w.branch(w.word_test("slt", after, w.get(self.rows(w), "i64")), next_row, done)
-            w.place(next_row)
-            w.put(after, i, "i64")
-            together = w.compare("oeq", w.get(self.row(w, here)), w.get(self.row(w, after)))
-            jumps = w.compare("une", self.value(w, here, str(k)), self.value(w, after, str(k)))
-            bends = w.compare("une", self.slope(w, here, str(k)), self.slope(w, after, str(k)))
-            w.branch(w.both(together, w.either(jumps, bends)), mark, look)
-            w.place(mark)
-            w.put(here, last, "i64")
-            w.jump(turn)
-            w.place(done)
-        w.do("ret void")
-        return w.text("define internal void @arrive(double %now, ptr %reals, ptr %counts)")
+            i = r.integer(0)
+            with r.part() as search, r.loop():
+                with r.when(last_rows[k] >= 0):
+                    tau = reals[self.places.taus + k]
+                    search.leave_unless(self.time(reals, last_rows[k]) + tau <= until)
+                    first_rows[k] = last_rows[k] + 1
+                last_rows[k] = -1
+                i.value = first_rows[k]
+                with r.part() as rows:
+                    here = i.value
+                    after = here + 1
+                    search.leave_unless(after < counts[Count.PAST])
+                    i.value = after
+                    together = self.time(reals, here) == self.time(reals, after)
+                    jumps = self.value(reals, here, k) != self.value(reals, after, k)
+                    bends = self.slope(reals, here, k) != self.slope(reals, after, k)
+                    with r.unless(together & (jumps | bends)):
+                        rows.again()
+                last_rows[k] = here
 
-    def next_arrival(self) -> str:
-        w, places = Routine(self.module), self.places
-        soonest = number_text(float("inf"))
+    def _next_arrival(self, r: Routine, reals: Reals, counts: Integers) -> Real:
+        """When a line comes to such a place; infinite if none is known."""
+        soonest = r.constant(float("inf"))
         for k, line in enumerate(self.lines):
             if not line.fixed:
                 continue
-            last = w.get(self.of_line(w, 1, str(k)), "i64")
-            known = w.word_test("sge", last, "0")
-            row = w.let(f"select i1 {known}, i64 {last}, i64 0")
-            arrival = w.add(w.get(self.row(w, row)), w.get(w.at("%reals", places.taus + k)))
-            soonest = w.select(w.both(known, w.compare("olt", arrival, soonest)), arrival, soonest)
-        w.do(f"ret double {soonest}")
-        return w.text("define internal double @next_arrival(ptr %reals, ptr %counts)")
+            last = self.last_rows(counts)[k]
+            known = last >= 0
+            row = select(known, last, 0)
+            arrival = self.time(reals, row) + reals[self.places.taus + k]
+            soonest = select(known & (arrival < soonest), arrival, soonest)
+        return soonest
 
     # Room.
 
-    def make_room(self) -> str:
-        w, places = Routine(self.module), self.places
-        capacity = w.get(w.at("%counts", Count.PAST_ROOM, "i64"), "i64")
-        crowded, roomy, look, older, forget, move, moved = (
-            w.fresh(stem) for stem in ("crowded", "roomy", "look", "older", "forget", "move", "moved")
-        )
-        needed = w.word_op("add", w.get(self.rows(w), "i64"), str(ROWS_OF_A_STEP))
-        w.branch(w.word_test("sle", needed, capacity), roomy, crowded)
-        w.place(crowded)
-        oldest = w.subtract("%now", w.get(w.at("%reals", places.longest)))
+    def _make_room(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
+        """Forget what no line can reach any more; whether there is room for another step."""
+        places = self.places
+        capacity = counts[Count.PAST_ROOM]
+        needed = counts[Count.PAST] + ROWS_OF_A_STEP
+        with r.when(needed <= capacity):
+            r.return_(r.truth(True))
+        oldest = now - reals[places.longest]
         # The first row that must stay: an end of a step, the last one before all that can be looked at.
-        keep, i = w.variable("i64", "0"), w.variable("i64", "0")
-        w.put("0", keep, "i64")
-        w.put("0", i, "i64")
-        w.place(look)
-        here = w.get(i, "i64")
-        inside = w.word_test("slt", here, w.get(self.rows(w), "i64"))
-        safe = w.let(f"select i1 {inside}, i64 {here}, i64 0")
-        old = w.compare("olt", w.get(self.row(w, safe)), oldest)
-        w.branch(w.both(inside, old), older, forget)
-        w.place(older)
-        at_end = w.compare("oeq", w.get(self.row(w, safe, 1)), number_text(0.0))
-        w.put(w.let(f"select i1 {at_end}, i64 {here}, i64 {w.get(keep, 'i64')}"), keep, "i64")
-        w.increase(i)
-        w.jump(look)
-        w.place(forget)
-        gone = w.get(keep, "i64")
-        left = w.word_op("sub", w.get(self.rows(w), "i64"), gone)
-        w.put(left, self.rows(w), "i64")
-        total = w.word_op("mul", left, str(places.past_width))
-        shift = w.word_op("mul", gone, str(places.past_width))
-        n = w.variable("i64", "0")
-        w.put("0", n, "i64")
-        w.place(move)
-        at = w.get(n, "i64")
-        step = w.fresh("shift")
-        w.branch(w.word_test("slt", at, total), step, moved)
-        w.place(step)
-        target = w.word_op("add", at, str(places.past))
-        w.put(w.get(w.at("%reals", w.word_op("add", target, shift))), w.at("%reals", target))
-        w.increase(n)
-        w.jump(move)
-        w.place(moved)
+        keep, i = r.integer(0), r.integer(0)
+        with r.loop() as search:
+            here = i.value
+            inside = here < counts[Count.PAST]
+            safe = select(inside, here, 0)
+            old = self.time(reals, safe) < oldest
+            search.leave_unless(inside & old)
+            at_end = self.middle(reals, safe) == 0.0
+            keep.value = select(at_end, here, keep.value)
+            i.value = i.value + 1
+        gone = keep.value
+        left = counts[Count.PAST] - gone
+        counts[Count.PAST] = left
+        total, shift = left * places.past_width, gone * places.past_width
+        for n in r.range(0, total):
+            target = n + places.past
+            reals[target] = reals[target + shift]
         for k in range(self.count):
-            for what in (0, 1):
-                place = self.of_line(w, what, str(k))
-                number = w.get(place, "i64")
-                shifted = w.word_op("sub", number, gone)
-                # The first row may be forgotten; where no last one is known, the number is -1.
-                least, kept = ("0", "0") if what == 0 else ("0", number)
-                known = w.word_test("sge", shifted, least)
-                w.put(w.let(f"select i1 {known}, i64 {shifted}, i64 {kept}"), place, "i64")
+            first, last = self.first_rows(counts), self.last_rows(counts)
+            # The first row may be forgotten; where no last one is known, the number is -1.
+            for rows, unknown in ((first, 0), (last, last[k])):
+                shifted = rows[k] - gone
+                rows[k] = select(shifted >= 0, shifted, unknown)
         # Twice the room where half of it is not free: else it would soon be full again.
-        enough = w.word_test("sle", w.word_op("mul", left, "2"), capacity)
-        fits = w.word_test("sle", w.word_op("add", left, str(ROWS_OF_A_STEP)), capacity)
-        w.do(f"ret i1 {w.both(enough, fits)}")
-        w.place(roomy)
-        w.do("ret i1 true")
-        return w.text("define internal i1 @make_room(double %now, ptr %reals, ptr %counts)")
+        enough = left * 2 <= capacity
+        fits = left + ROWS_OF_A_STEP <= capacity
+        return enough & fits
+
+
+def is_slope(slope: Real) -> Boolean:
+    """Whether an entry of the table is a slope, and not ``NO_SLOPE``."""
+    return abs(slope) < NO_SLOPE
+
+
+def parabola_slope(before: Real, after: Real, place: int) -> Real:
+    """Slope at -1, 0 or 1 (``place`` 0, 1, 2) of the parabola with values at -1 and 1, and 0 at 0."""
+    of_before, of_after = ((-1.5, -0.5), (-0.5, 0.5), (0.5, 1.5))[place]
+    return fma(of_before, before, of_after * after)
+
+
+def middle_basis(s: Real, square: Real, rest: Real) -> tuple[Real, Real, Real, Real]:
+    """(1 - s^2)^2, s (1 - s^2)^2 and their derivatives."""
+    of_value = rest * rest
+    rate_of_value = -4.0 * s * rest
+    five = fma(-5.0, square, 1.0)
+    return of_value, s * of_value, rate_of_value, rest * five
+
+
+def end_basis(s: Real, side: float) -> tuple[Real, Real, Real, Real]:
+    """s^2 (1 + s)^2 (4 - 3 s) / 4, s^2 (1 + s)^2 (s - 1) / 4 and their derivatives; or mirrored."""
+    up = 1.0 + s
+    common = 0.25 * s * up
+    outer = common * (s * up)
+    of_value = outer * fma(-3.0, s, 4.0)
+    of_slope = outer * (s - 1.0)
+    down = 1.0 - s
+    rate_of_value = common * (down * fma(15.0, s, 8.0))
+    inner = fma(fma(5.0, s, -1.0), s, -2.0)
+    rate_of_slope = common * inner
+    return of_value, side * of_slope, side * rate_of_value, rate_of_slope

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armblocks.compiler.delay_lines import emit_delay_lines
+from armblocks.compiler.delay_lines import DelayLines
 from armblocks.compiler.implicit_equations import define_solve
 from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Workspace
 from armblocks.compiler.ir_routine import Routine
@@ -36,7 +36,9 @@ def emit_functions(module: Module, workspace: Workspace, sizes: LoopSizes) -> No
         define_solve(program, workspace, sizes.algebraic)
         add_program(module, program)
     if sizes.delays:
-        emit_delay_lines(module, workspace, sizes)
+        program = Program()
+        DelayLines(program, workspace, sizes)
+        add_program(module, program)
     if sizes.directions:
         writer = _GuardFunctions(module, workspace, sizes.directions)
         module.define("watch", writer.watch)

@@ -185,11 +185,11 @@ class _FunctionText:
         self._ended = True
 
     def _part(self, statements: Sequence[Statement]) -> None:
-        for statement in statements:
+        for statement, following in zip(statements, [*statements[1:], None]):
             if not self._ended or isinstance(statement, Stage):  # what nothing leads to is left out
-                self._statement(statement)
+                self._statement(statement, following)
 
-    def _statement(self, statement: Statement) -> None:
+    def _statement(self, statement: Statement, following: Statement | None) -> None:
         match statement:
             case Jump(mark):
                 self._end(f"br label %{self._label(mark)}")
@@ -200,7 +200,7 @@ class _FunctionText:
             case Region():
                 self._region(statement)
             case When():
-                self._when(statement)
+                self._when(statement, following)
             case _:
                 self._plain(statement)
 
@@ -212,11 +212,12 @@ class _FunctionText:
         if region.end in used:
             self._place(self._label(region.end))
 
-    def _when(self, when: When) -> None:
-        """A part that only jumps is no block of its own: the branch goes there at once."""
+    def _when(self, when: When, following: Statement | None) -> None:
+        """Where a part, or what follows, only jumps, the branch goes there at once."""
         condition = self._operand(when.condition)
         places = [self._only_jump(when.yes), self._only_jump(when.no)]
-        after = self._fresh("after")
+        leads_on = isinstance(following, Jump)
+        after = self._label(following.mark) if isinstance(following, Jump) else self._fresh("after")
         parts: list[tuple[str, list[Statement]]] = []
         for k, (name, part) in enumerate((("when", when.yes), ("otherwise", when.no))):
             if not part:
@@ -232,7 +233,7 @@ class _FunctionText:
             if not self._ended:
                 joined = True
                 self._end(f"br label %{after}")
-        if joined:
+        if joined and not leads_on:
             self._place(after)
 
     def _only_jump(self, part: Sequence[Statement]) -> str:

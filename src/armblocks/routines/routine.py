@@ -191,6 +191,10 @@ class Routine(Writer):
         """A constant double, for where a Python number does not do."""
         return Real(self, real_operand(value))
 
+    def truth(self, value: bool) -> Boolean:
+        """A condition that always holds, or never."""
+        return Boolean(self, boolean_operand(value))
+
     def reals(self, symbol: str, numbers: Sequence[float]) -> Reals:
         """A table of constant doubles of the program."""
         return Reals(self, self.program.reals(symbol, numbers))
