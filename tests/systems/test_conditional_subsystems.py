@@ -29,6 +29,7 @@ from armblocks.blocks import (
     Sum,
     Switch,
     SwitchCase,
+    TransportDelay,
     TriggeredSubsystem,
     UnitDelay,
     ZeroOrderHold,
@@ -106,15 +107,18 @@ def test_outputs_go_back_where_that_is_asked_for(settings: dict[str, object]) ->
 
 
 @SETTINGS
-@pytest.mark.parametrize("sampled", [True, False], ids=["ticks", "breakpoints"])
+@pytest.mark.parametrize("kind", ["breakpoints", "ticks", "delays"])
 def test_an_output_that_is_switched_off_keeps_its_value_from_just_before(
-    sampled: bool, settings: dict[str, object]
+    kind: str, settings: dict[str, object]
 ) -> None:
     """Input and enable jump at the same instant: what is held is the value before the jump."""
 
     def jumping(builder: DiagramBuilder, name: str, first: float, last: float) -> BlockHandle:
-        step = builder.add(name, Step(time=1.0, initial=first, final=last))
-        return builder.add(f"{name} held", ZeroOrderHold(sample_time=0.5), step) if sampled else step
+        early = 0.3 if kind == "delays" else 0.0
+        step = builder.add(name, Step(time=1.0 - early, initial=first, final=last))
+        if kind == "delays":
+            return builder.add(f"{name} late", TransportDelay(delay=early, initial=first), step)
+        return builder.add(f"{name} held", ZeroOrderHold(sample_time=0.5), step) if kind == "ticks" else step
 
     diagram = around(
         EnabledSubsystem,

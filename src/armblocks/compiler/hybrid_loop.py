@@ -194,10 +194,10 @@ class HybridLoop(Loop):
         w = self.w
         time = w.get(self.kept[Real.TIME])
         until = w.multiply(time, number_text(SAME_ABOVE))
-        if self.delays:
-            w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         if self.sizes.captures:
             self.happenings.captures(time)
+        if self.delays:
+            w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         self.happenings.ticks(time, until)
         if self.guards:
             self.happenings.settle(time)
