@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.system import compile_system
+from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
-from armblocks.equations.sensitivity import sensitivity_name, sensitivity_system
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.equations import Signature
+from armblocks.equations.sensitivity import MIXED, sensitivity_name, sensitivity_system
+from armblocks.errors import InputError, SimulationError, UnknownNameError
 from armblocks.face.linearizing import described_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
 from armblocks.simulation import SimulationResult
@@ -28,14 +29,17 @@ Array = NDArray[np.float64]
 class SensitivityResult:
     """A run with the derivatives of some of its signals by some parameters.
 
-    ``result[output, parameter]`` is d output / d parameter, ``(N, *shape of the output)``, at ``time`` (N,)
-    s; an entry of a vector parameter is named ``pid.kp[0]``. ``run`` has all signals as well, and the
-    derivatives under ``"output by parameter"``.
+    ``result[output, parameter]`` is d output / d parameter at ``time`` (N,) s: ``(N, *shape of the output)``
+    for a parameter of one entry, else ``(N, *shape of the output, *shape of the parameter)``. One entry of a
+    parameter is named ``pid.kp[0]``. ``run`` has all signals as well, and the derivatives under
+    ``"output by parameter"``.
     """
 
     run: SimulationResult
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
+    slots: Signature = field(repr=False)
+    """The parameters with their shapes."""
 
     @property
     def time(self) -> Array:
@@ -44,9 +48,16 @@ class SensitivityResult:
 
     def __getitem__(self, key: tuple[str, str]) -> Array:
         output, parameter = key
-        if parameter not in self.parameters:
-            raise UnknownNameError("parameter", parameter, self.parameters, where=self.run.name)
-        return self.run[sensitivity_name(self.run.resolve(output), parameter)]
+        path = self.run.resolve(output)
+        for slot in self.slots:
+            if parameter == slot.name and slot.size > 1:
+                entries = [self.run[sensitivity_name(path, element)] for element in slot.elements]
+                stacked = np.stack(entries, axis=-1)
+                return stacked.reshape(*stacked.shape[:-1], *slot.shape)
+            if parameter == slot.name or parameter in slot.elements:
+                return self.run[sensitivity_name(path, parameter if slot.size > 1 else slot.name)]
+        known = [*self.parameters, *(element for slot in self.slots for element in slot.elements)]
+        raise UnknownNameError("parameter", parameter, dict.fromkeys(known), where=self.run.name)
 
     def __repr__(self) -> str:
         head = f"<SensitivityResult {self.run.name}: {self.time.size} instants>"
@@ -67,12 +78,14 @@ def sensitivity(
     Parameters of masks are among them, and what follows from them by formulas is moved with them.
 
     The traced equations are differentiated and integrated beside the equations themselves, natively, under
-    the same error control; ticks, implicit equations and the instants of events are accounted for.
+    the same error control. The instants of events, of jumps at known times and of the arrival of delayed
+    jumps are differentiated too, and so are implicit equations. An event at the start stays there.
     ``values``: other values of parameters; ``settings`` those of the run, as in :func:`simulate`.
 
-    Raises ``UnknownNameError`` for names; ``InputError`` for a parameter that says when a signal jumps or
-    is a table that is read by index, and where events and implicit equations come together;
-    ``SimulationError`` as a run does.
+    Raises ``UnknownNameError`` for names; ``InputError`` for a parameter that is a table that is read by
+    index, and where implicit equations come together with delays or with a parameter that says when a signal
+    jumps; ``SimulationError`` as a run does, and where events come together at one instant that a change of a
+    parameter would part: there is no derivative then.
     """
     described = described_diagram(diagram, values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
@@ -96,8 +109,25 @@ def sensitivity(
             raise UnknownNameError("signal", path, known, where=system.name)
     augmented = sensitivity_system(system, names, paths)
     options = dataclasses.replace(described.settings, **settings)
-    return SensitivityResult(
-        run=run_system(compile_system(augmented), options),
-        outputs=wanted,
-        parameters=tuple(element for name in names for element in system.parameters[name].elements),
-    )
+    compiled = compile_system(augmented)
+    run = run_system(compiled, options)
+    _check_instants(compiled, run)
+    slots = Signature(tuple(system.parameters[name] for name in dict.fromkeys(names)))
+    return SensitivityResult(run=run, outputs=wanted, parameters=names, slots=slots)
+
+
+def _check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
+    """Raise ``SimulationError`` where events came together at one instant that a parameter would part."""
+    place = compiled.discrete.ranges.get(MIXED)
+    if place is None or run.final_state is None:
+        return
+    time, guard = run.final_state.discrete[place]
+    if time >= 0.0:
+        raise SimulationError(
+            f"several events coincide at {time:.9g} s, one of '{compiled.guard_names[int(guard) - 1]}' among "
+            "them, and a change of a parameter would part them: there is no derivative",
+            where=compiled.name,
+            allowed="instants that stay together, or apart, when a parameter changes a little",
+            fix="move one of the events a little, or take the difference of two runs",
+            partial=run,
+        )

@@ -1,0 +1,220 @@
+"""Sensitivities of delayed signals, and the arrival of their jumps.
+
+For ``y(t) = u(t - d)`` the derivative by a parameter is ``y_p = u_p(t - d) - u'(t - d) d_p``: ``u_p`` is a
+delayed signal of its own. A jump of ``u`` at ``s`` arrives where ``t - d = s``, at an instant with the
+derivative ``(s_p + d_p) / (1 - d')``. Three more delayed signals tell of it: the count of jumps, ``s_p`` of
+the last jump, and the value of ``u`` before it. A guard fires where the delayed count changes. Where
+equations read the slope ``u'(t - d)`` too, ``u''`` and the slope before a jump are delayed likewise.
+
+Source: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, chapter 2.
+"""
+
+from __future__ import annotations
+
+from casadi import SX, Function, depends_on, fabs, fmax, if_else, logic_and, logic_or, vertcat, vertsplit
+
+from armblocks.equations.hybrid_system import Delays
+from armblocks.equations.sensitivity_layout import Columns
+from armblocks.equations.signatures import signature
+from armblocks.equations.traced_function import TracedFunction
+
+SAME_VALUE = 1e-11
+"""Beside its size, by how much a signal that does not jump may differ between the sides of an instant."""
+
+
+class DelayedSensitivities:
+    """The delayed scalars of a system, ``n`` of them, with their sensitivities; ``n`` = 0 without delays."""
+
+    def __init__(self, columns: Columns) -> None:
+        self.columns = columns
+        delays = columns.system.delays
+        self.n = 0 if delays is None else len(delays.values)
+        self.rate_along = SX.zeros(columns.z.numel())
+        """How z changes with the time, at the places of the delayed values."""
+        self.tau = columns.value(delays.times) if delays is not None else SX(0, 1)
+        self.tau_p = [self._along_parameter(self.tau, k) for k in range(len(columns.names))]
+        self.values = [] if delays is None else list(delays.values)
+        """The places of the delayed values in z."""
+        self.slopes = [] if delays is None else list(delays.slopes)
+        self.reads_slopes = delays is not None and self._slopes_are_read()
+        self.curvature = columns.add("curvature", self.n if self.reads_slopes else 0)
+        """u'' of the time before, where slopes are read."""
+        self.Z = [self._corrected(k) for k in range(len(columns.names))]
+        """Sensitivities of z: those of delayed values follow from what is kept of the past."""
+        if delays is None:
+            return
+        n, count = self.n, len(columns.names)
+        both = columns.value(delays.inputs)
+        self.u, self.du = both[:n], both[n:]
+        add, at_start = columns.add, self._before_start()
+        self.jumps = add("jumps", n, 1.0)
+        self.arrived = add("arrived", n)
+        self.before_jump = add("before jump", n, at_start)
+        self.left, self.left_slope = add("left limit", n), add("left slope", n)
+        self.jump_p = [add(f"jump by {name}", n) for name in columns.names]
+        self.past_jumps = add("jumps then", n)
+        self.past_before = add("before jump then", n, at_start)
+        self.past_p = [add(f"jump by {name} then", n) for name in columns.names]
+        self.flat = add("slope of steps", n * (2 + count))
+        if self.reads_slopes:
+            self.slope_before_jump = add("slope before jump", n)
+            self.past_slope_before = add("slope before jump then", n)
+            self.flat_slope = add("slope of steps of the slope", n)
+            self.past_slope = add("slope then", n)
+
+    def _along_parameter(self, expression: SX, k: int) -> SX:
+        c = self.columns
+        return c.along(expression, t=0.0, x=c.S[k], z=c.Z[k], w=c.W[k], p=c.seeds[k])
+
+    def _corrected(self, k: int) -> SX:
+        """What is kept at the place of a delayed value is ``u_p(t - d)``."""
+        corrected = SX(self.columns.Z[k])
+        for i, (value, slope) in enumerate(zip(self.values, self.slopes)):
+            corrected[value] = corrected[value] - self.columns.z[slope] * self.tau_p[k][i]
+            if self.curvature.numel():
+                corrected[slope] = corrected[slope] - self.curvature[i] * self.tau_p[k][i]
+        return corrected
+
+    def _slopes_are_read(self) -> bool:
+        c, system = self.columns, self.columns.system
+        read = vertcat(*(c.z[place] for place in self.slopes), SX(0, 1))
+        functions = (system.derivative, system.signals, system.guards, self._delays.inputs)
+        values = [c.value(function) for function in functions]
+        values.append(c.value(system.reset, SX.sym("e", len(system.guard_directions))))
+        values.append(c.value(system.update, SX.sym("m", len(system.clocks))))
+        kept = {*self.slopes}
+        changed = [value[k] for value in values[:-2] for k in range(value.numel())]
+        places = range(c.z.numel())
+        n = c.x.numel()
+        changed += [values[-2][k] for k in range(n)] + [values[-2][n + k] for k in places if k not in kept]
+        changed += [values[-1][k] for k in places if k not in kept]
+        return bool(read.numel() and depends_on(vertcat(*changed), read))
+
+    def _before_start(self) -> SX:
+        initial = self.columns.system.initial_discrete
+        function = Function("f", list(initial.arguments), [vertcat(*initial.results)])
+        (value,) = function.call([self.columns.p], True, False)
+        return value[self.values]
+
+    def set_flow(self, flow: SX) -> None:
+        """``flow``: x', from which ``delay_rate`` = d' follows, and the rate of the delayed values."""
+        if not self.n:
+            return
+        c = self.columns
+        still = SX.zeros(c.z.numel())
+        self.delay_rate = c.along(
+            self.tau, t=1.0, x=flow, z=still, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
+        )
+        for i, (value, slope) in enumerate(zip(self.values, self.slopes)):
+            self.rate_along[value] = c.z[slope] * (1.0 - self.delay_rate[i])
+            if self.reads_slopes:
+                self.rate_along[slope] = self.curvature[i]
+        self.ddu = c.along(
+            self.du, t=1.0, x=flow, z=self.rate_along, w=SX.zeros(c.w.numel()), p=SX.zeros(c.p.numel())
+        )
+
+    # At an instant.
+
+    def begin(self) -> dict[str, SX]:
+        """What is kept of the side before an instant."""
+        return {"left limit": self.u, "left slope": self.du} if self.n else {}
+
+    def guards(self, at_instant: SX) -> list[SX]:
+        """Upwards, where a jump arrives, and where a signal that is delayed has jumped at this instant."""
+        if not self.n:
+            return []
+        size = fabs(self.u) + fabs(self.left)
+        drift = 1e-13 * (1.0 + self.columns.t) * fmax(fabs(self.du), fabs(self.left_slope))
+        jumps = fabs(self.u - self.left) > SAME_VALUE * size + drift
+        bends = fabs(self.du - self.left_slope) > SAME_VALUE * (fabs(self.du) + fabs(self.left_slope))
+        fixed = SX([float(fixed) for fixed in self._delays.fixed])
+        changed = logic_and(at_instant, logic_or(jumps, logic_and(bends, fixed)))
+        return [self.past_jumps - self.arrived - 0.5, if_else(changed, 1.0, -1.0)]
+
+    @property
+    def _delays(self) -> Delays:
+        delays = self.columns.system.delays
+        assert delays is not None
+        return delays
+
+    def arrival(self, k: int) -> SX:
+        """The derivative by parameter ``k`` of the instant at which the last jump has arrived, (n,)."""
+        steady = if_else(self.delay_rate == 1.0, 0.0, self.delay_rate)
+        return (self.past_p[k] + self.tau_p[k]) / (1.0 - steady)
+
+    def before_arrival(self, fired: SX) -> SX:
+        """z with the delayed values as they were before the jumps that have arrived."""
+        z = SX(self.columns.z)
+        for i, value in enumerate(self.values):
+            z[value] = if_else(fired[i], self.past_before[i], z[value])
+            if self.reads_slopes:
+                slope = self.slopes[i]
+                z[slope] = if_else(fired[i], self.past_slope_before[i], z[slope])
+        return z
+
+    def after(self, arrived: SX, jumped: SX, instants: list[SX]) -> dict[str, SX]:
+        """What changes where jumps arrive, and where signals jump; ``instants``: derivatives of this one."""
+        if not self.n:
+            return {}
+        changes = {
+            "arrived": if_else(arrived, self.past_jumps, self.arrived),
+            "jumps": self.jumps + jumped,
+            "before jump": if_else(jumped, self.left, self.before_jump),
+        }
+        if self.reads_slopes:
+            changes["slope before jump"] = if_else(jumped, self.left_slope, self.slope_before_jump)
+        for name, known, instant in zip(self.columns.names, self.jump_p, instants):
+            changes[f"jump by {name}"] = if_else(jumped, instant, known)
+        return changes
+
+    # The delayed signals of the whole system.
+
+    def delays(self) -> Delays | None:
+        """All delayed scalars: those of the system, their sensitivities, and what tells of jumps."""
+        if not self.n:
+            return None
+        c, old, n, nz = self.columns, self._delays, self.n, self.columns.z.numel()
+        count = len(c.names)
+        values, slopes = list(self.values), list(self.slopes)
+        u, du = [self.u], [self.du]
+        for k in range(count):
+            values += [nz * (k + 1) + place for place in self.values]
+            slopes += [nz * (k + 1) + place for place in self.slopes]
+            u.append(self._sensitivity(self.u, k))
+            du.append(self._sensitivity(self.du, k))
+        flat = self._places("slope of steps", 2 + count)
+        steps = {"jumps then": self.jumps, "before jump then": self.before_jump}
+        steps |= {f"jump by {name} then": known for name, known in zip(c.names, self.jump_p)}
+        for (name, signal), slope in zip(steps.items(), flat):
+            values += self._places(name)[0]
+            slopes += slope
+            u.append(signal)
+            du.append(SX.zeros(n))
+        if self.reads_slopes:
+            values += [*self._places("slope before jump then")[0], *self._places("slope then")[0]]
+            slopes += [*self._places("slope of steps of the slope")[0], *self._places("curvature")[0]]
+            u += [self.slope_before_jump, self.du]
+            du += [SX.zeros(n), self.ddu]
+        copies = len(u)
+        (p,) = old.bounds.arguments
+        shortest, longest = vertsplit(vertcat(*old.bounds.results), [0, n, 2 * n])
+        bounds = vertcat(*[shortest] * copies, *[longest] * copies)
+        return Delays(
+            values=tuple(values),
+            slopes=tuple(slopes),
+            fixed=old.fixed * copies,
+            inputs=c.function("delay_inputs", {}, d=vertcat(*u, *du)),
+            times=c.function("delay_times", {}, d=vertcat(*[self.tau] * copies)),
+            bounds=TracedFunction(
+                "delay_bounds", old.bounds.inputs, signature(("d", (bounds.numel(),))), (p,), (bounds,)
+            ),
+        )
+
+    def _places(self, name: str, count: int = 1) -> list[list[int]]:
+        """The places of an added variable in the whole of z, in so many parts."""
+        start = self.columns.place(name)
+        return [list(range(start + k * self.n, start + (k + 1) * self.n)) for k in range(count)]
+
+    def _sensitivity(self, expression: SX, k: int) -> SX:
+        c = self.columns
+        return c.along(expression, t=0.0, x=c.S[k], z=self.Z[k], w=c.W[k], p=c.seeds[k])

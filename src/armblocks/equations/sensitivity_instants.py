@@ -1,0 +1,252 @@
+"""Sensitivities at instants, the times of which may depend on parameters.
+
+Let signals jump at an instant ``s`` that depends on a parameter, with ``s_p = ds/dp``. The derivative of
+``x(s(p); p)``, along the instant, is ``S* = S + x' s_p``. Every jump at the instant transforms ``S*`` by its
+total derivative, however many jumps follow one another there::
+
+    S* = S- + f- s_p,    S* := R_x S* + R_z Z* + R_w W* + R_p + R_t s_p (each jump),    S+ = S* - f+ s_p
+
+For a single jump this is the saltation matrix of Hiskens and Pai, IEEE Trans. Circuits and Systems I 47,
+2000, 204-220. Likewise ``Z* = Z + z' s_p``, where z' is 0 except for left limits and delayed values.
+
+``s_p`` is 0 at ticks. At a zero of a guard it is ``-g_p / g'``. Where a source jumps at a known time it is
+the derivative of this time. For the arrival of a delayed jump see
+:mod:`armblocks.equations.sensitivity_delays`. A guard that fires because of these jumps fires at the same
+instant. Where instants of different derivatives coincide, the cause of such a guard is not known: the time
+and one of the guards are noted in ``mixed``.
+
+The jumps at an instant are calls of ``reset``. The first call goes from S to S*. A guard that is added fires
+when no other guard fires any more; this last call goes from S* to S. There are two such guards, used in turn,
+because a guard that has just fired does not fire again at once.
+"""
+
+from __future__ import annotations
+
+from itertools import accumulate
+
+from casadi import (
+    SX,
+    Function,
+    densify,
+    dot,
+    fabs,
+    fmax,
+    if_else,
+    is_equal,
+    jtimes,
+    logic_and,
+    logic_not,
+    logic_or,
+    vertcat,
+    vertsplit,
+)
+
+from armblocks.equations.sensitivity_delays import DelayedSensitivities
+from armblocks.equations.sensitivity_layout import Columns
+
+LOCATED = 1e-8
+"""A guard that would be 0 within this time (beside the time, s) was located there; else it jumped."""
+SAME_INSTANT = 2.0**-48
+"""Times that differ by less, beside their size, are one instant."""
+SAME_DERIVATIVE = 1e-6
+"""Derivatives of two instants that differ by less, beside their size, are equal."""
+BEFORE = 1.0 - 2.0**-51
+"""A time just before another one, beside it."""
+NEVER = -1.0
+"""The time of what has not been, s."""
+
+
+class Instants:
+    """What happens to sensitivities at instants: ``update``, ``reset`` and guards of the whole system."""
+
+    def __init__(self, columns: Columns, delays: DelayedSensitivities) -> None:
+        self.columns = columns
+        self.delays = delays
+        c, system = columns, columns.system
+        self.guards = len(system.guard_directions)
+        self.time = c.add("instant", 1, NEVER)
+        self.known, self.open = c.add("known", 1), c.add("open", 1)
+        self.arms = c.add("arms", 2, 1.0)
+        self.mixed, self.ticked = c.add("mixed", 2, [NEVER, 0.0]), c.add("ticked", 1)
+        self.located = c.add("located", self.guards)
+        self.instant_p = [c.add(f"instant by {name}", 1) for name in c.names]
+        self.flow = c.value(system.derivative)
+        delays.set_flow(self.flow)
+        captured = c.value(system.update, SX.zeros(len(system.clocks)))
+        self.captured = captured
+        self.kept = [i for i in range(c.z.numel()) if not is_equal(captured[i], c.z[i], 1)]
+        self.kept_rate = c.add("rate of left limits", len(self.kept))
+        self.g = c.value(system.guards)
+        self.g_rate = self.over_time(self.g)
+        self.times, self.moved = self._breakpoints()
+
+    def _breakpoints(self) -> tuple[SX, list[int]]:
+        """Known times at which signals jump, and the places of those that parameters move."""
+        c = self.columns
+        (p,) = c.system.breakpoints.arguments
+        times = vertcat(*c.system.breakpoints.results, SX(0, 1))
+        (times,) = Function("f", [p], [times]).call([c.p], True, False)
+        of_times = [jtimes(times, c.p, seed) for seed in c.seeds] if times.numel() else []
+        moved = [k for k in range(times.numel()) if any(not rates[k].is_zero() for rates in of_times)]
+        return times, moved
+
+    def source(self, place: int) -> str:
+        """The block with a parameter that moves one of the known times."""
+        c = self.columns
+        names = zip(c.names, c.seeds)
+        movers = [name for name, seed in names if not jtimes(self.times, c.p, seed)[place].is_zero()]
+        return movers[0].rpartition(".")[0]
+
+    def over_time(self, expression: SX) -> SX:
+        """The time derivative along the flow."""
+        c = self.columns
+        return c.along(
+            expression, t=1.0, x=self.flow, z=self.delays.rate_along, w=c.V, p=SX.zeros(c.p.numel())
+        )
+
+    def by_parameter(self, expression: SX, k: int) -> SX:
+        """The derivative by parameter ``k`` with the sensitivities as they stand."""
+        c = self.columns
+        return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
+
+    # Guards of the instants themselves.
+
+    def all_guards(self) -> SX:
+        c = self.columns
+        at_instant = fabs(c.t - self.time) <= SAME_INSTANT * c.t
+        return vertcat(
+            self.g,
+            self.arms,
+            *(c.t - self.times[k] + 1e-300 for k in self.moved),
+            *self.delays.guards(at_instant),
+        )
+
+    def directions(self) -> tuple[int, ...]:
+        """Of the guards added."""
+        return 0, 0, *[1] * (len(self.moved) + 2 * self.delays.n)
+
+    # Just before an instant.
+
+    def update(self, m: SX) -> SX:
+        """``update`` of everything: at ticks, which are at fixed times, and just before an instant."""
+        c = self.columns
+        begins = dot(m, m) == 0.0 if m.numel() else SX(1.0)
+        updated = c.value(c.system.update, m)
+        Z = [self.by_parameter(updated, k) for k in range(len(c.names))]
+        near = fabs(self.g) <= LOCATED * fabs(self.g_rate) * fmax(1.0, c.t)
+        located = logic_and(near, logic_and(self.g_rate != 0.0, c.t > 0.0))
+        fresh = {
+            "instant": c.t,
+            "known": SX(0.0),
+            "open": SX(0.0),
+            "ticked": SX(0.0),
+            "located": located,
+            "rate of left limits": vertcat(*(self.over_time(self.captured)[k] for k in self.kept), SX(0, 1)),
+            **{f"instant by {name}": SX(0.0) for name in c.names},
+            **self.delays.begin(),
+        }
+        added = {**c.added, **{name: if_else(begins, new, c.added[name]) for name, new in fresh.items()}}
+        added["ticked"] = if_else(begins, 0.0, 1.0)
+        return vertcat(updated, *Z, *added.values())
+
+    # At an instant.
+
+    def reset(self, e: SX) -> tuple[SX, SX]:
+        """All states and discrete variables after the events ``e``, those of the added guards included."""
+        c, d, names = self.columns, self.delays, self.columns.names
+        ends = [self.guards, 2, len(self.moved), d.n, d.n]
+        own, arms, sources, arrived, jumped = vertsplit(e, [0, *accumulate(ends)])
+        fired, quiet = _any(own), logic_not(_any(e))
+        others = logic_or(_any(vertcat(own, sources, arrived, jumped)), quiet)
+        first = logic_not(self.known)
+        instants, mixed = self._instants(own, quiet, sources, arrived)
+        leaving = logic_and(self.open, logic_not(others))
+        entering = logic_and(logic_not(self.open), _any(vertcat(*instants)))
+
+        # The flow on the side that is left, or that is reached.
+        left_side = logic_and(first, _any(sources))
+        t = if_else(left_side, c.t * BEFORE, c.t)
+        flow = c.value_at(c.system.derivative, t, c.x, d.before_arrival(arrived), c.w)
+        along = [flow * (if_else(leaving, -1.0, entering) * instant) for instant in instants]
+        S = [known + step for known, step in zip(c.S, along)]
+        Z = [self._with_left_limits(c.Z[k], first, instants[k]) for k in range(len(names))]
+
+        n, jumps = c.x.numel(), logic_or(fired, quiet)
+        after = c.value(c.system.reset, own)
+        changed = [
+            c.along(
+                after,
+                t=instant,
+                x=S[k],
+                z=self._with_left_limits(d.Z[k], first, instant) + d.rate_along * instant,
+                w=c.W[k] + c.V * (entering * instant),
+                p=c.seeds[k],
+            )
+            for k, instant in enumerate(instants)
+        ]
+        parts = [vertsplit(column, [0, n, n + c.z.numel()]) for column in (after, *changed)]
+        x = [if_else(jumps, part[0], now) for part, now in zip(parts, (c.x, *S))]
+        z = [if_else(jumps, part[1], now) for part, now in zip(parts, (c.z, *Z))]
+
+        opened = logic_and(logic_or(self.open, entering), logic_not(leaving))
+        again = logic_and(opened, others)
+        second = logic_and(again, arms[0] != 0.0)
+        flips = vertcat(logic_and(again, logic_not(second)), second)
+        caused = logic_or(logic_not(first), _any(vertcat(sources, arrived)))
+        changes = {
+            "known": SX(1.0),
+            "open": opened,
+            "arms": if_else(flips, -self.arms, self.arms),
+            "mixed": if_else(logic_and(mixed > 0.0, self.mixed[0] < 0.0), vertcat(c.t, mixed), self.mixed),
+            **{f"instant by {name}": instant for name, instant in zip(names, instants)},
+            # A signal that had jumped before the first reset did so at a tick, if at nothing else.
+            **d.after(arrived, jumped, [if_else(caused, instant, 0.0) for instant in instants]),
+        }
+        added = [changes.get(name, now) for name, now in c.added.items()]
+        return vertcat(*x), vertcat(*z, *added)
+
+    def _with_left_limits(self, Z: SX, first: SX, instant: SX) -> SX:
+        """Sensitivities of left limits along the instant, from the first reset on."""
+        corrected = SX(Z)
+        for number, place in enumerate(self.kept):
+            corrected[place] = corrected[place] + first * instant * self.kept_rate[number]
+        return corrected
+
+    def _instants(self, own: SX, quiet: SX, sources: SX, arrived: SX) -> tuple[list[SX], SX]:
+        """The derivatives of this instant; the number, from 1, of a guard that contradicts them, or 0."""
+        located = logic_and(logic_or(own != 0.0, quiet), self.located)
+        marks = vertcat(located, SX.zeros(2), sources != 0.0, arrived != 0.0)
+        # A guard that fired without a zero here was moved by a jump: perhaps by one at a fixed time.
+        at_fixed = [self.ticked, *(self._is_now(k) for k in range(self.times.numel()) if k not in self.moved)]
+        moved = logic_and(own != 0.0, logic_not(self.located))
+        follows = vertcat(moved, SX.zeros(2), sources != 0.0, SX.zeros(arrived.numel()))
+        follows = logic_and(follows, _any(vertcat(*at_fixed)))
+        instants: list[SX] = []
+        apart = SX.zeros(marks.numel())
+        for k, known in enumerate(self.instant_p):
+            steady = if_else(self.g_rate == 0.0, 1.0, self.g_rate)
+            by_guards = -self.by_parameter(self.g, k) / steady
+            by_arrivals = self.delays.arrival(k) if self.delays.n else SX(0, 1)
+            found = vertcat(by_guards, SX.zeros(2), self._times_by_parameter(k), by_arrivals)
+            mean = dot(if_else(marks, found, 0.0), marks) / fmax(dot(marks, marks), 1.0)
+            differs = fabs(found - mean) > SAME_DERIVATIVE * (1.0 + fabs(mean))
+            differs = logic_or(logic_and(marks, differs), logic_and(follows, mean != 0.0))
+            apart = logic_or(apart, differs)
+            instants.append(if_else(self.known, known, mean))
+        last = SX(0.0)
+        for number in range(apart.numel()):
+            last = if_else(apart[number], float(number + 1), last)
+        return instants, if_else(self.known, 0.0, last)
+
+    def _is_now(self, k: int) -> SX:
+        """Whether a known time at which signals jump is this instant."""
+        return fabs(self.columns.t - self.times[k]) <= SAME_INSTANT * self.columns.t
+
+    def _times_by_parameter(self, k: int) -> SX:
+        c = self.columns
+        moved = vertcat(*(self.times[place] for place in self.moved), SX(0, 1))
+        return densify(jtimes(moved, c.p, c.seeds[k])) if self.moved else moved
+
+
+def _any(marks: SX) -> SX:
+    return dot(marks, marks) > 0.0 if marks.numel() else SX(0.0)

@@ -1,0 +1,122 @@
+"""The vectors of a system with sensitivities: the symbols of its variables, and the place of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from casadi import SX, Function, densify, jtimes, vertcat
+
+from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.signatures import Signature, Slot
+from armblocks.equations.traced_function import TracedFunction
+
+OWN = "sensitivity/"
+"""What the names of the discrete variables begin with that only the sensitivities need."""
+
+
+def sensitivity_name(path: str, parameter: str) -> str:
+    """The name of a derivative: ``x/y by k.gain``."""
+    return f"{path} by {parameter}"
+
+
+class Columns:
+    """The symbols ``t, x, z, w, p`` of a system, sensitivities of ``x``, ``z``, ``w``, and added variables.
+
+    For parameter ``k``, with the unit vector ``seeds[k]``: ``S[k]`` = dx/dp (nx,), ``Z[k]`` = dz/dp (nz,) and
+    ``W[k]`` = dw/dp (nw,). ``V`` = dw/dt (nw,). Further discrete variables are added one by one.
+    """
+
+    def __init__(self, system: HybridSystem, parameters: Sequence[str], *, moving: bool) -> None:
+        self.system = system
+        self.t, self.x, self.z, self.w, self.p = system.derivative.arguments
+        self.names: list[str] = []
+        self.seeds: list[SX] = []
+        for name in parameters:
+            slot = system.parameters[name]
+            places = range(*system.parameters.ranges[name].indices(system.parameters.size))
+            for element, place in zip(slot.elements, places):
+                seed = SX.zeros(self.p.numel())
+                seed[place] = 1.0
+                self.names.append(name if slot.size == 1 else element)
+                self.seeds.append(seed)
+        self.S = [SX.sym("S", self.x.numel()) for _ in self.names]
+        self.Z = [SX.sym("Z", self.z.numel()) for _ in self.names]
+        self.W = [SX.sym("W", self.w.numel()) for _ in self.names]
+        self.V = SX.sym("V", self.w.numel() if moving else 0)
+        self.added: dict[str, SX] = {}
+        self.starts: dict[str, SX] = {}
+
+    def add(self, name: str, size: int, start: SX | float | Sequence[float] = 0.0) -> SX:
+        """One more discrete variable (size,), with its value at the start."""
+        symbol = SX.sym(name, size)
+        self.added[name] = symbol
+        self.starts[name] = densify(SX.ones(size) * SX(start))
+        return symbol
+
+    def place(self, name: str) -> int:
+        """Where an added discrete variable begins in the whole of ``z``."""
+        place = self.z.numel() * (1 + len(self.names))
+        for other, symbol in self.added.items():
+            if other == name:
+                return place
+            place += symbol.numel()
+        raise KeyError(name)
+
+    def value(self, traced: TracedFunction, *more: SX) -> SX:
+        """The results of one of the system's functions of ``t, x, z, w, p``, in these symbols."""
+        return self.value_at(traced, self.t, self.x, self.z, self.w, *more)
+
+    def value_at(self, traced: TracedFunction, t: SX, x: SX, z: SX, w: SX, *more: SX) -> SX:
+        """The same at another point."""
+        function = Function("f", list(traced.arguments), [vertcat(*traced.results, SX(0, 1))])
+        (result,) = function.call([t, x, z, w, self.p, *more], True, False)
+        return densify(result)
+
+    def along(self, expression: SX, *, t: SX | float, x: SX, z: SX, w: SX, p: SX) -> SX:
+        """The directional derivative of an expression in these symbols."""
+        if not expression.numel():
+            return SX(0, 1)
+        by = vertcat(self.t, self.x, self.z, self.w, self.p)
+        return densify(jtimes(expression, by, vertcat(t, x, z, w, p)))
+
+    def widened(self, layout: Signature, letter: str) -> Signature:
+        """The slots of ``x``, ``z`` or ``w`` with those of their sensitivities."""
+        more = [Slot(sensitivity_name(slot.name, name), slot.shape) for name in self.names for slot in layout]
+        if letter == "z":
+            more += [Slot(OWN + name, (symbol.numel(),)) for name, symbol in self.added.items()]
+        if letter == "w" and self.V.numel():
+            more += [Slot(f"{slot.name}'", slot.shape) for slot in layout]
+        return Signature((*layout.slots, *more))
+
+    def _parts(self, letter: str) -> list[SX]:
+        parts = {
+            "x": [self.x, *self.S],
+            "z": [self.z, *self.Z, *self.added.values()],
+            "w": [self.w, *self.W, self.V],
+        }
+        return parts[letter]
+
+    def function(self, name: str, more: Mapping[str, SX], **results: SX) -> TracedFunction:
+        """A function of the whole system: with flat symbols for all inputs, as every system has them."""
+        inside: dict[str, list[SX]] = {"t": [self.t]}
+        inside |= {letter: self._parts(letter) for letter in "xzw"}
+        inside |= {"p": [self.p]} | {letter: [column] for letter, column in more.items()}
+        plain: list[SX] = []
+        given: list[SX] = []
+        fresh: dict[str, SX] = {}
+        for letter, parts in inside.items():
+            fresh[letter] = SX.sym(letter, sum(part.numel() for part in parts))
+            start = 0
+            for part in parts:
+                plain.append(part)
+                given.append(fresh[letter][start : start + part.numel()])
+                start += part.numel()
+        values = Function("f", plain, list(results.values())).call(given, True, False)
+
+        def ends(columns: Mapping[str, SX]) -> Signature:
+            shapes = {key: () if key == "t" else (column.numel(),) for key, column in columns.items()}
+            return Signature(tuple(Slot(key, shape) for key, shape in shapes.items()))
+
+        return TracedFunction(
+            name, ends(fresh), ends(results), tuple(fresh.values()), tuple(densify(v) for v in values)
+        )
