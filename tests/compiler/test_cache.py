@@ -227,6 +227,22 @@ def test_the_fingerprint_sees_edits(tmp_path: Path) -> None:
     assert cache._fingerprint(tmp_path) != before
 
 
+@pytest.mark.parametrize("folder", ["compiler", "routines"])
+def test_machine_code_is_made_anew_after_edits_of_all_that_writes_it(
+    folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("compiler", "routines"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "module.py").write_text("a = 1")
+    monkeypatch.setattr(cache, "__file__", str(tmp_path / "compiler" / "cache.py"))
+    fingerprint = cache.compiler_fingerprint.__wrapped__
+    before = fingerprint()
+    (tmp_path / "other.py").write_text("a = 1")
+    assert fingerprint() == before
+    (tmp_path / folder / "module.py").write_text("a = 12")
+    assert fingerprint() != before
+
+
 def _work(folder: str, results: "multiprocessing.Queue[list[float]]") -> None:
     os.environ["ARMBLOCKS_CACHE_DIR"] = folder
     kernel: Kernel = recall("shared key", function)

@@ -64,8 +64,9 @@ def _sha256(data: bytes) -> bytes:
 
 @cache
 def compiler_fingerprint() -> str:
-    """Changes whenever a source file of the compiler changes."""
-    return _fingerprint(Path(__file__).parent)
+    """Changes whenever a source file changes that decides which machine code is made."""
+    package = Path(__file__).parent.parent
+    return _fingerprint(*(package / name for name in ("compiler", "routines")))
 
 
 @cache
@@ -74,13 +75,14 @@ def package_fingerprint() -> str:
     return _fingerprint(Path(__file__).parent.parent)
 
 
-def _fingerprint(root: Path) -> str:
-    """Names, sizes and times of all Python files below ``root``."""
+def _fingerprint(*roots: Path) -> str:
+    """Names, sizes and times of all Python files below the folders ``roots``."""
     found: list[str] = []
     with contextlib.suppress(OSError):
-        for entry in _python_files(root):
-            status = entry.stat()
-            found.append(f"{entry.path} {status.st_size} {status.st_mtime_ns}")
+        for root in roots:
+            for entry in _python_files(root):
+                status = entry.stat()
+                found.append(f"{entry.path} {status.st_size} {status.st_mtime_ns}")
     return _sha256("\n".join(sorted(found)).encode()).hex()
 
 
