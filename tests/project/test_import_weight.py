@@ -24,6 +24,18 @@ def test_the_command_line_starts_without_heavy_libraries() -> None:
     assert loaded_by("import armblocks.cli.main") & HEAVY == set()
 
 
+def test_data_files_are_written_without_pandas() -> None:
+    write = (
+        "import numpy as np, pathlib, tempfile; from armblocks.simulation.export import open_log\n"
+        "for suffix in ('csv', 'parquet'):\n"
+        "    with tempfile.TemporaryDirectory() as folder:\n"
+        "        log = open_log(pathlib.Path(folder) / f'log.{suffix}', ['x'])\n"
+        "        log.append(np.zeros(3), np.ones((1, 3)))\n"
+        "        log.finish({})"
+    )
+    assert loaded_by(write) & (HEAVY - {"numpy"}) == {"pyarrow"}
+
+
 def test_the_page_of_the_studio_is_served_before_anything_heavy_is_imported() -> None:
     loaded = loaded_by("import armblocks.studio.launch")
     assert "starlette" in loaded

@@ -129,8 +129,10 @@ class Painter:
             weight="bold" if mark.bold else "normal",
             style="oblique" if mark.italic else "normal",
         )
-        width, _, _ = self.renderer.get_text_width_height_descent(text, font, False)
-        back = {"start": 0.0, "middle": 0.5, "end": 1.0}[mark.anchor] * width
+        back = 0.0
+        if mark.anchor != "start":  # laying out a text takes as long as drawing it
+            width, _, _ = self.renderer.get_text_width_height_descent(text, font, False)
+            back = {"middle": 0.5, "end": 1.0}[mark.anchor] * width
         x, y = mark.x * self.scale, mark.y * self.scale
         x, y = (x, y + back) if mark.turn else (x - back, y)
         if not self.renderer.flipy():

@@ -18,10 +18,17 @@ PIXELS_PER_PX = 2.0
 
 def picture_png(picture: Picture, *, theme: Theme = "light", scale: float = PIXELS_PER_PX) -> bytes:
     """The picture as an opaque PNG file with ``scale`` pixels for each px."""
+    return png_bytes(picture_pixels(picture, theme=theme, scale=scale))
+
+
+def picture_pixels(
+    picture: Picture, *, theme: Theme = "light", scale: float = PIXELS_PER_PX
+) -> NDArray[np.uint8]:
+    """The picture as opaque pixels (rows, columns, 3)."""
     from matplotlib.backends.backend_agg import RendererAgg
 
     width, height = round(picture.width * scale), round(picture.height * scale)
     renderer = RendererAgg(width, height, 72.0)
     Painter(renderer, height, theme, scale).picture(picture)
     pixels = cast("NDArray[np.uint8]", np.asarray(renderer.buffer_rgba()))
-    return png_bytes(np.ascontiguousarray(pixels[:, :, :3]))
+    return np.ascontiguousarray(pixels[:, :, :3])

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -64,18 +66,19 @@ def write_report(
     summaries = tuple(_summary(motion) for motion in found)
     figures = _figures(diagram, result, found)
     drawing = diagram_picture(diagram, result)
-    written: list[Path] = []
-    for figure in figures:
-        for kind in formats:
-            path = place / "figures" / f"{figure.name}.{kind}"
-            write_atomically(path, _encoded(figure, kind))
-            written.append(path)
     diagram_path = place / "diagram.svg"
-    write_atomically(diagram_path, svg_file(drawing).encode())
     data_paths = tuple(place / f"data.{kind}" for kind in data)
-    for path in data_paths:
-        result.save(path)
-    data_paths += write_files(place, diagram, result, taken=REPORT_DATA)
+    written: list[Path] = []
+    with _Writer() as writer:
+        for figure in figures:
+            for kind in formats:
+                path = place / "figures" / f"{figure.name}.{kind}"
+                writer.write(path, _encoding(figure, kind))
+                written.append(path)
+        writer.write(diagram_path, svg_file(drawing).encode)
+        for path in data_paths:
+            result.save(path)
+        data_paths += write_files(place, diagram, result, taken=REPORT_DATA)
     contents = ReportContents(
         diagram=diagram,
         result=result,
@@ -118,12 +121,38 @@ def _figures(diagram: Diagram, result: SimulationResult, found: Sequence[Motion]
     return named
 
 
-def _encoded(figure: Figure, kind: str) -> bytes:
+def _encoding(figure: Figure, kind: str) -> Callable[[], bytes]:
+    """What gives the bytes of a figure's file. Its slow part, if any, lets other threads run."""
     if kind == "svg":
-        return svg_file(figure.picture, marks=figure.svg_marks).encode()
-    from armblocks.report.png import picture_png
+        return svg_file(figure.picture, marks=figure.svg_marks).encode
+    from armblocks.report.png import picture_pixels
+    from armblocks.report.png_file import png_bytes
 
-    return picture_png(figure.picture)
+    return partial(png_bytes, picture_pixels(figure.picture))
+
+
+class _Writer:
+    """Encodes and writes files in a thread of its own, for compression and the disk leave Python to others.
+
+    After the ``with`` block all files are written. It raises what kept one from being written.
+    """
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="report")
+        self._files: list[Future[object]] = []
+
+    def write(self, path: Path, encode: Callable[[], bytes]) -> None:
+        """Write what ``encode`` gives, soon."""
+        self._files.append(self._thread.submit(lambda: write_atomically(path, encode())))
+
+    def __enter__(self) -> _Writer:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self._thread.shutdown(cancel_futures=failure[0] is not None)
+        if failure[0] is None:
+            for file in self._files:
+                file.result()
 
 
 def make_folder(folder: Path) -> None:

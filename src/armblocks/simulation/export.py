@@ -95,8 +95,16 @@ def _table(result: SimulationResult) -> pa.Table:
 
     names = ["time", *result.columns()]
     metadata = {"armblocks": json.dumps(description_of(result))}
-    arrays = [pa.array(result.time), *(pa.array(np.ascontiguousarray(row)) for row in result.signals)]
+    arrays = [_column(values) for values in (result.time, *result.signals)]
     return pa.table(arrays, names=names, metadata=metadata)
+
+
+def _column(values: Array) -> pa.Array:
+    """A column that reads the numbers in place. (``pyarrow.array`` imports pandas to look for its types.)"""
+    import pyarrow as pa
+
+    buffer = pa.py_buffer(np.ascontiguousarray(values))
+    return pa.Array.from_buffers(pa.float64(), len(values), [None, buffer])
 
 
 def _npz(result: SimulationResult) -> bytes:
@@ -166,7 +174,7 @@ class LogFile(ABC):
         """Add instants, ``(N,)`` s, with their values ``(count of columns, N)``."""
         import pyarrow as pa
 
-        arrays = [pa.array(np.ascontiguousarray(row)) for row in (time, *signals)]
+        arrays = [_column(values) for values in (time, *signals)]
         self._append(pa.table(arrays, names=self.columns))
 
     def finish(self, description: Mapping[str, Any]) -> None:
