@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from stepwise_reference import run_reference
+from reference_simulator import run_reference
 
 from armblocks.blocks import (
     Backlash,

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from reference_simulator import run_reference
 from scipy.interpolate import RegularGridInterpolator
-from stepwise_reference import run_reference
 
 from armblocks.blocks import (
     Abs,

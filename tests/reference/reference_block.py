@@ -1,0 +1,233 @@
+"""One block as numbers: its equations as functions between arrays.
+
+Every equation of a block is one CasADi function of its own, over arrays that stand for the block's states,
+modes and inputs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from casadi import SX, Function, densify, depends_on, fabs, fmax, if_else, jtimes, vertcat
+from reference_history import History
+
+from armblocks.blocks import FromFile
+from armblocks.blocks.rate_limits import SMALLEST_JUMP, RateLimiting
+from armblocks.diagram import Block, shape_of
+from armblocks.equations import Shape, flatten, unflatten
+
+
+class UnsupportedError(Exception):
+    """A diagram that the reference does not cover."""
+
+
+def column(value: Any, shape: Shape) -> SX:
+    """The flat column of a value; a scalar is spread over the shape."""
+    value = SX(value)
+    return SX.ones(math.prod(shape)) * value if value.numel() == 1 else flatten(value, shape)
+
+
+def own_modes(block: Block, x: Mapping[str, SX], u: Mapping[str, SX], p: Mapping[str, SX]) -> dict[str, SX]:
+    """The law of a rate limiter: y follows u while its rate is allowed; else it goes towards u at a limit.
+
+    With the mode m as it was, 1 rising, -1 falling, 0 following: where y has met u, or follows it, the rate
+    of u decides. A jump of u that is larger than what the block passes on has to be made up for.
+    """
+    if not isinstance(block, RateLimiting):
+        return {}
+    limits, gap, m = block.limits(u, p), u["u"] - x["y"], x["mode"]
+    by_rate = if_else(u["u'"] > limits["rising"], 1.0, if_else(u["u'"] < limits["falling"], -1.0, 0.0))
+    passed_on = 2.0 * SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
+    following = if_else(gap > passed_on, 1.0, if_else(gap < -passed_on, -1.0, by_rate))
+    rising, falling = if_else(gap > 0.0, 1.0, following), if_else(gap < 0.0, -1.0, following)
+    return {"mode": if_else(m > 0.0, rising, if_else(m < 0.0, falling, following))}
+
+
+class BlockNumbers:
+    """One block: an array for every named quantity, and its equations as functions between the arrays."""
+
+    def __init__(
+        self, name: str, block: Block, shapes: Mapping[str, Shape], outputs: Mapping[str, Shape]
+    ) -> None:
+        if block.called:
+            raise UnsupportedError(f"'{name}' calls Python at its ticks")
+        if isinstance(block, FromFile) or any(not rule.tunable for rule in block.inputs_of_the_run()):
+            raise UnsupportedError(f"'{name}' has a long table")
+        self.name, self.block, self.shapes = name, block, shapes
+        self.clock: int | None = None
+        self.period = 0.0
+        self.gate: dict[str, np.ndarray] = {}
+        self.states = block.states(shapes)
+        self.discrete = block.discrete_states(shapes)
+        self.lines = block.delay_lines(shapes)
+        self.conditions = block.conditions(shapes)
+        self.modes = (*block.modes(shapes), *self.conditions)
+        self.guards = block.guards(shapes)
+        self.symbols: dict[str, SX] = {"t": SX.sym("t")}
+        self.arrays: dict[str, np.ndarray] = {"t": np.zeros(1)}
+        self.output_shapes = outputs
+        self.outputs = {port: np.zeros(math.prod(shape)) for port, shape in outputs.items()}
+        self.rates: dict[str, np.ndarray] = {}
+        self.history = {line.name: History(math.prod(line.shape)) for line in self.lines}
+        ends = {
+            "x": {s.name: s.shape for s in (*self.states, *self.discrete, *self.lines, *self.modes)},
+            "u": {**shapes, **{f"{u}'": shapes[u] for u in block.rated_inputs}},
+            "e": {guard.name: guard.shape for guard in self.guards},
+            "p": {rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
+            | ({"T": ()} if block.sampled else {}),
+        }
+        natural: dict[str, dict[str, SX]] = {}
+        for letter, named in ends.items():
+            natural[letter] = {}
+            for key, shape in named.items():
+                symbol = SX.sym(key, math.prod(shape))
+                self.symbols[f"{letter}:{key}"] = symbol
+                self.arrays[f"{letter}:{key}"] = np.zeros(math.prod(shape))
+                natural[letter][key] = unflatten(symbol, shape)
+        for rule in block.inputs_of_the_run():
+            self.arrays[f"p:{rule.name}"][:] = np.ravel(block.parameter_value(rule.name))
+        self._build(natural["x"], natural["u"], natural["p"], natural["e"])
+
+    def _build(self, x: dict[str, SX], u: dict[str, SX], p: dict[str, SX], e: dict[str, SX]) -> None:
+        """All equations, as flat columns by kind and name."""
+        block, t = self.block, self.symbols["t"]
+        shape_of_state = {s.name: s.shape for s in (*self.states, *self.discrete)}
+        given = block.outputs(t, x, u, p)
+        self.expressions: dict[tuple[str, str], SX] = {}
+
+        def add(kind: str, values: Mapping[str, Any], shape_by_name: Mapping[str, Shape]) -> None:
+            for key, shape in shape_by_name.items():
+                if key in values:
+                    self.expressions[kind, key] = column(values[key], shape)
+
+        out_shapes = {port.name: port.shape for port in block.output_ports() if port.shape is not None}
+        out_shapes |= dict(block.output_shapes(self.shapes))
+        add("out", given, out_shapes)
+        add("xdot", block.derivatives(t, x, u, p), {s.name: s.shape for s in self.states})
+        add("update", block.updates(t, x, u, p), {s.name: s.shape for s in self.discrete})
+        add("guard", block.guard_values(t, x, u, p), {g.name: g.shape for g in self.guards})
+        wanted = dict(block.mode_values(t, x, u, p)) | own_modes(block, x, u, p)
+        for condition in self.conditions:
+            quantity = block.condition_values(t, x, u, p)[condition.name]
+            wanted[condition.name] = quantity >= 0.0 if condition.closed else quantity > 0.0
+        add("mode", wanted, {m.name: m.shape for m in self.modes})
+        mode_shapes = {m.name: m.shape for m in self.modes}
+        resets = block.resets(t, x, u, p, e) if self.guards and not isinstance(block, RateLimiting) else {}
+        add("reset", resets, shape_of_state | mode_shapes)
+        self.has_events = any(key in shape_of_state for key in resets)
+        add("capture", block.captures(t, x, u, p), shape_of_state)
+        add("delay", block.delay_times(t, x, u, p), {line.name: () for line in self.lines})
+        bounds = block.delay_bounds(p)
+        add("shortest", {key: bound[0] for key, bound in bounds.items()}, dict.fromkeys(bounds, ()))
+        past = block.initial_past(p)
+        add("past", past, {line.name: line.shape for line in self.lines})
+        add("start", block.initial_states(p), shape_of_state)
+        add("guess", block.initial_guesses(p), out_shapes)
+        add("held", block.initial_outputs(p), out_shapes)
+        breaks = block.breakpoints(p)
+        add("break", {str(k): v for k, v in enumerate(breaks)}, {str(k): () for k in range(len(breaks))})
+        self.functions: dict[tuple[str, str], tuple[Callable[[], None], np.ndarray]] = {}
+        self._needs: dict[tuple[str, str], set[str]] = {}
+        self._buffers: list[Any] = []
+        read = {key for entry in self.expressions for key in self.needs(*entry)}
+        self.fed = sorted(key[2:] for key in read if key.startswith("u:"))
+
+    def needs(self, kind: str, name: str) -> set[str]:
+        """The arrays that an equation reads."""
+        if (kind, name) not in self._needs:
+            expression = self.expressions[kind, name]
+            ends = self.symbols.items()
+            self._needs[kind, name] = {k for k, s in ends if s.numel() and depends_on(expression, s)}
+        return self._needs[kind, name]
+
+    def value(self, kind: str, name: str) -> np.ndarray:
+        """An equation at the present numbers. The array is overwritten by the next evaluation."""
+        if (kind, name) not in self.functions:
+            self.functions[kind, name] = self._function(self.expressions[kind, name])
+        run, result = self.functions[kind, name]
+        run()
+        return result
+
+    def rate(self, port: str, rates: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The time derivative of an output, modes standing still: d/dt + the sum of d/da da/dt."""
+        if ("rate", port) not in self.functions:
+            expression = self.expressions["out", port]
+            along = [self.symbols[key] for key in rates]
+            seeds = [SX.sym(f"{key}'", symbol.numel()) for key, symbol in zip(rates, along)]
+            direction = vertcat(1.0, *seeds)
+            total = jtimes(expression, vertcat(self.symbols["t"], *along), direction)
+            more = {f"rate of {key}": (seed, rates[key]) for key, seed in zip(rates, seeds)}
+            self.functions["rate", port] = self._function(total, more)
+        run, result = self.functions["rate", port]
+        run()
+        return result
+
+    def _function(
+        self, expression: SX, more: Mapping[str, tuple[SX, np.ndarray]] | None = None
+    ) -> tuple[Callable[[], None], np.ndarray]:
+        ends = {key: (symbol, self.arrays[key]) for key, symbol in self.symbols.items()} | dict(more or {})
+        used = [(s, a) for s, a in ends.values() if s.numel() and depends_on(expression, s)]
+        function = Function("f", [symbol for symbol, _ in used], [densify(expression)])
+        result = np.zeros(expression.numel())
+        buffer, run = function.buffer()
+        for k, (_, array) in enumerate(used):
+            buffer.set_arg(k, memoryview(array))
+        buffer.set_res(0, memoryview(result))
+        self._buffers.append(buffer)
+        return run, result
+
+    # -- what the simulator does with one block ------------------------------------------------------------
+
+    def names(self, kind: str) -> list[str]:
+        return [name for entry, name in self.expressions if entry == kind]
+
+    @property
+    def on(self) -> bool:
+        return "?on" not in self.gate or self.gate["?on"][0] != 0.0
+
+    @property
+    def restarts(self) -> bool:
+        return "?restart" in self.gate and self.gate["?restart"][0] != 0.0
+
+    @property
+    def fires(self) -> bool:
+        return "?fire" in self.gate and self.gate["?fire"][0] != 0.0
+
+    def restart(self) -> None:
+        for name in self.names("start"):
+            self.arrays[f"x:{name}"][:] = self.value("start", name)
+
+    def mode_values(self) -> dict[str, np.ndarray]:
+        """The modes that hold, by name."""
+        return {mode.name: self.arrays[f"x:{mode.name}"].copy() for mode in self.modes}
+
+    def set_modes(self, values: Mapping[str, np.ndarray]) -> None:
+        for name, value in values.items():
+            self.arrays[f"x:{name}"][:] = value
+
+    def update_modes(self) -> bool:
+        """Modes by the signals; whether one has changed."""
+        changed = False
+        for _ in range(len(self.modes) + 2):
+            again = False
+            for mode in self.modes:
+                new, array = self.value("mode", mode.name), self.arrays[f"x:{mode.name}"]
+                if not np.array_equal(new, array):
+                    array[:] = new
+                    again = True
+            if not again:
+                return changed
+            changed = True
+        raise UnsupportedError(
+            f"the modes of '{self.name}' have no consistent value at {self.arrays['t'][0]}"
+        )
+
+    def modes_differ(self) -> bool:
+        """Whether the signals ask for other modes than those that hold."""
+        return any(
+            not np.array_equal(self.value("mode", mode.name), self.arrays[f"x:{mode.name}"])
+            for mode in self.modes
+        )

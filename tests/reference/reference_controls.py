@@ -1,0 +1,178 @@
+"""The laws of conditional subsystems in plain Python: controls, held outputs, merged outputs.
+
+They stand for the blocks of the same names in a flat diagram, with the same ports, and share nothing with
+their equations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from armblocks.diagram.controls import EnableControl, HeldOutput, MergedOutput, TriggerControl
+from armblocks.equations import Shape
+
+
+class _Law:
+    """What the network asks of every block."""
+
+    clock = None
+    period = 0.0
+    states = lines = guards = ()
+    has_events = False
+    expressions: Mapping[Any, Any] = {}
+    memory: tuple[str, ...] = ()
+    sides: tuple[str, ...] = ()
+
+    def __init__(
+        self, name: str, block: Any, shapes: Mapping[str, Shape], outputs: Mapping[str, Shape]
+    ) -> None:
+        self.name, self.block = name, block
+        self.gate: dict[str, np.ndarray] = {}
+        self.arrays: dict[str, np.ndarray] = {"t": np.zeros(1)}
+        self.arrays |= {f"u:{port}": np.zeros(math.prod(shape)) for port, shape in shapes.items()}
+        self.output_shapes = outputs
+        self.outputs = {port: np.zeros(math.prod(shape)) for port, shape in outputs.items()}
+        self.rates: dict[str, np.ndarray] = {}
+        self.modes = tuple(_Named(entry) for entry in self.sides)
+        self.arrays |= {f"x:{entry}": np.zeros(1) for entry in self.sides}
+        self.discrete = tuple(_Named(entry) for entry in self.memory)
+        for entry in self.memory:
+            self.arrays[f"x:{entry}"] = np.zeros(math.prod(outputs.get("y", ())))
+        self.fed = [key[2:] for key in self.arrays if key.startswith("u:")]
+        self.begin()
+
+    on, restarts, fires = True, False, False
+
+    def begin(self) -> None: ...
+    def restart(self) -> None: ...
+
+    def names(self, kind: str) -> list[str]:
+        return ["held"] if kind == "capture" and "held" in self.memory else []
+
+    def side(self) -> float:
+        """Whether the control signal is positive."""
+        return float(self.arrays["u:u"][0] > 0.0)
+
+    def update_modes(self) -> bool:
+        changed = self.modes_differ()
+        self.arrays["x:side"][:] = self.side()
+        return changed
+
+    def modes_differ(self) -> bool:
+        return bool(self.arrays["x:side"][0] != self.side())
+
+    def u(self, port: str, default: float = 1.0) -> float:
+        return float(self.arrays[f"u:{port}"][0]) if f"u:{port}" in self.arrays else default
+
+    def needs(self, kind: str, port: str) -> set[str]:
+        if kind == "mode":
+            return {"u:u"}
+        unread = {"u:u"} if self.sides else set[str]()
+        return {key for key in self.arrays if key.startswith("u:")} - unread if kind == "out" else set()
+
+
+class _Named:
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+
+class Enable(_Law):
+    """On while u is positive and the subsystem around is on; states start anew when it comes on, if asked."""
+
+    memory = ("seen",)
+    sides = ("side",)
+
+    def begin(self) -> None:
+        self.arrays["x:seen"][:] = -1.0
+
+    def value(self, kind: str, port: str) -> np.ndarray:
+        on = self.arrays["x:side"][0] * self.u("outer")
+        begins = self.block.restarts and on and self.arrays["x:seen"][0] == 0.0
+        return np.array([on if port == "on" else float(bool(begins or self.u("anew", 0.0)))])
+
+    def act(self, t: float) -> bool:
+        on, seen = self.value("out", "on")[0], self.arrays["x:seen"][0]
+        self.arrays["x:seen"][:] = on
+        return bool(on != seen)
+
+
+class Trigger(_Law):
+    """Fires where the sign of u has changed in the right direction and the subsystem around is on."""
+
+    memory = ("seen", "last")
+    sides = ("side",)
+
+    def begin(self) -> None:
+        self.arrays["x:seen"][:] = -1.0
+
+    def value(self, kind: str, port: str) -> np.ndarray:
+        side, seen = self.arrays["x:side"][0], self.arrays["x:seen"][0]
+        rises, falls = side == 1.0 and seen == 0.0, side == 0.0 and seen == 1.0
+        fires = {"rising": rises, "falling": falls, "either": rises or falls}[self.block.edge]
+        fires = fires and bool(self.u("outer"))
+        found = {
+            "fire": float(fires),
+            "restart": float(fires or bool(self.u("anew", 0.0))),
+            "elapsed": self.arrays["t"][0] - self.arrays["x:last"][0],
+        }
+        return np.array([found[port]])
+
+    def act(self, t: float) -> bool:
+        side, seen = self.arrays["x:side"][0], self.arrays["x:seen"][0]
+        if t <= 0.0:
+            self.arrays["x:seen"][:] = side
+            return False
+        if self.value("out", "fire")[0]:
+            self.arrays["x:last"][:] = t
+        self.arrays["x:seen"][:] = side
+        return bool(side != seen)
+
+
+class Held(_Law):
+    """u while the subsystem works, else the last value before it stopped, or the initial one."""
+
+    memory = ("held",)
+
+    def begin(self) -> None:
+        self.arrays["x:held"][:] = np.ravel(self.block.initial)
+
+    def value(self, kind: str, port: str) -> np.ndarray:
+        if self.u("works"):
+            return self.arrays["u:u"] + 0.0 * self.arrays["x:held"]
+        if kind == "out" and not self.block.fires and self.block.when_off == "reset":
+            return np.zeros_like(self.arrays["x:held"]) + np.ravel(self.block.initial)
+        return self.arrays["x:held"]
+
+    def names(self, kind: str) -> list[str]:
+        return ["held"] if kind == "capture" and not self.block.fires else []
+
+    def act(self, t: float) -> bool:
+        if self.block.fires and self.u("works"):
+            self.arrays["x:held"][:] = self.arrays["u:u"]
+        return False
+
+
+class Merged(_Law):
+    """The first input whose subsystem works, else what it was."""
+
+    memory = ("held",)
+
+    def begin(self) -> None:
+        self.arrays["x:held"][:] = np.ravel(self.block.initial)
+
+    def value(self, kind: str, port: str) -> np.ndarray:
+        for number in range(1, self.block.inputs + 1):
+            if self.u(f"works{number}"):
+                return self.arrays[f"u:u{number}"] + 0.0 * self.arrays["x:held"]
+        return self.arrays["x:held"]
+
+    def act(self, t: float) -> bool:
+        self.arrays["x:held"][:] = self.value("out", "y")
+        return False
+
+
+CONTROLS = {EnableControl: Enable, TriggerControl: Trigger, HeldOutput: Held, MergedOutput: Merged}

@@ -1,0 +1,433 @@
+"""All blocks of a diagram as numbers: what :mod:`reference_simulator` evaluates at one time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from reference_block import BlockNumbers, UnsupportedError
+from reference_controls import CONTROLS
+from reference_order import EvaluationOrder, Node, assign_clocks
+
+from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
+
+MOST_PASSES = 30
+
+
+class Network:
+    """All blocks of a diagram, the present time's signals, and what an instant does to them."""
+
+    def __init__(self, diagram: Diagram) -> None:
+        self.diagram = flat = flat_diagram(diagram)
+        shapes = infer_shapes(flat)
+        self.blocks: dict[str, Any] = {}
+        for name, block in flat.blocks.items():
+            kind = CONTROLS.get(type(block), BlockNumbers)
+            self.blocks[name] = kind(name, block, shapes.inputs[name], shapes.outputs[name])
+        self.drivers: dict[tuple[str, str], PortRef] = {
+            (name, port.name): flat.drivers[PortRef(name, port.name)]
+            for name, block in flat.blocks.items()
+            for port in block.input_ports()
+        }
+        for name, gate in flat.gates.items():
+            found = self.blocks[name]
+            found.gate = {key: self.blocks[ref.block].outputs[ref.port] for key, ref in gate.items()}
+            if "?elapsed" in gate and "p:T" in found.arrays:
+                found.arrays["p:T"] = found.gate["?elapsed"]
+        self._place_states()
+        self.clocks = assign_clocks(flat, self.blocks, self.drivers)
+        self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
+        self.fed_by: dict[Node, list[str]] = {}
+        self._start()
+
+    # -- structure -----------------------------------------------------------------------------------------
+
+    def _place_states(self) -> None:
+        """One vector x of all continuous states, of which the blocks' arrays are views."""
+        places = [(b, s) for b in self.blocks.values() for s in b.states]
+        self.x = np.zeros(sum(math.prod(state.shape) for _, state in places))
+        self.xdot = np.zeros_like(self.x)
+        self.places: list[tuple[Any, str, slice]] = []
+        start = 0
+        for block, state in places:
+            here = slice(start, start + math.prod(state.shape))
+            block.arrays[f"x:{state.name}"] = self.x[here]
+            self.places.append((block, state.name, here))
+            start = here.stop
+
+    # -- numbers -------------------------------------------------------------------------------------------
+
+    def _start(self) -> None:
+        self.frozen = False
+        self.ticking: set[int] = set()
+        self.t = 0.0
+        for block in self.blocks.values():
+            block.restart()
+            for name in block.names("held") if block.block.sampled else ():
+                block.outputs[name][:] = block.value("held", name)
+            for name in block.names("guess"):
+                block.outputs[name][:] = block.value("guess", name)
+            for line in block.lines:
+                block.arrays[f"x:{line.name}"][:] = block.value("past", line.name)
+                block.history[line.name].begin(block.value("past", line.name))
+        self.signs: dict[tuple[str, str], np.ndarray] = {
+            (name, guard.name): np.zeros(math.prod(guard.shape))
+            for name, block in self.blocks.items()
+            if block.has_events
+            for guard in block.guards
+        }
+        self.was_on = {name: True for name, _ in self.signs}
+
+    def shortest_delays(self) -> list[float]:
+        return [float(b.value("shortest", line.name)[0]) for b in self.blocks.values() for line in b.lines]
+
+    def breakpoints(self) -> list[float]:
+        return [float(b.value("break", k)[0]) for b in self.blocks.values() for k in b.names("break")]
+
+    def signals(self) -> dict[str, np.ndarray]:
+        """Every output in its shape, by ``block/port``."""
+        return {
+            f"{name}/{port}": array.reshape(block.output_shapes[port]).copy()
+            for name, block in self.blocks.items()
+            for port, array in block.outputs.items()
+        }
+
+    def evaluate(self, t: float, frozen: bool = False) -> None:
+        """All signals at a time; modes follow them, unless they are ``frozen`` as they are."""
+        self.t, self.frozen = t, frozen
+        for block in self.blocks.values():
+            block.arrays["t"][0] = t
+        for _ in range(MOST_PASSES):
+            changed = False
+            for loop in self.order.groups:
+                if loop in self.order.loops:
+                    self._solve(loop)
+                else:
+                    changed = self._work_out(loop[0]) or changed
+            if frozen or not (changed and self.order.late):
+                return
+        raise UnsupportedError(f"modes and signals have no consistent values at {t}")
+
+    def _feed(self, block: Any, port: str) -> None:
+        if port.endswith("'"):
+            ref = self.drivers[block.name, port[:-1]]
+            block.arrays[f"u:{port}"][:] = self.blocks[ref.block].rates[ref.port]
+        else:
+            ref = self.drivers[block.name, port]
+            block.arrays[f"u:{port}"][:] = self.blocks[ref.block].outputs[ref.port]
+
+    def _feed_all(self, block: Any) -> None:
+        for port in block.fed:
+            self._feed(block, port)
+
+    def _work_out(self, node: Node) -> bool:
+        """Evaluate one node; whether a mode has changed."""
+        kind, name, port = node
+        block = self.blocks[name]
+        held = block.clock is not None and (block.clock not in self.ticking or not block.on)
+        if kind == "modes":
+            if self.frozen or held:
+                return False
+            self._feed_some(block, node)
+            self._past(block)
+            return block.update_modes()
+        if kind == "out":
+            if port in block.block.time_derivatives:
+                ref = self.drivers[name, block.block.time_derivatives[port]]
+                block.outputs[port][:] = self.blocks[ref.block].rates[ref.port]
+            elif not held:
+                self._feed_some(block, node)
+                self._past(block)
+                block.outputs[port][:] = block.value("out", port)
+            return False
+        if kind == "rate":
+            self._rate(block, port)
+        else:
+            self._feed_some(block, node)
+            block.rates[f"x:{port}"] = block.value("xdot", port) * (1.0 if block.on else 0.0)
+        return False
+
+    def _feed_some(self, block: Any, node: Node) -> None:
+        for port in self._fed(node):
+            self._feed(block, port)
+
+    def _fed(self, node: Node) -> list[str]:
+        if node not in self.fed_by:
+            kind, name, port = node
+            block = self.blocks[name]
+            keys: set[str] = set()
+            for entry in [m.name for m in block.modes] if kind == "modes" else [port]:
+                keys |= block.needs("mode" if kind == "modes" else kind, entry)
+            self.fed_by[node] = sorted(key[2:] for key in keys if key.startswith("u:"))
+        return self.fed_by[node]
+
+    def _rate(self, block: Any, port: str) -> None:
+        if block.block.sampled or not isinstance(block, BlockNumbers):
+            block.rates[port] = np.zeros_like(block.outputs[port])
+            return
+        rates: dict[str, np.ndarray] = {}
+        for key in sorted(block.needs("out", port)):
+            letter, _, entry = key.partition(":")
+            if letter == "u":
+                ref = self.drivers[block.name, entry]
+                rates[key] = block.rates.setdefault(f"of {key}", np.zeros_like(block.arrays[key]))
+                rates[key][:] = self.blocks[ref.block].rates[ref.port]
+            elif letter == "x" and f"x:{entry}" in block.rates:
+                rates[key] = block.rates.setdefault(f"of {key}", np.zeros_like(block.arrays[key]))
+                rates[key][:] = block.rates[f"x:{entry}"]
+        block.rates[port] = block.rate(port, rates).copy()
+
+    def _solve(self, loop: tuple[Node, ...]) -> None:
+        """An algebraic loop, by Newton's method with differences on all its signals."""
+        outs = [self.blocks[name].outputs[port] for kind, name, port in loop if kind == "out"]
+        if any(kind != "out" for kind, _, _ in loop):
+            raise UnsupportedError("a loop through derivatives")
+
+        def residual(v: np.ndarray) -> np.ndarray:
+            found = []
+            start = 0
+            for array in outs:
+                array[:] = v[start : start + array.size]
+                start += array.size
+            for kind, name, port in loop:
+                block = self.blocks[name]
+                if block.clock is not None and block.clock not in self.ticking:
+                    found.append(block.outputs[port].copy())
+                    continue
+                self._feed_some(block, (kind, name, port))
+                self._past(block)
+                result = block.value("out", port).copy()
+                # The equation of an implicit output is not its value but what has to be 0.
+                found.append(result + block.outputs[port] if port in block.block.implicit_outputs else result)
+            return np.concatenate(found) - v
+
+        v = np.concatenate(outs)
+        if not np.isfinite(v).all():
+            v[:] = 0.0
+        for _ in range(30):
+            r = residual(v)
+            steps = 1e-7 * np.maximum(1.0, np.abs(v))
+            J = np.column_stack([(residual(v + s * d) - r) / s for s, d in zip(steps, np.eye(v.size))])
+            change = np.linalg.solve(J, r)
+            v = v - change
+            if np.max(np.abs(change)) <= 1e-14 * (1.0 + np.max(np.abs(v))):
+                break
+        else:
+            raise UnsupportedError("an algebraic loop was not solved")
+        residual(v)
+
+    def _past(self, block: Any) -> None:
+        """What delayed signals were."""
+        for line in block.lines:
+            needed = block.needs("delay", line.name)
+            for key in needed:
+                if key.startswith("u:"):
+                    self._feed(block, key[2:])
+            when = self.t - float(block.value("delay", line.name)[0])
+            history = block.history[line.name]
+            block.arrays[f"x:{line.name}"][:] = history.at(when, history.segment if self.frozen else None)
+
+    # -- flow ----------------------------------------------------------------------------------------------
+
+    def derivative(self, t: float) -> np.ndarray:
+        """dx/dt with the modes of the start of the step."""
+        self.evaluate(t, frozen=True)
+        for block, name, here in self.places:
+            if not block.on:
+                self.xdot[here] = 0.0
+                continue
+            self._feed_all(block)
+            self.xdot[here] = block.value("xdot", name)
+        return self.xdot.copy()
+
+    def modes_differ(self) -> bool:
+        """Whether the present signals ask for other modes than those that hold."""
+        for block in self.blocks.values():
+            if block.clock is not None or not block.on:
+                continue
+            for line in block.lines:
+                self._past(block)
+                when = self.t - float(block.value("delay", line.name)[0])
+                if block.history[line.name].segment_at(when) != block.history[line.name].segment:
+                    return True
+            if block.modes:
+                self._feed_all(block)
+                if block.modes_differ():
+                    return True
+        return False
+
+    def fired(self) -> dict[tuple[str, str], np.ndarray]:
+        """Guards whose sign is the opposite of the one they had, in a direction that counts: +1 or -1."""
+        found: dict[tuple[str, str], np.ndarray] = {}
+        for (name, guard), before in self.signs.items():
+            block = self.blocks[name]
+            if not block.on:
+                continue
+            self._feed_all(block)
+            now = np.sign(block.value("guard", guard))
+            direction = next(g.direction for g in block.guards if g.name == guard)
+            e = np.where((now * before < 0.0) & (now * direction >= 0.0), now, 0.0)
+            if e.any():
+                found[name, guard] = e
+        return found
+
+    def take_signs(self, only: Iterable[tuple[str, str]] | None = None) -> None:
+        for key in self.signs if only is None else only:
+            block = self.blocks[key[0]]
+            if not block.on:
+                continue
+            self._feed_all(block)
+            now = np.sign(block.value("guard", key[1]))
+            kept = self.signs[key] if only is None else 0.0 * now
+            self.signs[key] = np.where(now != 0.0, now, kept)
+
+    # -- instants ------------------------------------------------------------------------------------------
+
+    def capture(self, t: float) -> None:
+        """What keeps how things were just before this time."""
+        if not any(block.names("capture") for block in self.blocks.values()):
+            return
+        self.evaluate(float(np.nextafter(t, 0.0)), frozen=True)
+        for block in self.blocks.values():
+            if block.on:
+                self._feed_all(block)
+                kept = {name: block.value("capture", name).copy() for name in block.names("capture")}
+                for name, value in kept.items():
+                    block.arrays[f"x:{name}"][:] = value
+
+    def tick(self, t: float, clocks: list[int]) -> None:
+        """Outputs of all blocks that tick, then their discrete states."""
+        self.ticking = set(clocks)
+        for _ in range(2):  # a restart at this tick changes what is read
+            self.evaluate(t)
+            again = [b for b in self.blocks.values() if b.clock in self.ticking and b.restarts]
+            if not again:
+                break
+            for block in again:
+                block.restart()
+        new: list[tuple[np.ndarray, np.ndarray]] = []
+        for block in self.blocks.values():
+            if block.clock in self.ticking and block.on:
+                new += self._updated(block)
+        self._act(t, new)
+        self.ticking = set()
+
+    def turn(self, t: float, first: bool = False) -> bool:
+        """One turn of an instant; whether it has changed a state or a mode.
+
+        Guards and resets of a block see consistent signals at its inputs, but its own modes as they were
+        before: an event is where the old mode ends.
+        """
+        before = self.kept()
+        eventful = [block for block in self.blocks.values() if block.has_events]
+        old = {block.name: block.mode_values() for block in eventful}
+        self.evaluate(t)
+        consistent = {block.name: block.mode_values() for block in eventful}
+        for block in eventful:
+            block.set_modes(old[block.name])
+        fired = {} if first else self.fired()
+        if not first:
+            self.take_signs()
+        new: list[tuple[np.ndarray, np.ndarray]] = []
+        for block in eventful if fired or first else ():
+            # An event decides the new modes of its block; where there is none, the signals do.
+            decides = first or any(name == block.name for name, _ in fired)
+            if block.on:
+                new += self._reset(block, fired, set() if decides else set(old[block.name]))
+                consistent[block.name] = {} if decides else consistent[block.name]
+        for block in eventful:
+            block.set_modes(consistent[block.name])
+        acted = self._act(t, new)
+        self.evaluate(t)
+        if fired:
+            self.take_signs(fired)
+        return bool(fired) or acted or self.kept() != before
+
+    def _reset(
+        self, block: Any, fired: Mapping[tuple[str, str], np.ndarray], without: set[str]
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The arrays of a block that events change, but those ``without``, and their new values."""
+        self._feed_all(block)
+        for guard in block.guards:
+            block.arrays[f"e:{guard.name}"][:] = fired.get((block.name, guard.name), 0.0)
+        names = [name for name in block.names("reset") if name not in without]
+        return [(block.arrays[f"x:{name}"], block.value("reset", name).copy()) for name in names]
+
+    def _updated(self, block: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The arrays of discrete states, and what a tick makes of them."""
+        self._feed_all(block)
+        names = block.names("update")
+        return [(block.arrays[f"x:{name}"], block.value("update", name).copy()) for name in names]
+
+    def _act(self, t: float, new: list[tuple[np.ndarray, np.ndarray]]) -> bool:
+        """Put new states into their places together with what the controls of subsystems ask for."""
+        starts: list[Any] = []
+        for block in self.blocks.values():
+            if block.restarts and block.clock not in self.ticking:
+                starts.append(block)
+            if block.fires and block.block.sampled:
+                new += self._updated(block)
+        acted = False
+        for block in self.blocks.values():
+            if hasattr(block, "act"):
+                self._feed_all(block)
+                acted = block.act(t) or acted
+        for array, value in new:
+            array[:] = value
+        for block in starts:
+            block.restart()
+        return acted
+
+    def end_instant(self) -> None:
+        """Guards of a subsystem that was switched on are watched from now on."""
+        for name, guard in self.signs:
+            if self.blocks[name].on and not self.was_on[name]:
+                self._feed_all(self.blocks[name])
+                self.signs[name, guard] = np.sign(self.blocks[name].value("guard", guard))
+        self.was_on = {name: self.blocks[name].on for name in self.was_on}
+
+    def note(self, x: Mapping[float, np.ndarray], t: float, h: float) -> None:
+        """Keep the inputs of delays during a step, by the states at four places of it (0, 1/3, 2/3, 1)."""
+        lines = [(block, line) for block in self.blocks.values() for line in block.lines]
+        if not lines:
+            return
+        found: dict[int, list[np.ndarray]] = {k: [] for k in range(len(lines))}
+        end = self.x.copy()
+        for place, state in x.items():
+            self.x[:] = state
+            time = t + place * h
+            self.evaluate(time if place < 1.0 else float(np.nextafter(time, 0.0)), frozen=True)
+            for k, (block, line) in enumerate(lines):
+                self._feed(block, line.input)
+                wide = np.zeros(math.prod(line.shape)) + block.arrays[f"u:{line.input}"]
+                found[k].append(wide)
+        self.x[:] = end
+        for k, (block, line) in enumerate(lines):
+            block.history[line.name].add(t, h, np.array(found[k]))
+
+    def settle_delays(self) -> None:
+        """At an instant: which segment of the past is read from now on."""
+        for block in self.blocks.values():
+            for line in block.lines:
+                when = self.t - float(block.value("delay", line.name)[0])
+                block.history[line.name].segment = block.history[line.name].segment_at(when)
+
+    def kept(self) -> tuple[bytes, ...]:
+        """States, modes and held outputs, to compare."""
+        found = [self.x]
+        for block in self.blocks.values():
+            found += [block.arrays[f"x:{s.name}"] for s in (*block.discrete, *block.modes)]
+            found += list(block.outputs.values()) if block.clock is not None else []
+        return tuple(array.tobytes() for array in found)
+
+    def ended(self) -> bool:
+        """Whether a block ends the run."""
+        found = False
+        for block in self.blocks.values():
+            for guard in block.guards:
+                if guard.action in ("stop", "fail") and block.on:
+                    self._feed_all(block)
+                    found = found or bool((block.value("guard", guard.name) > 0.0).any())
+        return found

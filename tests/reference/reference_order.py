@@ -1,0 +1,176 @@
+"""The structure of a network: which clock each block obeys, and in which order signals are evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from graphlib import TopologicalSorter
+from typing import Any
+
+import numpy as np
+from reference_block import BlockNumbers, UnsupportedError
+
+from armblocks.diagram import Diagram, PortRef
+
+Node = tuple[str, str, str]
+"""What is evaluated: ("out" | "rate" | "modes" | "xdot", block, port)."""
+
+
+def assign_clocks(
+    flat: Diagram, blocks: Mapping[str, Any], drivers: Mapping[tuple[str, str], PortRef]
+) -> list[tuple[float, float]]:
+    """Periods and offsets; a block without a sample time takes the fastest clock that reaches it."""
+    sampled = [n for n, b in flat.blocks.items() if b.sampled and "?fire" not in flat.gates.get(n, {})]
+    clock_of: dict[str, tuple[float, float]] = {}
+    for name in sampled:
+        given = np.atleast_1d(flat.blocks[name].parameter_value("sample_time"))
+        if given.tolist() != [-1.0]:
+            clock_of[name] = (float(given[0]), float(given[1]) if given.size > 1 else 0.0)
+    sources: dict[str, set[str]] = {name: set() for name in flat.blocks}
+    targets: dict[str, set[str]] = {name: set() for name in flat.blocks}
+    for (name, _), ref in drivers.items():
+        sources[name].add(ref.block)
+        targets[ref.block].add(name)
+    stated = dict(clock_of)
+    for name in sampled:
+        for step in (sources, targets):
+            if name not in clock_of and (near := _reached(name, step, stated)):
+                clock_of[name] = min(near)
+        if name not in clock_of:
+            raise UnsupportedError(f"'{name}' has no clock")
+    clocks = sorted(set(clock_of.values()))
+    for name, clock in clock_of.items():
+        block = blocks[name]
+        block.clock, block.period = clocks.index(clock), clock[0]
+        block.arrays["p:T"][:] = clock[0]
+    return clocks
+
+
+def _reached(
+    name: str, step: Mapping[str, Iterable[str]], stated: Mapping[str, tuple[float, float]]
+) -> set[tuple[float, float]]:
+    found: set[tuple[float, float]] = set()
+    seen, pending = {name}, list(step[name])
+    while pending:
+        entry = pending.pop()
+        if entry in seen:
+            continue
+        seen.add(entry)
+        if entry in stated:
+            found.add(stated[entry])
+        else:
+            pending.extend(step[entry])
+    return found
+
+
+class EvaluationOrder:
+    """In which order the nodes of a network are evaluated: what is needed comes first.
+
+    ``groups``: nodes that are evaluated together, one by itself or the several of an algebraic loop.
+    ``loops``: those groups that are loops. ``late``: whether a mode is used before it is evaluated, so that a
+    second pass is needed.
+    """
+
+    def __init__(
+        self,
+        blocks: Mapping[str, Any],
+        drivers: Mapping[tuple[str, str], PortRef],
+        gates: Mapping[str, Mapping[str, PortRef]],
+    ) -> None:
+        self.blocks, self.drivers, self.gates = blocks, drivers, gates
+        hard: dict[Node, set[Node]] = {}
+        soft: dict[Node, set[Node]] = {}
+        pending: list[Node] = [("out", n, port) for n, b in self.blocks.items() for port in b.outputs]
+        pending += [("modes", n, "") for n, b in self.blocks.items() if b.modes]
+        for name, block in self.blocks.items():
+            for key in {k for entry in block.expressions for k in block.needs(*entry)}:
+                if key.startswith("u:") and key.endswith("'"):
+                    pending.append(self._rate_of(name, key[2:-1]))
+        while pending:
+            node = pending.pop()
+            if node not in hard:
+                hard[node], soft[node] = self.needs(node)
+                pending += [*hard[node], *soft[node]]
+        # A mode that depends on the very signals that it decides is left to the next pass.
+        both = {node: hard[node] | soft[node] for node in hard}
+        reach = _closure(both)
+        graph = {n: hard[n] | {m for m in soft[n] if n not in reach[m]} for n in hard}
+        reach = _closure(graph)
+        loops = {n: tuple(sorted(m for m in reach[n] if n in reach[m])) or (n,) for n in graph}
+        groups = {loop: {loops[m] for n in loop for m in graph[n]} - {loop} for loop in loops.values()}
+        order = list(TopologicalSorter(groups).static_order())
+        self.loops = [loop for loop in order if len(loop) > 1 or loop[0] in graph[loop[0]]]
+        done: set[Node] = set()
+        self.late = False  # whether a mode is used before it is evaluated
+        for loop in order:
+            for node in loop:
+                self.late = self.late or bool(soft[node] - done - set(loop)) or bool(soft[node] & set(loop))
+            done |= set(loop)
+        self.groups = order
+
+    def needs(self, node: Node) -> tuple[set[Node], set[Node]]:
+        """What a node must wait for, and what it waits for where that is possible (its modes, a restart)."""
+        kind, name, port = node
+        block = self.blocks[name]
+        if kind == "modes":
+            hard = set[Node]()
+            for mode in block.modes:
+                hard |= self._inputs_of(block, block.needs("mode", mode.name))
+            return hard, set()
+        soft: set[Node] = {("modes", name, "")} if getattr(block, "modes", ()) else set()
+        gate = self.gates.get(name, {})
+        if block.clock is not None or block.block.sampled:
+            soft |= {("out", ref.block, ref.port) for ref in gate.values()}
+        if kind == "out":
+            if port in block.block.time_derivatives:
+                return {self._rate_of(name, block.block.time_derivatives[port])}, set()
+            unknown = {node} if port in block.block.implicit_outputs else set[Node]()
+            return self._inputs_of(block, block.needs("out", port)) | unknown, soft
+        if kind == "rate":
+            if port in block.block.time_derivatives:
+                raise UnsupportedError(f"'{name}' is differentiated twice")
+            if block.lines:
+                raise UnsupportedError(f"the delayed signal '{name}' is differentiated")
+            if block.block.sampled or not isinstance(block, BlockNumbers):
+                return {("out", name, port)}, set()
+            needed = block.needs("out", port)
+            hard = self._inputs_of(block, needed) | {("out", name, port)}
+            for key in needed:
+                letter, _, entry = key.partition(":")
+                if letter == "u":
+                    if entry.endswith("'"):
+                        raise UnsupportedError(f"'{name}' reads a derivative that is differentiated")
+                    hard.add(self._rate_of(name, entry))
+                if letter == "x" and any(state.name == entry for state in block.states):
+                    hard.add(("xdot", name, entry))
+            return hard, soft
+        return self._inputs_of(block, block.needs("xdot", port)), soft
+
+    def _rate_of(self, name: str, port: str) -> Node:
+        ref = self.drivers[name, port]
+        return ("rate", ref.block, ref.port)
+
+    def _inputs_of(self, block: Any, needed: set[str]) -> set[Node]:
+        found: set[Node] = set()
+        for key in needed:
+            letter, _, port = key.partition(":")
+            if letter == "u" and port.endswith("'"):
+                found.add(self._rate_of(block.name, port[:-1]))
+            elif letter == "u":
+                ref = self.drivers[block.name, port]
+                found.add(("out", ref.block, ref.port))
+        return found
+
+
+def _closure(graph: Mapping[Node, set[Node]]) -> dict[Node, set[Node]]:
+    """Everything that each node leads to, by one or more steps."""
+    found: dict[Node, set[Node]] = {}
+    for node in graph:
+        reached: set[Node] = set()
+        pending = list(graph[node])
+        while pending:
+            entry = pending.pop()
+            if entry not in reached:
+                reached.add(entry)
+                pending += graph[entry]
+        found[node] = reached
+    return found

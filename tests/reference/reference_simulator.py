@@ -1,0 +1,219 @@
+"""Executable semantics of a diagram: a slow simulator to check the native one against.
+
+It shares with the product the definitions of the blocks (``Block.outputs``, ``derivatives``, ``mode_values``,
+``resets`` …, evaluated one block at a time), the flattening of hierarchies and the inference of shapes. It
+does not use ``trace_diagram``, ``HybridSystem`` or the compiler.
+
+**Signals.** At a time t, with the continuous states x and the discrete states z, every output is evaluated
+once all inputs that it depends on are known. Outputs that depend on each other form an algebraic loop, which
+Newton's method solves. A sampled block's output is held between the ticks of its clock.
+
+**Modes.** A mode is a function of the signals: ``mode_values`` (for a condition: whether its quantity is
+positive) at *every* evaluation, also inside a Runge-Kutta step. Only where that function reads the mode
+itself (a relay's hysteresis) does the mode have a memory: the value at the last accepted time. Where modes
+and signals depend on each other, both are evaluated again until no mode changes.
+
+**Flow.** Between instants x follows the classical Runge-Kutta method with steps of at most ``step``. Within
+a step the modes of its start hold. The step is accepted when the modes by the signals are the same at all its
+stages, no guard has changed its sign, and no delayed jump has arrived. Otherwise bisection finds the shortest
+step that is not accepted, to 1e-14; its end is an instant.
+
+**Instant.** An instant is t = 0, a tick, a breakpoint (a time at which a source jumps), a recorded time, or
+the time of an event. At an instant, in this order:
+
+1. left limits: what keeps a value "just before" (the held output of a subsystem that is switched off) takes
+   it from the signals with the old modes and states;
+2. ticks: the outputs of all blocks whose clock ticks are evaluated with the others, from discrete states as
+   they were before; then all their discrete states are updated at once;
+3. turns: modes are made consistent with the signals; guards whose sign has changed fire, and ``resets`` gives
+   new states; controls of conditional subsystems act. This is repeated until a turn changes nothing;
+4. the instant is recorded: signals are right-continuous.
+
+**Conditional subsystems.** While one is off, the states of its blocks stand still, and no guard fires; its
+outputs keep the last value they had while it was on, or return to ``initial``. A restart gives all states
+inside their start values. A trigger executes the blocks inside once, as a tick does.
+
+What it does not cover raises ``UnsupportedError``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from reference_block import UnsupportedError
+from reference_network import Network
+
+from armblocks.diagram import Diagram
+
+__all__ = ["EndlessEventsError", "Network", "ReferenceRun", "UnsupportedError", "run_reference"]
+
+MOST_TURNS = 100
+SAME = 2.0**-50
+"""Times within this relative distance are one instant."""
+
+
+class EndlessEventsError(Exception):
+    """An instant whose turns do not end, or more events than the run may have."""
+
+
+class ReferenceRun:
+    """One run of a diagram from 0 to ``stop``: ``record`` (N,) are the times to record, the first is 0."""
+
+    def __init__(
+        self, diagram: Diagram, record: np.ndarray, step: float = 0.01, most_events: int = 500
+    ) -> None:
+        self.network = network = Network(diagram)
+        self.step = min([step, *network.shortest_delays()])
+        self.stop = float(record[-1])
+        self.record = record
+        self.most_events = most_events
+        self.events = 0
+        self.event_time = 0.0
+        self.longest = self.step
+        self.t = 0.0
+        self.rows: list[dict[str, np.ndarray]] = []
+        self.stopped = False
+
+    def run(self) -> dict[str, np.ndarray]:
+        """Signals ``(N, *shape)`` by ``block/port``; fewer rows where a block ended the run."""
+        network = self.network
+        network.evaluate(0.0)
+        self.begin()
+        for t, clocks, recorded, jumps in self.instants():
+            if t > 0.0:
+                while not self.stopped and self.t < t:
+                    self.flow(t, jumps)
+                if self.stopped:
+                    break
+            self.instant(t, clocks)
+            if recorded:
+                self.rows.append(network.signals())
+            if self.stopped:
+                break
+        return {name: np.array([row[name] for row in self.rows]) for name in self.rows[0]}
+
+    # -- time ----------------------------------------------------------------------------------------------
+
+    def instants(self) -> list[tuple[float, list[int], bool, bool]]:
+        """All times known beforehand: which clocks tick, whether it is recorded, whether a source jumps."""
+        marks: list[tuple[float, str, int]] = [(float(t), "record", 0) for t in self.record]
+        for number, (period, offset) in enumerate(self.network.clocks):
+            count = int((self.stop - offset) / period) + 2
+            marks += [(offset + k * period, "tick", number) for k in range(count)]
+        marks += [(t, "jump", 0) for t in self.network.breakpoints() if t > 0.0]
+        found: list[tuple[float, list[int], bool, bool]] = []
+        for t, what, number in sorted(marks):
+            if t > self.stop * (1.0 + SAME):
+                break
+            if not found or t > found[-1][0] * (1.0 + SAME) + 1e-300:
+                found.append((t, [], False, False))
+            time, clocks, recorded, jumps = found[-1]
+            clocks = [*clocks, number] if what == "tick" else clocks
+            # A jump is at the later of the times that are one instant, so that the source has jumped there.
+            time = max(time, t) if what == "jump" else time
+            found[-1] = (time, clocks, recorded or what == "record", jumps or what == "jump")
+        return found
+
+    # -- flow ----------------------------------------------------------------------------------------------
+
+    def flow(self, end: float, jumps: bool) -> None:
+        """One accepted step towards ``end``, and the instant of an event after it, if there is one."""
+        network = self.network
+        latest = float(np.nextafter(end, 0.0)) if jumps else np.inf
+        x = network.x.copy()
+        h = end - self.t
+        h = h if h < 1.5 * self.longest else self.longest
+        self.longest = min(self.step, 2.0 * self.longest)
+        calm = self.stepped(x, h, latest)
+        if not calm:
+            low, high = 0.0, h
+            while (
+                high - low > 1e-14 * max(1.0, self.t)
+                and self.t + low < self.t + (low + high) / 2 < self.t + high
+            ):
+                if self.stepped(x, (low + high) / 2, latest):
+                    low = (low + high) / 2
+                else:
+                    high = (low + high) / 2
+            h = high
+            self.stepped(x, h, latest)
+        network.note(self.thirds(x, h), self.t, h)
+        reached = end if h >= end - self.t else self.t + h
+        self.t = reached
+        if calm:
+            network.evaluate(min(self.t, latest), frozen=True)
+            network.take_signs()
+            return
+        # Bounces may get shorter and shorter: no step leaps over one.
+        self.longest = min(self.step, max(1e-9, (self.t - self.event_time) / 16))
+        self.event_time = self.t
+        self.events += 1
+        if self.events > self.most_events:
+            raise EndlessEventsError(f"more than {self.most_events} events at {self.t}")
+        if self.t < end:
+            self.instant(self.t, [])
+
+    def stepped(self, start: np.ndarray, h: float, latest: float) -> bool:
+        """Take one Runge-Kutta step with the modes of its start; whether they hold at all its stages."""
+        network, t = self.network, self.t
+        calm = True
+
+        def rate(place: float, change: np.ndarray | float) -> np.ndarray:
+            nonlocal calm
+            network.x[:] = start + change
+            found = network.derivative(min(t + place, latest))
+            calm = calm and (place == 0.0 or not network.modes_differ())
+            return found
+
+        a = rate(0.0, 0.0)
+        b = rate(h / 2, h / 2 * a)
+        c = rate(h / 2, h / 2 * b)
+        d = rate(h, h * c)
+        network.x[:] = start + h / 6 * (a + 2 * b + 2 * c + d)
+        self.slopes = a, d
+        network.evaluate(min(t + h, latest), frozen=True)
+        return calm and not network.modes_differ() and not network.fired()
+
+    def thirds(self, start: np.ndarray, h: float) -> dict[float, np.ndarray]:
+        """The states at 0, 1/3, 2/3 and 1 of the step just taken, by Hermite's cubic."""
+        end = self.network.x.copy()
+        a, d = self.slopes
+        found: dict[float, np.ndarray] = {}
+        for s in (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0):
+            cubic = (1 + 2 * s) * (1 - s) ** 2 * start + s * s * (3 - 2 * s) * end
+            found[s] = cubic + h * s * (1 - s) * ((1 - s) * a - s * d)
+        return found
+
+    # -- instants ------------------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """At t = 0 no guard has a sign yet: resets without events give the states that signals ask for."""
+        for _ in range(MOST_TURNS):
+            if not self.network.turn(0.0, first=True):
+                break
+        self.network.take_signs()
+
+    def instant(self, t: float, clocks: list[int]) -> None:
+        """Left limits, ticks, turns."""
+        network = self.network
+        if t > 0.0:
+            network.capture(t)
+        self.t = t
+        if clocks:
+            network.tick(t, clocks)
+        for _ in range(MOST_TURNS):
+            if not network.turn(t):
+                break
+        else:
+            raise EndlessEventsError(f"the events at {t} do not end")
+        network.settle_delays()
+        network.end_instant()
+        self.stopped = network.ended()
+
+
+def run_reference(
+    diagram: Diagram, record: Sequence[float], step: float = 0.01, most_events: int = 500
+) -> dict[str, np.ndarray]:
+    """Signals ``(N, *shape)`` by ``block/port`` at the times ``record`` (N,), which begin with 0."""
+    return ReferenceRun(diagram, np.asarray(record, dtype=np.float64), step, most_events).run()

@@ -1,0 +1,157 @@
+"""The reference simulator against closed forms, and every block of the library against it."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from block_formulas import FORMULAS, broken_formulas
+from reference_simulator import EndlessEventsError, UnsupportedError, run_reference
+
+import armblocks as ab
+from armblocks import blocks as bl
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, DiagramBuilder
+
+TIMES = np.arange(41) * 0.05
+
+
+def chain(source: Block, *blocks: Block) -> ab.Diagram:
+    """A source and blocks behind it, named ``u``, ``b1``, ``b2`` …"""
+    builder = DiagramBuilder("chain")
+    last = builder.add("u", source)
+    for number, block in enumerate(blocks, 1):
+        last = builder.add(f"b{number}", block, last)
+    return builder.build()
+
+
+# -- closed forms ------------------------------------------------------------------------------------------
+
+
+def test_a_mode_follows_a_jump_from_its_border() -> None:
+    """The sawtooth reaches -1 exactly where it jumps to 1: the limiter is between its limits again."""
+    wave = bl.SignalGenerator(waveform="sawtooth", frequency=2.652)
+    found = run_reference(chain(wave, bl.Saturation(lower=-1.0, upper=1.0), bl.Integrator()), TIMES)
+    phase = np.mod(TIMES * 2.652, 1.0)
+    np.testing.assert_allclose(found["u/y"], 1.0 - 2.0 * phase, atol=1e-12)
+    np.testing.assert_array_equal(found["b1/y"], np.clip(found["u/y"], -1.0, 1.0))
+    np.testing.assert_allclose(found["b2/y"], (phase - phase**2) / 2.652, atol=1e-10)
+
+
+def test_a_hysteresis_has_a_memory() -> None:
+    """On from sin t = 0.5 upwards to sin t = -0.5 downwards."""
+    t = np.arange(101) * 0.1
+    found = run_reference(chain(bl.SineWave(), bl.Relay(), bl.Integrator()), t)
+    on, off = math.pi / 6, 7 * math.pi / 6
+    hours = sum(np.clip(t, on + k, off + k) - (on + k) for k in (0.0, 2 * math.pi))
+    np.testing.assert_allclose(found["b2/y"], hours, atol=1e-10)
+
+
+def test_a_ball_bounces() -> None:
+    """Dropped from 1 m with e = 0.5: the times of the bounces are a geometric series."""
+    builder = DiagramBuilder("ball")
+    place = bl.SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True)
+    ball = builder.add("ball", place, builder.add("weight", bl.Constant(value=-9.81)))
+    builder.connect(builder.add("bounce", bl.Gain(gain=-0.5), ball["dx"]), ball["dx0"])
+    found = run_reference(builder.build(), TIMES)
+    fall = math.sqrt(2 / 9.81)
+    t = TIMES - fall
+    expected = 1.0 - 9.81 / 2 * TIMES**2
+    for bounce in range(60):
+        speed, flight = 9.81 * fall * 0.5 ** (bounce + 1), 2 * fall * 0.5 ** (bounce + 1)
+        expected = np.where(t >= 0.0, speed * t - 9.81 / 2 * t**2, expected)
+        t = t - flight
+    expected = np.where(3 * fall <= TIMES, 0.0, expected)
+    np.testing.assert_allclose(found["ball/x"], expected, atol=1e-9)
+
+
+def test_a_delayed_jump_arrives_on_time() -> None:
+    """A step at 0.31 s, 0.5 s later, into an integrator."""
+    found = run_reference(chain(bl.Step(time=0.31), bl.TransportDelay(delay=0.5), bl.Integrator()), TIMES)
+    np.testing.assert_allclose(found["b2/y"], np.maximum(TIMES - 0.81, 0.0), atol=1e-12)
+
+
+def test_what_is_held_is_the_value_from_just_before() -> None:
+    """A subsystem around t, on in (0, 1): its output stays 1, its integral stays 1/2."""
+    builder, inner = DiagramBuilder("outer"), DiagramBuilder("inner")
+    entered = inner.input("u")
+    inner.output("y", entered)
+    inner.output("area", inner.add("area of u", bl.Integrator(), entered))
+    enable = builder.add("enable", bl.Step(time=1.0, initial=1.0, final=0.0))
+    builder.add(
+        "sub", bl.EnabledSubsystem(diagram=inner.build()), builder.add("t", bl.Clock()), enable=enable
+    )
+    found = run_reference(builder.build(), TIMES)
+    np.testing.assert_allclose(found["sub/y/y"], np.minimum(TIMES, 1.0), atol=1e-15)
+    np.testing.assert_allclose(found["sub/area/y"], np.minimum(TIMES, 1.0) ** 2 / 2, atol=1e-12)
+
+
+def test_ticks_work_from_what_was_before() -> None:
+    """z(k + 1) = z(k) + 0.1 k 0.1, read before it is changed."""
+    found = run_reference(chain(bl.Clock(), bl.DiscreteIntegrator(sample_time=0.1)), TIMES)
+    k = np.floor(TIMES / 0.1 + 1e-9)
+    np.testing.assert_allclose(found["b1/y"], 0.01 * k * (k - 1) / 2, atol=1e-14)
+
+
+def test_an_algebraic_loop_is_solved() -> None:
+    """y = sin t - y^3."""
+    builder = DiagramBuilder("loop")
+    rest = builder.add("rest", bl.Sum(signs="+-"), builder.add("u", bl.SineWave()))
+    builder.connect(builder.add("cube", bl.Expression(formula="u^3"), rest), rest["u2"])
+    y = run_reference(builder.build(), TIMES)["rest/y"]
+    np.testing.assert_allclose(y + y**3, np.sin(TIMES), atol=1e-12)
+
+
+def test_what_has_no_end_is_said() -> None:
+    with pytest.raises(EndlessEventsError, match="more than 20 events"):
+        run_reference(chain(bl.SineWave(frequency=1e3), bl.Sign()), TIMES, most_events=20)
+
+
+def test_what_is_not_covered_is_said() -> None:
+    with pytest.raises(UnsupportedError, match="differentiated twice"):
+        run_reference(chain(bl.SineWave(), bl.Derivative(), bl.Derivative()), TIMES)
+
+
+# -- every block of the library ----------------------------------------------------------------------------
+
+NOT_COVERED = {
+    "ArmPlant": "has a reference of its own, sticking_reference, and is slow here",
+    "CalledPythonFunction": "Python is called at ticks",
+    "FromFile": "reads a table by index",
+}
+TRIALS = ((0.01, 11), (0.0005, 4))
+"""Step and count of recorded times; the second for what is stiff, as a robot with a stiff controller."""
+
+
+@pytest.mark.parametrize("kind", [name for name in BLOCKS if name not in NOT_COVERED])
+def test_a_native_run_is_what_the_reference_gives(kind: str) -> None:
+    """The block's worked example, natively with rtol 1e-9."""
+    diagram = ab.block_example(kind)
+    worst: dict[str, float] = {}
+    for step, count in TRIALS:
+        times = np.arange(count) * 0.1
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a limit of a robot that is passed is not the subject here
+            found = ab.simulate(diagram, stop_time=float(times[-1]), sample_time=0.1, rtol=1e-9, atol=1e-12)
+        wanted = run_reference(diagram, times, step)
+        worst = {name: distance(found[name], values) for name, values in wanted.items()}
+        if all(value < 1e-6 for value in worst.values()):
+            return
+    raise AssertionError({name: value for name, value in worst.items() if not value < 1e-6})
+
+
+def distance(found: np.ndarray, wanted: np.ndarray) -> float:
+    """The largest difference, relative to 1 + the largest value."""
+    if found.shape != wanted.shape:
+        return math.inf
+    return float(np.abs(found - wanted).max(initial=0.0) / (1.0 + np.abs(wanted).max(initial=0.0)))
+
+
+@pytest.mark.parametrize("kind", FORMULAS)
+def test_a_block_gives_its_formula(kind: str) -> None:
+    """At every recorded time of its worked example."""
+    diagram = ab.block_example(kind)
+    found = ab.simulate(diagram, stop_time=10.0, sample_time=0.05)
+    assert broken_formulas(diagram, found, found.time) == {}
