@@ -81,9 +81,9 @@ class Stage:
         """The bodies in the world at one pose (L+2, 4, 4), with the pedestal."""
         return [*(body.mesh.moved(pose[body.row]) for body in self.bodies), *self.pedestal]
 
-    def render(self, pose: _Array) -> Rendering:
-        """The shaded bodies at one pose."""
-        return render(self.meshes(pose), self.camera, self.width, self.height, RASTER_SCALE)
+    def render(self, meshes: Sequence[TriangleMesh]) -> Rendering:
+        """Bodies in the world, shaded."""
+        return render(meshes, self.camera, self.width, self.height, RASTER_SCALE)
 
 
 def moments_picture(
@@ -101,7 +101,8 @@ def moments_picture(
     width = math.floor(width)
     height, caption = round(width * 0.84), 34.0
     stage = Stage.framing(robot, poses[picked], path, width, height, margin=16.0)
-    ghost = stage.render(poses[picked[0]])
+    ghost = stage.render(stage.meshes(poses[picked[0]]))
+    floor = _floor(stage)
     rows = math.ceil(moments / columns)
     picture = Picture(
         width=FIGURE_WIDTH,
@@ -118,9 +119,10 @@ def moments_picture(
         top = (number // columns) * (height + caption + gap)
         panel = Picture(width=width, height=height + caption, title="")
         panel.add(Rectangle(0.5, 0.5, width - 1, height - 1, radius=6, fill=Tone.SUNKEN))
-        panel.extend(_floor(stage))
-        body = ghost if number == 0 else stage.render(poses[k])
-        panel.add(_raster(stage, poses[k], body, None if number == 0 else ghost))
+        panel.extend(floor)
+        meshes = stage.meshes(poses[k])
+        body = ghost if number == 0 else stage.render(meshes)
+        panel.add(_raster(stage, meshes, body, None if number == 0 else ghost))
         panel.extend(_path_marks(stage, body, path, k))
         panel.add(
             Text(2, height + 16, f"t = {axis_number(float(time[k]))} s", size=TEXT_SIZE, bold=True),
@@ -145,7 +147,8 @@ def arm_picture(robot: Robot, q: Sequence[float], *, width: float = 420.0, heigh
         description=f"The arm {robot.name} with its tool at {_position(poses[-1, :3, 3])}.",
     )
     picture.extend(_floor(stage))
-    picture.add(_raster(stage, poses, stage.render(poses), None))
+    meshes = stage.meshes(poses)
+    picture.add(_raster(stage, meshes, stage.render(meshes), None))
     picture.add(
         Text(
             8,
@@ -165,12 +168,12 @@ def arm_picture_svg(
     return svg_file(arm_picture(robot, q, width=size[0], height=size[1]), theme=theme)
 
 
-def _raster(stage: Stage, pose: _Array, body: Rendering, ghost: Rendering | None) -> Raster:
-    """Shadow, ghost and body as one image over the panel, without its empty margin."""
+def _raster(stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, ghost: Rendering | None) -> Raster:
+    """Shadow of the meshes, ghost and body as one image over the panel, without its empty margin."""
     rows, columns = round(stage.height * RASTER_SCALE), round(stage.width * RASTER_SCALE)
     canvas = np.zeros((rows, columns, 4), dtype=np.uint8)
     half = RASTER_SCALE / 2
-    soft = shadow(stage.meshes(pose), stage.camera, stage.floor, stage.width, stage.height, half)
+    soft = shadow(meshes, stage.camera, stage.floor, stage.width, stage.height, half)
     doubled = np.repeat(np.repeat(soft, 2, axis=0), 2, axis=1)[:rows, :columns]
     canvas[: doubled.shape[0], : doubled.shape[1]] = doubled
     for layer, strength in ((ghost, GHOST), (body, 1.0)):

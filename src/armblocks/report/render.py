@@ -170,10 +170,14 @@ def shadow(
 
 def over(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """``front`` laid over ``back``, both straight alpha (Porter and Duff 1984)."""
-    f, b = front.astype(np.float64) / 255, back.astype(np.float64) / 255
-    alpha = f[..., 3:] + b[..., 3:] * (1 - f[..., 3:])
-    colour = (f[..., :3] * f[..., 3:] + b[..., :3] * b[..., 3:] * (1 - f[..., 3:])) / np.maximum(alpha, 1e-9)
-    return np.rint(np.concatenate([colour, alpha], axis=-1) * 255).astype(np.uint8)
+    result = back.copy()
+    result[back[..., 3] == 0] = 0
+    covered = front[..., 3] > 0  # elsewhere the back stays as it is
+    f, b = front[covered] / 255, back[covered] / 255
+    alpha = f[:, 3:] + b[:, 3:] * (1 - f[:, 3:])
+    colour = (f[:, :3] * f[:, 3:] + b[:, :3] * b[:, 3:] * (1 - f[:, 3:])) / np.maximum(alpha, 1e-9)
+    result[covered] = np.rint(np.concatenate([colour, alpha], axis=-1) * 255).astype(np.uint8)
+    return result
 
 
 def faded(pixels: NDArray[np.uint8], strength: float) -> NDArray[np.uint8]:
