@@ -189,7 +189,16 @@ def _inputs(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Inputs:
 
         return body.gather(address, behind)
 
-    return Inputs(load, load_entry)
+    def block(register: int) -> str | None:
+        slot, place = tape.input_place(register)
+        kind, size = layout.inputs[slot], tape.input_sizes[slot]
+        if body.lanes > 1 or kind is Layout.COLUMNS:
+            return None
+        begin = "0" if kind is Layout.SHARED else _row(body, sample, size)
+        there = body.let(f"add nsw i64 {begin}, {place}")
+        return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {there}")
+
+    return Inputs(load, load_entry, block)
 
 
 def _row(body: Body, sample: str, size: int) -> str:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import casadi
-from casadi import Function
+from casadi import SX, Function
 
 from armblocks.compiler.opcodes import Opcode
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_builder import TapeBuilder
 from armblocks.equations import TracedFunction
+from armblocks.equations.linear_solution import derivative_rule, solution_size
 from armblocks.errors import CompileError
 
 # Operations that mean the same in both, by CasADi's name.
@@ -72,27 +76,68 @@ def tape_from(traced: TracedFunction) -> Tape:
     """
     function = traced.casadi_function()
     builder = TapeBuilder([slot.size for slot in traced.inputs])
+    inputs = [[builder.input(k, place) for place in range(slot.size)] for k, slot in enumerate(traced.inputs)]
     outputs = [[builder.constant(0.0)] * slot.size for slot in traced.outputs]
     places = [function.sparsity_out(k).row() for k in range(len(outputs))]
+    for slot, entries in enumerate(_inlined(builder, function, inputs, traced.name)):
+        for place, handle in zip(places[slot], entries):
+            outputs[slot][place] = handle
+    return builder.build(outputs)
+
+
+def _inlined(
+    builder: TapeBuilder, function: Function, inputs: Sequence[Sequence[int]], name: str
+) -> list[list[int]]:
+    """Handles of all structural entries of a function's outputs, for those of its inputs."""
+    outputs = [[-1] * function.nnz_out(k) for k in range(function.n_out())]
     work = [-1] * function.sz_w()  # handle of the value that each work slot holds now
+    called: SX | None = None
     for k in range(function.n_instructions()):
         number = function.instruction_id(k)
         if number == casadi.OP_OUTPUT:
             slot, place = function.instruction_output(k)
-            outputs[slot][places[slot][place]] = work[function.instruction_input(k)[0]]
+            outputs[slot][place] = work[function.instruction_input(k)[0]]
+        elif number == casadi.OP_INPUT:
+            slot, place = function.instruction_input(k)
+            work[function.instruction_output(k)[0]] = inputs[slot][place]
+        elif number == casadi.OP_CALL:
+            called = function.instructions_sx() if called is None else called
+            arguments = [work[source] for source in function.instruction_input(k)]
+            results = _call(builder, called[k].which_function(), arguments, name)
+            for target, handle in zip(function.instruction_output(k), results):
+                if target >= 0:
+                    work[target] = handle
         else:
-            work[function.instruction_output(k)[0]] = _translate(builder, function, k, work, traced.name)
-    return builder.build(outputs)
+            work[function.instruction_output(k)[0]] = _translate(builder, function, k, work, name)
+    return outputs
+
+
+def _call(builder: TapeBuilder, function: Function, arguments: Sequence[int], name: str) -> list[int]:
+    """A linear solution (:mod:`armblocks.equations.linear_solution`), or one of its derivatives."""
+    size = solution_size(function.name())
+    if size is not None:
+        # CasADi has matrices column by column.
+        by_rows = [arguments[column * size + row] for row in range(size) for column in range(size)]
+        solved = builder.add(Opcode.SOLVE, *by_rows, *arguments[size * size :])
+        return [builder.add(Opcode.MEMBER, solved, builder.constant(float(k))) for k in range(size)]
+    rule = derivative_rule(function.name())
+    if rule is None:
+        raise CompileError(
+            f"the equations call the function {function.name()}",
+            where=name,
+            allowed="calls of linear_solution",
+            fix="let CasADi put the function's operations in the place of the call",
+        )
+    starts = itertools.accumulate((rule.nnz_in(k) for k in range(rule.n_in())), initial=0)
+    inputs = [arguments[start:end] for start, end in itertools.pairwise(starts)]
+    return [handle for entries in _inlined(builder, rule, inputs, name) for handle in entries]
 
 
 def _translate(builder: TapeBuilder, function: Function, k: int, work: list[int], name: str) -> int:
     number = function.instruction_id(k)
     if number == casadi.OP_CONST:
         return builder.constant(function.instruction_constant(k))
-    sources = function.instruction_input(k)
-    if number == casadi.OP_INPUT:
-        return builder.input(sources[0], sources[1])
-    operands = [work[source] for source in sources]
+    operands = [work[source] for source in function.instruction_input(k)]
     opcode = _OPCODES.get(number)
     if opcode is not None:
         return builder.add(opcode, *operands[: opcode.arity])

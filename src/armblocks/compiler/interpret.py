@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.compiler.opcodes import Opcode
+from armblocks.compiler.opcodes import Opcode, solution_length
 from armblocks.compiler.tape import Tape
 from armblocks.errors import InputError
 
@@ -48,6 +48,14 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
             if opcode is Opcode.READ:
                 registers.append(_read(registers, tape, *operands))
                 continue
+            if opcode is Opcode.SOLVE:
+                values = [registers[operand] for operand in operands]
+                registers.append(_solve(values, solution_length(len(operands)), fused=fused))
+                continue
+            if opcode is Opcode.MEMBER:
+                vector, place = operands
+                registers.append(registers[vector][..., int(tape.constants[place - tape.first_constant])])
+                continue
             registers.append(evaluate(opcode, [registers[operand] for operand in operands], fused=fused))
     return [
         np.stack([registers[register] for register in slot], axis=-1) if slot else np.empty((*lead, 0))
@@ -64,6 +72,55 @@ def _read(registers: Sequence[Values], tape: Tape, first: int, count: int, index
         chosen = places == place
         found[chosen] = registers[first + int(place)][chosen]
     return found
+
+
+def _solve(values: Sequence[Values], n: int, *, fused: bool) -> Values:
+    """The solutions (…, n) of linear equations, step by step as :mod:`armblocks.compiler.linear_solution`."""
+    stacked = np.stack(values, axis=-1)
+    matrix, right = stacked[..., : n * n].reshape((*stacked.shape[:-1], n, n)), stacked[..., n * n :].copy()
+
+    def less(a: Values, b: Values, c: Values) -> Values:
+        """``c - a b``."""
+        return multiply_add(-a, *np.broadcast_arrays(b, c)) if fused else c - a * b
+
+    weights = 1.0 / np.max(np.where(np.isnan(matrix), 0.0, np.abs(matrix)), axis=-1)
+    # Rows are exchanged as wholes: of the factors, of the matrix, and its weight and right side.
+    rows = np.concatenate([matrix, matrix, weights[..., None], right[..., None]], axis=-1)
+    for k in range(n):
+        for i in range(k + 1, n):
+            sizes = [np.abs(rows[..., row, k]) * rows[..., row, 2 * n] for row in (i, k)]
+            larger = (sizes[0] > sizes[1])[..., None]
+            first, second = rows[..., k, :].copy(), rows[..., i, :].copy()
+            rows[..., k, :], rows[..., i, :] = (
+                np.where(larger, second, first),
+                np.where(larger, first, second),
+            )
+        for i in range(k + 1, n):
+            factor = rows[..., i, k] / rows[..., k, k]
+            rows[..., i, k] = factor
+            if k + 1 < n:
+                span = slice(k + 1, n)
+                factors = np.broadcast_to(factor[..., None], rows[..., k, span].shape)
+                rows[..., i, span] = less(factors, rows[..., k, span], rows[..., i, span])
+    matrix, right = rows[..., n : 2 * n], rows[..., 2 * n + 1]
+
+    def substitute(work: Values) -> Values:
+        work = work.copy()
+        for i in range(n):
+            for j in range(i):
+                work[..., i] = less(work[..., j], rows[..., i, j], work[..., i])
+        for i in reversed(range(n)):
+            for j in range(i + 1, n):
+                work[..., i] = less(work[..., j], rows[..., i, j], work[..., i])
+            work[..., i] = work[..., i] / rows[..., i, i]
+        return work
+
+    solution = substitute(right)
+    rest = right.copy()
+    for i in range(n):
+        for j in range(n):
+            rest[..., i] = less(solution[..., j], matrix[..., i, j], rest[..., i])
+    return solution + substitute(rest)
 
 
 def evaluate(opcode: Opcode, values: Sequence[Values], *, fused: bool = True) -> Values:

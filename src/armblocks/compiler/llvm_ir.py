@@ -42,10 +42,12 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
     pointers += [("ptr noalias", f"%o{k}") for k in range(len(tape.outputs))]
 
     def inputs_of(body: Body) -> Inputs:
-        def load(register: int) -> str:
+        def address(register: int) -> str:
             slot, place = tape.input_place(register)
-            address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {place}")
-            return body.let(f"load double, ptr {address}, align 8")
+            return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {place}")
+
+        def load(register: int) -> str:
+            return body.let(f"load double, ptr {address(register)}, align 8")
 
         def load_entry(first: int, behind: str) -> str:
             slot, place = tape.input_place(first)
@@ -53,7 +55,7 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
             address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {entry}")
             return body.let(f"load double, ptr {address}, align 8")
 
-        return Inputs(load, load_entry)
+        return Inputs(load, load_entry, address)
 
     def write() -> str:
         body = Body(module)

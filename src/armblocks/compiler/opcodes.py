@@ -13,11 +13,14 @@ Every operation works on IEEE 754 doubles and rounds to nearest. Where the sourc
   even, exact).
 * ``READ x n i`` is entry ``i``, cut to an integer and held in 0 … n - 1 (0 for a NaN), of the ``n`` scalars
   from input ``x`` on, all of one slot; ``n`` is a constant.
+* ``SOLVE a11 a12 … ann b1 … bn`` solves n linear equations (:mod:`armblocks.compiler.linear_solution`). Its
+  value is n numbers, of which ``MEMBER s k`` is number k, a constant from 0; nothing else may read it.
 * ``POWER`` follows C99: ``x**0`` and ``1**y`` are 1 even with NaN.
 """
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum, auto
 
 
@@ -71,12 +74,17 @@ class Opcode(IntEnum):
     HYPOT = auto()
     ERF = auto()
     READ = auto()
+    SOLVE = auto()
+    MEMBER = auto()
 
     @property
     def arity(self) -> int:
-        """Count of operands."""
+        """Count of operands; 0 where it varies."""
         return _ARITY.get(self, 1)
 
+
+VECTORS = frozenset({Opcode.SOLVE})
+"""Operations of any count of operands whose value is several numbers."""
 
 COMMUTATIVE = frozenset(
     {Opcode.ADD, Opcode.MULTIPLY, Opcode.EQUAL, Opcode.NOT_EQUAL, Opcode.AND, Opcode.OR, Opcode.HYPOT}
@@ -94,7 +102,14 @@ ELEMENTARY = frozenset(opcode for opcode in Opcode if Opcode.SIN <= opcode <= Op
 }
 """Operations that are worked out by a function of :mod:`armblocks.compiler.elementary`."""
 
+
+def solution_length(operands: int) -> int:
+    """The count n of unknowns of a ``SOLVE`` with n (n + 1) operands."""
+    return math.isqrt(operands)
+
+
 _ARITY = {
+    Opcode.SOLVE: 0,
     **dict.fromkeys((Opcode.FMA, Opcode.FMS, Opcode.FNMA, Opcode.SELECT, Opcode.READ), 3),
     **dict.fromkeys(
         (
@@ -116,6 +131,7 @@ _ARITY = {
             Opcode.ATAN2,
             Opcode.POWER,
             Opcode.HYPOT,
+            Opcode.MEMBER,
         ),
         2,
     ),

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body, Module
-from armblocks.compiler.opcodes import ELEMENTARY
+from armblocks.compiler.opcodes import ELEMENTARY, VECTORS, Opcode
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 
@@ -45,7 +45,8 @@ class Cut:
 
 def is_long(tape: Tape) -> bool:
     """Whether a tape is better cut."""
-    read = {register for _, operands in tape.operations for register in operands}
+    # A vector's operands are copied in blocks, not read one by one.
+    read = {r for opcode, operands in tape.operations if opcode not in VECTORS for r in operands}
     accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
     return len(tape.operations) + ACCESS_WEIGHT * accesses > LONGEST
 
@@ -77,11 +78,14 @@ def cut(tape: Tape, stores: Stores) -> Cut:
     for k, (opcode, operands) in enumerate(tape.operations):
         done = ready.pop(first + k, [])
         waiting += done
-        new = {register for register in operands if register < tape.first_constant} - read
+        single = () if opcode in VECTORS else operands
+        new = {register for register in single if register < tape.first_constant} - read
         read |= new
         weight += FUNCTION_WEIGHT if opcode in ELEMENTARY else 1
         weight += ACCESS_WEIGHT * (len(done) + len(new))
-        if weight >= LENGTH:
+        following = tape.operations[k + 1].opcode if k + 1 < len(tape.operations) else None
+        # The members of a vector stand in the piece that works it out.
+        if weight >= LENGTH and following is not Opcode.MEMBER:
             pieces.append(Piece(first=begin, last=k + 1, stores=tuple(waiting)))
             begin, weight, waiting = k + 1, 0, []
             read.clear()
@@ -188,7 +192,7 @@ def _emit_piece(
         return body.let(f"load {body.real}, ptr {address(register)}, align {8 * body.lanes}")
 
     registers = emit_operations(
-        body, tape, Inputs(load, inputs.load_entry), some=range(piece.first, piece.last)
+        body, tape, Inputs(load, inputs.load_entry, inputs.address), some=range(piece.first, piece.last)
     )
     for store in piece.stores:
         storing(body, registers, store)

@@ -164,7 +164,11 @@ class Tape:
     def to_bytes(self) -> bytes:
         """A portable binary form (little-endian), read back by :meth:`from_bytes`."""
         flat = [value for slot in self.outputs for value in slot]
-        code = [number for opcode, operands in self.operations for number in (opcode, *operands)]
+        code = [
+            number
+            for opcode, operands in self.operations
+            for number in (opcode, *(() if opcode.arity else (len(operands),)), *operands)
+        ]
         sizes = (self.input_sizes, self.output_sizes)
         head = struct.pack("<5q", *(len(part) for part in (*sizes, self.constants, code, flat)))
         numbers = np.array([*self.input_sizes, *self.output_sizes, *code, *flat], dtype="<i8")
@@ -204,9 +208,10 @@ def _decode(code: list[int]) -> tuple[Operation, ...]:
     place = 0
     while place < len(code):
         opcode = Opcode(code[place])
-        end = place + 1 + opcode.arity
+        first = place + (1 if opcode.arity else 2)
+        end = first + (opcode.arity or code[place + 1])
         if end > len(code):
             raise ValueError("cut short")
-        operations.append(Operation(opcode, tuple(code[place + 1 : end])))
+        operations.append(Operation(opcode, tuple(code[first:end])))
         place = end
     return tuple(operations)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armblocks.compiler.opcodes import COMMUTATIVE, ELEMENTARY, Opcode
+from armblocks.compiler.opcodes import COMMUTATIVE, ELEMENTARY, VECTORS, Opcode
 from armblocks.compiler.tape import Operation, Tape
 
 _Node = tuple[Opcode, tuple[int, ...]]
@@ -50,7 +50,7 @@ class TapeBuilder:
     def add(self, opcode: Opcode, *operands: int) -> int:
         """``opcode`` of the operands, simplified where that changes no bit."""
         values = [self._nodes[operand] for operand in operands]
-        if opcode not in ELEMENTARY and all(isinstance(value, float) for value in values):
+        if opcode not in ELEMENTARY | VECTORS and all(isinstance(value, float) for value in values):
             return self.constant(_fold(opcode, [value for value in values if isinstance(value, float)]))
         simpler = self._simplify(opcode, operands)
         if simpler is not None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body
+from armblocks.compiler.linear_solution import emit_linear_solution
 from armblocks.compiler.opcodes import COMPARISONS, Opcode
 from armblocks.compiler.tape import Tape
 
@@ -13,6 +14,9 @@ LoadInput = Callable[[int], str]
 """Gives the value of a register that is not written here, in all lanes."""
 LoadEntry = Callable[[int, str], str]
 """Gives the value of the input register that lies so many (an integer in each lane) behind another."""
+BlockAddress = Callable[[int], "str | None"]
+"""Gives the address from which an input register and those after it in its slot follow one another as plain
+doubles; ``None`` where they do not."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,7 @@ class Inputs:
 
     load: LoadInput
     load_entry: LoadEntry
+    address: BlockAddress
 
 
 class Registers:
@@ -32,6 +37,8 @@ class Registers:
         self._load = load
         self._numbers: dict[int, str] = {}
         self._conditions: dict[int, str] = {}
+        self.vectors: dict[int, list[str]] = {}
+        """The numbers of the registers that hold several."""
 
     def set_number(self, register: int, value: str) -> None:
         """Write a register with a number."""
@@ -100,6 +107,13 @@ def emit_operations(
             size = int(tape.constants[count - tape.first_constant])
             behind = body.held_index(registers.number(index), size)
             registers.set_number(target, inputs.load_entry(first, behind))
+        elif opcode is Opcode.SOLVE:
+            members = emit_linear_solution(body, tape, operands, registers.number, inputs.address)
+            registers.vectors[target] = members
+        elif opcode is Opcode.MEMBER:
+            vector, place = operands
+            member = int(tape.constants[place - tape.first_constant])
+            registers.set_number(target, registers.vectors[vector][member])
         elif target in partners:
             if not registers.has_number(target):
                 pair = elementary.sine_cosine(body, registers.number(operands[0]))

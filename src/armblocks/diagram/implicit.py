@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from casadi import SX, Function, densify, depends_on, jacobian, solve, substitute, symvar
+from casadi import SX, Function, densify, depends_on, jacobian, substitute, symvar
 from numpy.typing import NDArray
 
+from armblocks.equations.linear_solution import linear_solution
 from armblocks.errors import AlgebraicLoopError
 
 
@@ -35,7 +36,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
 
 
 def _divided(right: SX, matrix: SX) -> SX:
-    """``matrix^-1 right``. Up to 2 x 2 by Cramer's rule, which needs no pivots; QR beyond."""
+    """``matrix^-1 right``. Up to 2 x 2 by Cramer's rule, which needs no pivots; beyond, with pivots."""
     if matrix.numel() == 1:
         return right / densify(matrix)
     if matrix.numel() == 4:
@@ -44,7 +45,7 @@ def _divided(right: SX, matrix: SX) -> SX:
         result = SX.zeros(2)
         result[0], result[1] = first, a * right[1] - c * right[0]
         return result / (a * d - b * c)
-    return solve(matrix, right)
+    return linear_solution(densify(matrix), right)
 
 
 def _needs(slope: SX) -> list[list[int]]:
@@ -100,16 +101,17 @@ def check_solvable(
     found here; what depends on states or the time is noticed when it happens.
     """
     slopes = jacobian(residual, w)
+    parameters = _symbols_in(p)
     for circle in _circles(_needs(slopes)):
         unknowns, own, slope = w[circle], residual[circle], slopes[circle, circle]
-        if not _over(slope, p):
+        if not _symbols_in(slope) <= parameters:
             continue
         matrix = _number(slope, p, values)
         scale = np.abs(matrix).max(initial=0.0)
-        if not np.isfinite(scale) or np.linalg.matrix_rank(matrix) == len(circle):
+        if not np.isfinite(scale) or np.linalg.matrix_rank(_equilibrated(matrix)) == len(circle):
             continue
-        others = [entry for entry in symvar(own) if not depends_on(unknowns, entry)]
-        if not slope.nnz() and others and not all(depends_on(p, entry) for entry in others):
+        others = _symbols_in(own) - _symbols_in(unknowns)
+        if not slope.nnz() and not others <= parameters:
             raise AlgebraicLoopError(
                 loops[circle[0]],
                 where=where,
@@ -118,7 +120,7 @@ def check_solvable(
                 fix="differentiate the equation in time until it does: twice for a rod and the force in it",
             )
         why = "with no solution or infinitely many"
-        if all(depends_on(p, entry) for entry in others):
+        if others <= parameters:
             right = _number(substitute(own, unknowns, SX.zeros(len(circle))), p, values).ravel()
             widened = np.linalg.matrix_rank(np.column_stack([matrix, right]))
             solvable = widened == np.linalg.matrix_rank(matrix)
@@ -132,8 +134,20 @@ def check_solvable(
         )
 
 
-def _over(expression: SX, p: SX) -> bool:
-    return all(depends_on(p, entry) for entry in symvar(expression))
+def _symbols_in(expression: SX) -> set[int]:
+    """What identifies the symbols of an expression."""
+    return {entry.element_hash() for entry in symvar(expression)}
+
+
+def _equilibrated(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrix with the largest entry of every row, then of every column, near 1.
+
+    Its numerical rank does not depend on units. Powers of two leave all digits as they are.
+    """
+    for axis in (1, 0):
+        largest = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)
+        matrix = np.ldexp(matrix, -np.frexp(largest)[1])
+    return matrix
 
 
 def _number(expression: SX, p: SX, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,12 +12,13 @@ derivative in the entries but the first, so that sensitivities to entries of suc
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import casadi
 import numpy as np
-from casadi import SX, Function, fmax, fmin, if_else
+from casadi import DM, SX, Function, fmax, fmin, if_else
 from numpy.typing import NDArray
 
 
@@ -60,14 +61,16 @@ def tables_read(function: Function) -> set[tuple[int, int, int]]:
     constants: dict[int, float] = {}
     for k in range(function.n_instructions()):
         number, sources = function.instruction_id(k), function.instruction_input(k)
-        target = function.instruction_output(k)[0]
+        targets = function.instruction_output(k)
         if number == casadi.OP_OUTPUT:
             continue
+        target = targets[0]
         if number == casadi.OP_PRINTME and sources[0] in inputs and constants.get(sources[1], 0.0) < 0.0:
             slot, place = inputs[sources[0]]
             found.add((slot, place, int(-constants[sources[1]])))
-        inputs.pop(target, None)
-        constants.pop(target, None)
+        for written in targets:
+            inputs.pop(written, None)
+            constants.pop(written, None)
         if number == casadi.OP_INPUT:
             inputs[target] = (sources[0], sources[1])
         elif number == casadi.OP_CONST:
@@ -86,6 +89,13 @@ def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float
         target = function.instruction_output(k)
         if number == casadi.OP_OUTPUT:
             outputs[target[0]][places[target[0]][target[1]]] = work[sources[0]]
+            continue
+        if number == casadi.OP_CALL:
+            called = function.instructions_sx()[k].which_function()
+            for place, value in zip(target, _called(called, [work[source] for source in sources])):
+                if place >= 0:
+                    work[place] = value
+                    origins.pop(place, None)
             continue
         origin = None
         if number == casadi.OP_CONST:
@@ -107,3 +117,11 @@ def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float
         if origin is not None:
             origins[target[0]] = origin
     return outputs
+
+
+def _called(function: Function, values: Sequence[float]) -> list[float]:
+    """All structural entries of the results of a function that is called, for those of its arguments."""
+    starts = itertools.accumulate((function.nnz_in(k) for k in range(function.n_in())), initial=0)
+    spans = itertools.pairwise(starts)
+    arguments = [DM(function.sparsity_in(k), list(values[start:end])) for k, (start, end) in enumerate(spans)]
+    return [float(value) for result in function.call(arguments) for value in result.nonzeros()]

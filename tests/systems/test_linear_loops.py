@@ -1,0 +1,123 @@
+"""Loops that are linear in their signals, against NumPy: flowing, at ticks, by pieces, and differentiated."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import Clock, Constant, Gain, Integrator, MatrixGain, Saturation, Sum, ZeroOrderHold
+from armblocks.compiler.from_casadi import tape_from
+from armblocks.compiler.interpret import interpret
+from armblocks.diagram import DiagramBuilder, trace_diagram
+from armblocks.equations import HybridSystem
+
+EPS = np.finfo(np.float64).eps
+
+
+def loop(M: np.ndarray, c: np.ndarray) -> ab.Diagram:
+    """s = c + M s."""
+    builder = DiagramBuilder("loop")
+    s = builder.add("s", Sum(), builder.add("c", Constant(value=c)))
+    builder.connect(builder.add("M", MatrixGain(gain=M), s), s["u2"])
+    return builder.build()
+
+
+def interpreted(system: HybridSystem) -> dict[str, np.ndarray]:
+    """The signals of a system without states at t = 0, by the tape's interpreter."""
+    empty = np.empty(0)
+    (y,) = interpret(tape_from(system.signals), [np.zeros(1), empty, empty, empty, system.parameter_values])
+    return system.signals_layout.unpack(y)
+
+
+def hilbert(n: int) -> np.ndarray:
+    return 1.0 / (np.add.outer(np.arange(n), np.arange(n)) + 1.0)
+
+
+def permuted_triangle(n: int, random: np.random.Generator) -> np.ndarray:
+    """Regular, with zeros on the diagonal: elimination without an exchange of rows divides by zero."""
+    triangle = np.triu(random.uniform(0.5, 2.0, (n, n)))
+    return triangle[np.roll(np.arange(n), 1)]
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 6, 8, 12])
+def test_a_loop_of_vectors_is_as_accurate_as_a_numerical_library(n: int) -> None:
+    random = np.random.default_rng(n)
+    kinds = [np.eye(n) + random.normal(size=(n, n)), permuted_triangle(n, random)]
+    kinds += [hilbert(n)] if n <= 8 else []
+    for matrix in kinds:
+        c, M = random.normal(size=n), np.eye(n) - matrix
+        expected = np.linalg.solve(np.eye(n) - M, c)
+        error = np.abs(interpreted(trace_diagram(loop(M, c)))["s/y"] - expected).max()
+        assert error <= 5.0 * n * EPS * np.linalg.cond(matrix) * np.abs(expected).max()
+
+
+def test_a_loop_of_fifty_unknowns_runs() -> None:
+    random = np.random.default_rng(50)
+    M, c = random.normal(size=(50, 50)), random.normal(size=50)
+    result = ab.simulate(loop(M, c), stop_time=1.0, sample_time=0.5)
+    np.testing.assert_allclose(result["s"], [np.linalg.solve(np.eye(50) - M, c)] * 3, rtol=1e-10)
+
+
+def test_a_loop_of_vectors_changes_with_its_modes() -> None:
+    """s = c - M sat(s) with c = t c0: of the 27 linear pieces the one that fits is found."""
+    c0 = np.array([1.0, -2.0, 1.5])
+    M = np.array([[1.0, 0.5, 0.2], [0.3, 2.0, -0.4], [-0.2, 0.6, 1.5]])
+    builder = DiagramBuilder("pieces")
+    s = builder.add(
+        "s", Sum(signs="+-"), builder.add("c", MatrixGain(gain=c0[:, None]), builder.add("t", Clock()))
+    )
+    limited = builder.add("limited", Saturation(lower=-1.0, upper=1.0), s)
+    builder.connect(builder.add("M", MatrixGain(gain=M), limited), s["u2"])
+    builder.add("x", Integrator(initial=np.zeros(3)), s)
+    result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.25, rtol=1e-9, atol=1e-9)
+
+    def piece(c: np.ndarray) -> np.ndarray:
+        for sides in itertools.product((-1.0, 0.0, 1.0), repeat=3):
+            side = np.array(sides)
+            free = np.diag(side == 0.0)
+            found = np.linalg.solve(np.eye(3) + M @ free, c - M @ side)
+            if (np.where(side == 0.0, np.abs(found) <= 1.0, found * side >= 1.0)).all():
+                return found
+        raise AssertionError
+
+    expected = np.array([piece(t * c0) for t in result.time])
+    np.testing.assert_allclose(result["s"], expected, rtol=1e-12, atol=1e-12)
+    assert len({tuple(np.sign(row) * (np.abs(row) > 1.0)) for row in expected}) > 2
+
+
+def test_a_loop_of_vectors_is_solved_at_a_tick_with_what_is_fresh() -> None:
+    M = np.array([[0.0, 2.0, 0.0], [0.5, 0.3, 0.7], [0.2, 0.0, -4.0]])
+    builder = DiagramBuilder("ticks")
+    held = builder.add("held", ZeroOrderHold(sample_time=0.5), builder.add("t", Clock()))
+    wide = builder.add("wide", MatrixGain(gain=[[1.0], [2.0], [3.0]]), held)
+    s = builder.add("s", Sum(), wide)
+    builder.connect(builder.add("M", MatrixGain(gain=M), s), s["u2"])
+    builder.add("again", ZeroOrderHold(), s)
+    system = trace_diagram(builder.build())
+    (z,) = system.update(1.5, (), np.zeros(system.discrete.size), (), system.parameter_values, [1.0])
+    expected = 1.5 * np.linalg.solve(np.eye(3) - M, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(system.discrete.unpack(z)["again/y"], expected, rtol=1e-13)
+
+
+def test_a_loop_of_vectors_is_linearized_and_differentiated_by_its_gain() -> None:
+    """x' = s with s = g M s - x."""
+    M = np.array([[0.0, 2.0, 0.0], [0.5, 0.3, 0.7], [0.2, 0.0, -4.0]])
+    builder = DiagramBuilder("inside")
+    x = builder.add("x", Integrator(initial=[1.0, -2.0, 0.5]))
+    s = builder.add("s", Sum(signs="-+"), x)
+    gain = builder.add("g", Gain(gain=1.0), s)
+    builder.connect(builder.add("M", MatrixGain(gain=M), gain), s["u2"])
+    builder.connect(s, x["u"])
+    diagram = builder.build()
+    system = ab.linearize(diagram)
+    np.testing.assert_allclose(system.A, -np.linalg.inv(np.eye(3) - M), rtol=1e-12, atol=1e-13)
+
+    settings = {"stop_time": 1.0, "sample_time": 0.5, "rtol": 1e-11, "atol": 1e-13}
+    found = ab.sensitivity(diagram, "g.gain", "x", **settings)
+    runs = [ab.simulate(diagram, parameters={"g.gain": 1.0 + d}, **settings)["x"] for d in (1e-5, -1e-5)]
+    np.testing.assert_allclose(found["x", "g.gain"], (runs[0] - runs[1]) / 2e-5, rtol=1e-6, atol=1e-8)
+    stiff = ab.simulate(diagram, **(settings | {"solver": "rodas", "rtol": 1e-9, "atol": 1e-12}))
+    np.testing.assert_allclose(stiff["x"], sum(runs) / 2.0, rtol=1e-6)
