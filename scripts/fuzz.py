@@ -1,0 +1,58 @@
+"""Random diagrams against the reference simulator and other laws, for as long as wanted.
+
+    python scripts/fuzz.py --minutes 60 --seed 7
+
+Prints counts, and each finding reduced to a small diagram with a script that builds it. The same seeds give
+the same diagrams. ``--laws`` picks some of the laws of ``tests/reference/fuzz_laws.py``. The exit status is 1
+where there was a finding.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "reference"))
+
+from fuzz_laws import LAWS
+from fuzzing import fuzz
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Random diagrams against the reference simulator.")
+    parser.add_argument("--minutes", type=float, default=10.0, help="how long")
+    parser.add_argument("--seed", type=int, default=0, help="the first seed; the others follow it")
+    parser.add_argument("--count", type=int, default=0, help="how many diagrams at most; 0 for no limit")
+    parser.add_argument("--laws", nargs="*", default=list(LAWS), choices=list(LAWS), help="which laws")
+    parser.add_argument("--findings", type=int, default=20, help="stop after so many findings")
+    parser.add_argument("--reduce", type=float, default=120.0, help="seconds to reduce one finding")
+    arguments = parser.parse_args()
+    warnings.simplefilter("ignore")
+    end = time.monotonic() + 60.0 * arguments.minutes
+    counts: Counter[str] = Counter()
+
+    def seeds() -> Iterator[int]:
+        for seed in itertools.count(arguments.seed):
+            done = arguments.count and seed - arguments.seed >= arguments.count
+            if done or time.monotonic() > end:
+                return
+            yield seed
+
+    found = 0
+    for finding in fuzz(seeds(), arguments.laws, counts, reduce_for=arguments.reduce):
+        found += 1
+        print(f"--- {found} ---\n{finding.report()}\n", flush=True)
+        if found >= arguments.findings:
+            break
+    print(f"seeds from {arguments.seed}:", ", ".join(f"{value} {name}" for name, value in counts.items()))
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

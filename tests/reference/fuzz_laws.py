@@ -1,0 +1,391 @@
+"""Laws that hold for every diagram: what a fuzzer checks of a random one.
+
+Each law takes a :class:`Case` and returns a text for every contradiction. A run is repeated with altered
+settings or with an altered diagram; the alterations are those of SLforge and SLEMI (Chowdhury et al., ICSE
+2018 and 2020), equivalence modulo input among them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from block_formulas import BORDER, broken_formulas
+from random_diagrams import RECORD, Node, Recipe
+from reference_block import BlockNumbers
+from reference_controls import CONTROLS
+from reference_simulator import EndlessEventsError, UnsupportedError, run_reference
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram, flat_diagram, infer_shapes
+from armblocks.diagram.controls import EnableControl, TriggerControl
+from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
+from armblocks.formats.diagram_python import diagram_to_python
+
+Signals = Mapping[str, np.ndarray]
+TOO_LARGE = 1e4
+"""Beyond this a diagram counts as unstable, and nothing is compared."""
+
+
+class InconclusiveError(Exception):
+    """A case of which nothing can be said, with the reason."""
+
+
+class Case:
+    """One diagram and its run, from which the laws start."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self.recipe = recipe
+        self.times = recipe.times
+        self.diagram = recipe.diagram()
+        self.settings: dict[str, Any] = {"stop_time": recipe.stop, "sample_time": RECORD}
+        self.run = self.signals(self.diagram)
+        for name, values in self.run.items():
+            if not np.isfinite(values).all():
+                raise InconclusiveError(f"'{name}' is not finite")
+            if np.abs(values).max(initial=0.0) > TOO_LARGE:
+                raise InconclusiveError(f"'{name}' is larger than {TOO_LARGE:g}")
+
+    def signals(self, diagram: Diagram, **settings: Any) -> dict[str, np.ndarray]:
+        """All signals that are compared, by path: not those inside conditional subsystems."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = ab.simulate(diagram, **{**self.settings, "rtol": 1e-9, "atol": 1e-12, **settings})
+        self.result = result
+        return {name: result[name] for name in self.compared(diagram)}
+
+    @staticmethod
+    def compared(diagram: Diagram) -> list[str]:
+        """Outputs outside of conditional subsystems."""
+        flat = flat_diagram(diagram)
+        return [
+            f"{name}/{port.name}"
+            for name, block in flat.blocks.items()
+            if name not in flat.gates and not isinstance(block, EnableControl | TriggerControl)
+            for port in block.output_ports()
+        ]
+
+    @cached_property
+    def reference(self) -> Signals:
+        """The reference simulator's signals, refined until they converge."""
+        return self.converged(self.diagram)
+
+    def converged(self, diagram: Diagram) -> dict[str, np.ndarray]:
+        """Two reference runs, the second with half the step; each signal with its own uncertainty."""
+        try:
+            one = run_reference(diagram, self.times, 0.01, most_events=300)
+            two = run_reference(diagram, self.times, 0.004, most_events=300)
+        except (UnsupportedError, EndlessEventsError, np.linalg.LinAlgError) as error:
+            raise InconclusiveError(f"reference: {error}") from None
+        self.uncertainty = {name: rows_of(two[name], one[name]) for name in two}
+        return two
+
+
+def rows_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The largest difference in each row."""
+    if len(a) != len(b):
+        return np.full(max(len(a), len(b)), np.inf)
+    a, b = a.reshape(len(a), -1), b.reshape(len(b), -1)
+    return np.abs(a - b).max(axis=1, initial=0.0)
+
+
+def different(
+    found: Signals, wanted: Signals, tolerance: float, excess: Mapping[str, np.ndarray] | None = None
+) -> Iterator[str]:
+    """Every signal that differs by more than ``tolerance`` of its size (and of what else is uncertain)."""
+    for name, values in wanted.items():
+        if name not in found:
+            yield f"'{name}' is missing"
+            continue
+        other = found[name]
+        if len(other) != len(values):
+            yield f"'{name}' has {len(other)} rows in the place of {len(values)}"
+            continue
+        rows = rows_of(other, values)
+        size = 1.0 + np.abs(values).max(initial=0.0)
+        bound = tolerance * size + (0.0 if excess is None else 10.0 * excess[name])
+        if (rows > bound).any():
+            row = int(np.argmax(rows > bound))
+            count = int((rows > bound).sum())
+            values, other = (v.reshape(len(v), -1)[row] for v in (values, other))
+            yield f"'{name}' is {other} at row {row} in the place of {values} ({count} rows differ)"
+
+
+def agrees_with_reference(case: Case) -> Iterator[str]:
+    """The native run gives what the reference simulator gives."""
+    wanted = {name: v for name, v in case.reference.items() if name in case.run}
+    found = {name: v.reshape(len(v), -1) for name, v in case.run.items()}
+    return different(found, wanted, 1e-6, case.uncertainty)
+
+
+def obeys_formulas(case: Case) -> Iterator[str]:
+    """At every recorded time a block that switches gives its formula of its inputs."""
+    case.signals(case.diagram)
+    for name, (row, found, wanted) in broken_formulas(case.diagram, case.result, case.times).items():
+        yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
+
+
+def obeys_equations(case: Case) -> Iterator[str]:
+    """At every recorded time a block without memory gives what its equations give for its inputs.
+
+    Its modes are worked out from these inputs alone, so that a loop without a solution is noticed, too.
+    """
+    case.signals(case.diagram)
+    flat = flat_diagram(case.diagram)
+    shapes = infer_shapes(flat)
+    for name, block in flat.blocks.items():
+        if block.sampled or block.rated_inputs or block.time_derivatives or name in flat.gates:
+            continue
+        if type(block) in CONTROLS or block.implicit_outputs:
+            continue
+        try:
+            numbers = BlockNumbers(name, block, shapes.inputs[name], shapes.outputs[name])
+        except UnsupportedError:
+            continue
+        remembers = any(f"x:{m.name}" in numbers.needs("mode", m.name) for m in numbers.modes)
+        if numbers.states or numbers.discrete or numbers.lines or remembers:
+            continue
+        yield from contradicted_rows(case, numbers)
+
+
+def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
+    """The first row of each output that no input within ``BORDER`` of the recorded one explains."""
+    ports = list(numbers.shapes)
+    recorded = {port: np.asarray(case.result[f"{numbers.name}/{port}"]) for port in ports}
+    for port in numbers.outputs:
+        given = np.asarray(case.result[f"{numbers.name}/{port}"])
+        near = 0
+        for row, t in enumerate(case.times):
+            inputs = {p: np.ravel(recorded[p][row]) for p in ports}
+            y = np.ravel(given[row])
+            exact = fits_equations(numbers, port, y, t, inputs, (0.0,))
+            near += not exact
+            # An instant may be found a little late, at a few rows; what stays at a border has a side.
+            late = near <= 2 + len(case.times) // 10
+            if not exact and not (
+                late and fits_equations(numbers, port, y, t, inputs, (BORDER, -BORDER, 0.0))
+            ):
+                yield f"'{numbers.name}/{port}' is {y} at row {row}, not what its equations give for {inputs}"
+                break
+
+
+def fits_equations(
+    numbers: BlockNumbers, port: str, y: np.ndarray, t: float, inputs: Signals, moves: Sequence[float]
+) -> bool:
+    """Whether inputs that are moved a little give an output, by element."""
+    size = 1.0 + np.abs(y) + sum(np.abs(u).max(initial=0.0) for u in inputs.values())
+    fits = np.zeros(y.shape, dtype=bool)
+    numbers.arrays["t"][0] = t
+    for chosen in itertools.product(moves, repeat=min(len(inputs), 4)):
+        for (name, u), move in itertools.zip_longest(inputs.items(), chosen, fillvalue=0.0):
+            numbers.arrays[f"u:{name}"][:] = u + move * (1.0 + np.abs(u))
+        numbers.update_modes()
+        wanted = numbers.value("out", port)
+        fits |= (np.abs(y - wanted) <= 4 * BORDER * size * (10.0 if any(moves) else 1.0)) | ~np.isfinite(
+            wanted
+        )
+        if fits.all():
+            return True
+    return False
+
+
+def obeys_formulas_loosely(case: Case) -> Iterator[str]:
+    """The same at the default tolerances."""
+    case.signals(case.diagram, rtol=1e-6, atol=1e-9)
+    for name, (row, found, wanted) in broken_formulas(case.diagram, case.result, case.times).items():
+        yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
+
+
+def converges(case: Case) -> Iterator[str]:
+    """A run at the default tolerances is close to one at tight ones, but for instants that move."""
+    loose = case.signals(case.diagram, rtol=1e-6, atol=1e-9)
+    for name, values in case.run.items():
+        rows = rows_of(loose[name], values)
+        wrong = rows > 2e-3 * (1.0 + np.abs(values).max(initial=0.0))
+        if wrong.sum() > max(2, len(wrong) // 10):
+            row = int(np.argmax(wrong))
+            yield f"'{name}' differs in {wrong.sum()} rows between tolerances, first at row {row}"
+
+
+def agrees_with_fixed_steps(case: Case) -> Iterator[str]:
+    """The fixed-step solver locates events, too: it gives the same but for the error of its steps."""
+    fixed = case.signals(case.diagram, solver="rk4", step=0.002)
+    for name, values in case.run.items():
+        rows = rows_of(fixed[name], values)
+        wrong = rows > 1e-3 * (1.0 + np.abs(values).max(initial=0.0))
+        if wrong.sum() > max(2, len(wrong) // 10):
+            row = int(np.argmax(wrong))
+            yield f"'{name}' differs in {wrong.sum()} rows with fixed steps, first at row {row}"
+
+
+def repeats(case: Case) -> Iterator[str]:
+    """The same diagram gives the same bits again, also saved and loaded, or exported to Python."""
+    yield from same_bits("again", case.signals(case.diagram), case.run)
+    loaded = diagram_from_bytes(diagram_to_bytes(case.diagram, load_robot), "fuzz", BLOCKS, load_robot)
+    if loaded != case.diagram:
+        yield "a saved diagram is loaded as another one"
+    yield from same_bits("loaded", case.signals(loaded), case.run)
+    text = diagram_to_python(case.diagram)
+    scope: dict[str, Any] = {}
+    exec(text[: text.index("result = ")], scope)  # noqa: S102 - what the product has written itself
+    yield from same_bits("exported", case.signals(scope["diagram"]), case.run)
+
+
+def same_bits(what: str, found: Signals, wanted: Signals) -> Iterator[str]:
+    for name, values in wanted.items():
+        if name not in found or not np.array_equal(found[name], values):
+            yield f"{what}: '{name}' has other bits"
+
+
+def goes_on(case: Case) -> Iterator[str]:
+    """A run in pieces, and one that goes on from the state of a shorter one, give the same bits."""
+    settings = {**case.settings, "rtol": 1e-9, "atol": 1e-12}
+    run = ab.begin(case.diagram, **settings)
+    while not run.finished:
+        run.advance(steps=7)
+    result = run.result()
+    yield from same_bits("in pieces", {name: result[name] for name in case.run}, case.run)
+    middle = round(case.recipe.stop / RECORD / 2) * RECORD
+    first = ab.simulate(case.diagram, **{**settings, "stop_time": middle})
+    later = ab.simulate(case.diagram, **settings, initial_state=first.final_state)
+    row = int(np.argmin(np.abs(case.times - later.time[0])))
+    rest = {name: values[row:] for name, values in case.run.items()}
+    yield from same_bits("resumed", {name: later[name] for name in rest}, rest)
+
+
+def is_invariant(case: Case) -> Iterator[str]:
+    """Renaming, reordering, wrapping, dead blocks, unit gains and added zeros change no signal."""
+    for what, change in CHANGES.items():
+        recipe, names = change(case.recipe)
+        try:
+            diagram = recipe.diagram()
+        except ArmblocksError as error:
+            yield f"{what}: refused, {error}"
+            continue
+        found = case.signals(diagram)
+        kept = {name: found[names(name)] for name in case.run if names(name) in found}
+        wanted = {name: case.run[name] for name in kept}
+        for text in different(kept, wanted, 1e-6):
+            yield f"{what}: {text}"
+
+
+Change = Callable[[Recipe], tuple[Recipe, Callable[[str], str]]]
+
+
+def same(name: str) -> str:
+    return name
+
+
+def renamed(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
+    """Names that sort the other way round."""
+    names = {node.name: f"{chr(122 - k % 26)}{k} {node.name}" for k, node in enumerate(recipe.nodes)}
+
+    def ref(text: str) -> str:
+        first, _, rest = text.partition("/")
+        return f"{names[first]}/{rest}"
+
+    nodes = tuple(
+        replace(n, name=names[n.name], inputs={p: ref(s) for p, s in n.inputs.items()}) for n in recipe.nodes
+    )
+    return replace(recipe, nodes=nodes), ref
+
+
+def reordered(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
+    return replace(recipe, nodes=recipe.nodes[::-1]), same
+
+
+def wrapped(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
+    """Everything inside a subsystem."""
+    return replace(
+        recipe, nodes=(Node("whole", "Subsystem", {}, {}, recipe.nodes),)
+    ), lambda name: f"whole/{name}"
+
+
+def with_dead_blocks(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
+    dead: list[Node] = []
+    for k, node in enumerate(recipe.nodes):
+        sources = list(node.inputs.values())
+        if sources and k % 3 == 0:
+            dead += [Node(f"dead {k}", "Gain", {"gain": 2.0}, {"u": sources[0]})]
+            dead += [Node(f"end {k}", "Terminator", {}, {"u": f"dead {k}/y"})]
+    return replace(recipe, nodes=(*dead, *recipe.nodes)), same
+
+
+def through(kind: str, parameters: Mapping[str, Any]) -> Change:
+    """A block that changes nothing, between some blocks and what feeds them."""
+
+    def change(recipe: Recipe) -> tuple[Recipe, Callable[[str], str]]:
+        nodes: list[Node] = []
+        for k, node in enumerate(recipe.nodes):
+            inputs = dict(node.inputs)
+            for port, source in node.inputs.items():
+                fixed = node.kind in ("Merge", "ActionSubsystem") or source.split("/")[0].startswith("if ")
+                if k % 2 == 0 and not fixed:
+                    name = f"through {k} {port}"
+                    nodes.append(Node(name, kind, parameters, {"u": source}))
+                    inputs[port] = f"{name}/y"
+            nodes.append(replace(node, inputs=inputs))
+        return replace(recipe, nodes=tuple(nodes)), same
+
+    return change
+
+
+CHANGES: Mapping[str, Change] = {
+    "renamed": renamed,
+    "reordered": reordered,
+    "wrapped": wrapped,
+    "with dead blocks": with_dead_blocks,
+    "through unit gains": through("Gain", {"gain": 1.0}),
+    "with zeros added": through("Bias", {"bias": 0.0}),
+}
+
+LAWS: Mapping[str, Callable[[Case], Iterator[str]]] = {
+    "reference": agrees_with_reference,
+    "formulas": obeys_formulas,
+    "equations": obeys_equations,
+    "formulas at default tolerances": obeys_formulas_loosely,
+    "tolerances": converges,
+    "fixed steps": agrees_with_fixed_steps,
+    "repeats": repeats,
+    "goes on": goes_on,
+    "invariance": is_invariant,
+}
+
+
+def failure(recipe: Recipe, message: str) -> dict[str, list[str]]:
+    """A run that fails is a finding where the reference comes to its end with finite signals."""
+    try:
+        found = run_reference(recipe.diagram(), recipe.times, 0.004, most_events=300)
+    except (UnsupportedError, EndlessEventsError, np.linalg.LinAlgError) as error:
+        raise InconclusiveError(f"{message}; reference: {error}") from None
+    for name, values in found.items():
+        if not np.isfinite(values).all():
+            raise InconclusiveError(f"'{name}' is not finite in the reference either")
+    return {"runs": [message]}
+
+
+def findings(recipe: Recipe, laws: Sequence[str] = tuple(LAWS)) -> dict[str, list[str]]:
+    """Contradictions by law; ``InconclusiveError`` where nothing can be compared."""
+    try:
+        case = Case(recipe)
+    except SimulationError as error:
+        return failure(recipe, str(error))
+    found: dict[str, list[str]] = {}
+    for name in laws:
+        try:
+            texts = list(LAWS[name](case))
+        except InconclusiveError as error:
+            found.setdefault("inconclusive", []).append(f"{name}: {error}")
+            continue
+        except SimulationError as error:
+            texts = [f"fails: {error}"]
+        if texts:
+            found[name] = texts
+    return found

@@ -1,0 +1,140 @@
+"""The fuzzer: random diagrams, laws, and the reduction of what contradicts them.
+
+Everything runs in a process of its own, which is ended where it takes too long: a run that never returns is a
+finding, too.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+from fuzz_laws import LAWS, InconclusiveError, findings
+from random_diagrams import Recipe, random_recipe, reductions
+
+from armblocks.errors import ArmblocksError
+from armblocks.formats.diagram_python import diagram_to_python
+
+Found = dict[str, list[str]]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A law that a diagram contradicts, reduced."""
+
+    seed: int
+    law: str
+    text: str
+    recipe: Recipe
+
+    def report(self) -> str:
+        """The finding with a script that builds the diagram."""
+        try:
+            script = diagram_to_python(self.recipe.diagram())
+        except ArmblocksError as error:
+            script = f"# not exported: {error}"
+        return f"seed {self.seed}, law '{self.law}', stop_time {self.recipe.stop}\n{self.text}\n\n{script}"
+
+
+def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
+    """Contradictions by law. A refused diagram has none; anything else that is raised is a finding."""
+    try:
+        return findings(recipe, laws)
+    except InconclusiveError as reason:
+        return {"inconclusive": [str(reason)]}
+    except ArmblocksError as refused:
+        return {"refused": [str(refused)]}
+    except Exception as error:
+        return {"error": [f"{error!r}\n{traceback.format_exc(limit=-4)}"]}
+
+
+class Judge:
+    """A process that judges diagrams, started again where one takes longer than ``seconds``."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self.process: Any = None
+
+    def __enter__(self) -> Judge:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    def end(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.join()
+            self.process = None
+
+    def judge(self, recipe: Recipe, laws: Sequence[str]) -> Found:
+        if self.process is None:
+            context = multiprocessing.get_context("fork")
+            self.ours, theirs = context.Pipe()
+            self.process = context.Process(target=_judging, args=(theirs,), daemon=True)
+            self.process.start()
+        self.ours.send((recipe, laws))
+        try:
+            if self.ours.poll(self.seconds):
+                return self.ours.recv()
+        except EOFError:
+            self.end()
+            return {"crash": ["the process died"]}
+        self.end()
+        return {"hangs": [f"no end within {self.seconds:g} s"]}
+
+
+def _judging(pipe: Connection) -> None:
+    while True:
+        recipe, laws = pipe.recv()
+        pipe.send(judged(recipe, laws))
+
+
+NO_FINDING = ("inconclusive", "refused")
+
+
+def reduced(
+    judge: Callable[[Recipe, Sequence[str]], Found], recipe: Recipe, law: str, until: float
+) -> tuple[Recipe, str]:
+    """The smallest diagram found that still contradicts the law, and what it says of it."""
+    laws = [law] if law in LAWS else list(LAWS)[:1]
+    text = ""
+    again = True
+    while again and time.monotonic() < until:
+        again = False
+        for smaller in reductions(recipe):
+            if time.monotonic() > until:
+                break
+            found = judge(smaller, laws)
+            if law in found:
+                recipe, text, again = smaller, found[law][0], True
+                break
+    return recipe, text
+
+
+def fuzz(
+    seeds: Iterator[int],
+    laws: Sequence[str],
+    counts: Counter[str],
+    *,
+    seconds: float = 90.0,
+    reduce_for: float = 180.0,
+) -> Iterator[Finding]:
+    """Findings of the seeds, one for each law that a diagram contradicts; ``counts`` says how it went."""
+    with Judge(seconds) as judge:
+        for seed in seeds:
+            recipe = random_recipe(seed)
+            found = judge.judge(recipe, laws)
+            counts["diagrams"] += 1
+            counts["blocks"] += len(recipe.nodes)
+            for law, texts in found.items():
+                counts[law] += 1
+                if law not in NO_FINDING:
+                    smaller, text = reduced(judge.judge, recipe, law, time.monotonic() + reduce_for)
+                    yield Finding(seed, law, text or texts[0], smaller)

@@ -1,0 +1,551 @@
+"""Random diagrams over the block registry, described so that they can be altered and reduced.
+
+Sources jump, touch and graze the values at which other blocks switch: sawteeth that reach a limit exactly as
+they jump, squares equal to a limit, steps at recorded times, sines whose crest touches a limit, pulses in
+phase with ticks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Diagram, DiagramBuilder, Parameter, ParameterKind, PortRef
+from armblocks.equations import Shape
+from armblocks.errors import ArmblocksError
+from armblocks.face.block_examples import example_block
+
+RECORD = 0.05
+"""s; the interval of the record, a multiple of which many times of the sources are."""
+LIMITS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Values at which blocks switch and that sources reach exactly."""
+PERIODS = (0.05, 0.1, 0.2, 0.25, 0.3, (0.1, 0.05), (0.2, 0.1))
+LEFT_OUT = (
+    # They make or read files, call Python, end the run, or stand for wires that are made by hand here.
+    "FromFile ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum ManualSwitch "
+    "Goto From BusCreator BusSelector BusAssignment Merge Inport Outport Subsystem EnabledSubsystem "
+    "TriggeredSubsystem EnabledTriggeredSubsystem ResettableSubsystem ActionSubsystem If SwitchCase"
+)
+SLOW = "ArmPlant ForwardDynamics LoadedRne JointPID SampledJointPID"
+SWITCHING = (
+    "Saturation DeadZone Sign Abs MinMax CompareToConstant CompareToZero IntervalTest IntervalTestDynamic "
+    "RelationalOperator Switch Quantizer Rounding Modulo CoulombFriction Relay SaturationDynamic "
+    "DeadZoneDynamic WrapToZero MultiportSwitch LookupTable1D HitCrossing LogicalOperator"
+)
+STATES = (
+    "Integrator FirstOrderLag ResettableIntegrator IntegratorLimited SecondOrderIntegrator TransferFunction "
+    "RateLimiterContinuous RateLimiterDynamic SecondOrderIntegratorLimited UnitDelay ZeroOrderHold "
+    "DiscreteIntegrator DiscreteTransferFunction Memory TransportDelay"
+)
+
+
+@dataclass(frozen=True)
+class Node:
+    """One block: its type, parameters, sources of its inputs (``block/port``) by port, and what is inside."""
+
+    name: str
+    kind: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    inside: tuple[Node, ...] = ()
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A diagram as a list of nodes, and how long it is run."""
+
+    nodes: tuple[Node, ...]
+    stop: float = 2.0
+
+    @property
+    def times(self) -> np.ndarray:
+        """The recorded times."""
+        return np.arange(round(self.stop / RECORD) + 1) * RECORD
+
+    def diagram(self) -> Diagram:
+        """The diagram. Raises ``ArmblocksError`` where it is refused."""
+        return built(self.nodes, "fuzz")
+
+
+@dataclass(frozen=True)
+class Signal:
+    """An output that may feed others. ``steady``: it changes at ticks only, or not at all."""
+
+    ref: str
+    shape: Shape
+    steady: bool = False
+
+
+def block_of(node: Node) -> Block:
+    """The block that a node describes."""
+    kind = BLOCKS[node.kind]
+    if node.inside:
+        return kind(**dict(node.parameters), diagram=built(node.inside, node.name))
+    robots = {
+        r.name: getattr(example_block(kind), r.name)
+        for r in kind.parameters()
+        if r.kind is ParameterKind.ROBOT
+    }
+    return kind(**(robots | dict(node.parameters)))
+
+
+def built(nodes: Sequence[Node], name: str) -> Diagram:
+    """The diagram of some nodes; each may be fed by one that stands after it."""
+    builder = DiagramBuilder(name)
+    for node in nodes:
+        builder.add(node.name, block_of(node))
+    for node in nodes:
+        for port, source in node.inputs.items():
+            block, _, output = source.rpartition("/")
+            builder.connect(PortRef(block, output), PortRef(node.name, port))
+    return builder.build()
+
+
+class Maker:
+    """Makes one diagram from a seed."""
+
+    def __init__(self, seed: int, size: int = 10) -> None:
+        self.random = np.random.default_rng(seed)
+        self.size = size
+        self.count = 0
+
+    def recipe(self) -> Recipe:
+        """A diagram of about ``size`` blocks that a builder accepts."""
+        nodes = self.level(self.size, depth=0)
+        return Recipe(nodes, float(self.random.choice([1.0, 2.0, 3.0])))
+
+    def level(
+        self, size: int, depth: int, given: Sequence[Signal] = (), calm: bool = False
+    ) -> tuple[Node, ...]:
+        """The nodes of one level. ``calm``: no continuous states and clocks, for triggered subsystems."""
+        self_nodes: list[Node] = []
+        signals = list(given)
+        loops = [] if calm or self.random.random() < 0.4 else self.begin_feedback(self_nodes, signals)
+        if not given:
+            for _ in range(int(self.random.integers(1, 4))):
+                self.add(self_nodes, signals, *self.source())
+        for _ in range(size):
+            if depth < 2 and self.random.random() < 0.08 and len(signals) > 1:
+                self.subsystem(self_nodes, signals, depth)
+            elif not calm and self.random.random() < 0.02:
+                self.ball(self_nodes, signals)
+            else:
+                self.block(self_nodes, signals, calm)
+        return self.end_feedback(self_nodes, signals, loops)
+
+    # -- parts ---------------------------------------------------------------------------------------------
+
+    def add(
+        self,
+        nodes: list[Node],
+        signals: list[Signal],
+        kind: str,
+        parameters: Mapping[str, Any],
+        inputs: Mapping[str, Signal] | None = None,
+        inside: tuple[Node, ...] = (),
+    ) -> bool:
+        """Add a block, if it takes these parameters and inputs; its outputs become signals."""
+        inputs = inputs or {}
+        self.count += 1
+        node = Node(
+            f"{kind.lower()} {self.count}", kind, parameters, {p: s.ref for p, s in inputs.items()}, inside
+        )
+        try:
+            block = block_of(node)
+            given = {name: signal.shape for name, signal in inputs.items()}
+            shapes = {p.name: p.shape for p in block.output_ports() if p.shape is not None}
+            shapes |= dict(block.output_shapes(given))
+        except (ArmblocksError, ValueError, KeyError):
+            return False
+        nodes.append(node)
+        steady = block.sampled or all(s.steady for s in inputs.values())
+        steady = steady and (bool(inputs) or block.sampled or kind == "Constant")
+        steady = steady and not (block.states(given) or block.delay_lines(given) or inside)
+        ports = block.output_ports()
+        signals += [Signal(f"{node.name}/{port.name}", shapes.get(port.name, ()), steady) for port in ports]
+        return True
+
+    def source(self) -> tuple[str, dict[str, Any]]:
+        """A source that jumps, touches or grazes."""
+        r = self.random
+        height, low = float(r.choice([0.5, 1.0, 1.0, r.uniform(0.3, 2.5)])), float(r.choice(LIMITS))
+        grid = float(RECORD * r.integers(1, 30))
+        frequency = float(r.choice([1.0, 2.0, 0.5, 2.5, 1 / 0.3, r.uniform(0.3, 3.0)]))
+        choices: list[tuple[str, dict[str, Any]]] = [
+            ("SignalGenerator", {"waveform": "sawtooth", "amplitude": height, "frequency": frequency}),
+            ("SignalGenerator", {"waveform": "square", "amplitude": height, "frequency": frequency}),
+            (
+                "Step",
+                {"time": float(r.choice([grid, r.uniform(0.1, 1.5)])), "initial": low, "final": -low + 0.5},
+            ),
+            ("Pulse", {"start": grid, "width": float(r.choice([0.25, 0.3, 0.4])), "amplitude": height}),
+            (
+                "PulseGenerator",
+                {
+                    "period": float(r.choice([0.2, 0.4, 0.5, 0.7])),
+                    "width": float(r.choice([50.0, 25.0, 37.0])),
+                    "amplitude": height,
+                },
+            ),
+            (
+                "RepeatingSequence",
+                {"times": (0.0, 0.3, 0.5, 0.8), "values": tuple(float(r.choice(LIMITS)) for _ in range(4))},
+            ),
+            (
+                "SineWave",
+                {
+                    "amplitude": height,
+                    "frequency": float(r.choice([math.pi, 2 * math.pi, 2.0, r.uniform(0.5, 9.0)])),
+                    "phase": float(r.choice([0.0, math.pi / 2, r.uniform(0, 6)])),
+                    "bias": float(r.choice([0.0, 0.5, -0.5])),
+                },
+            ),
+            ("SineWave", {"amplitude": (1.0, 0.5), "frequency": (3.0, float(r.uniform(1, 6))), "phase": 0.3}),
+            (
+                "Ramp",
+                {
+                    "slope": float(r.choice([1.0, -0.5, 2.0])),
+                    "start": float(r.choice([0.0, grid])),
+                    "initial": low,
+                },
+            ),
+            ("Clock", {}),
+            ("Constant", {"value": float(r.choice([*LIMITS, r.normal()]))}),
+            ("Constant", {"value": tuple(float(v) for v in r.normal(size=2))}),
+            (
+                "RepeatingSequenceStair",
+                {"values": tuple(float(r.choice(LIMITS)) for _ in range(3)), "sample_time": self.period()},
+            ),
+            ("UniformRandomNumber", {"sample_time": self.period(), "seed": int(r.integers(1, 1000))}),
+            ("CounterLimited", {"upper": 3, "sample_time": self.period()}),
+        ]
+        return choices[int(r.integers(len(choices)))]
+
+    def period(self) -> Any:
+        return PERIODS[int(self.random.integers(len(PERIODS)))]
+
+    def block(self, nodes: list[Node], signals: list[Signal], calm: bool) -> None:
+        """A random block, fed by signals that there are."""
+        r = self.random
+        for _ in range(20):
+            draw = r.random()
+            if draw < 0.12:
+                if not calm and self.add(nodes, signals, *self.source()):
+                    return
+                continue
+            pool = list(BLOCKS)
+            if draw < 0.45:
+                pool = SWITCHING.split()
+            elif draw < 0.6:
+                pool = STATES.split()
+            name = str(r.choice(pool))
+            if name in LEFT_OUT.split() or (name in SLOW.split() and r.random() < 0.9):
+                continue
+            kind = BLOCKS[name]
+            parameters = self.parameters(name)
+            if calm and kind.sampled:
+                parameters["sample_time"] = -1.0
+            node = Node("trial", name, parameters)
+            try:
+                block = block_of(node)
+            except (ArmblocksError, ValueError):
+                continue
+            if not block.input_ports():
+                continue
+            inputs = self.feeds(block, signals)
+            if inputs is None or (
+                calm
+                and (
+                    block.states({p: s.shape for p, s in inputs.items()})
+                    or block.delay_lines({p: s.shape for p, s in inputs.items()})
+                )
+            ):
+                continue
+            if kind.sampled and not calm and all(s.steady for s in inputs.values()) and r.random() < 0.3:
+                parameters["sample_time"] = -1.0
+            before = len(nodes)
+            if self.add(nodes, signals, name, parameters, inputs):
+                if parameters.get("sample_time") == -1.0 and not calm and not _accepted(nodes):
+                    nodes[before] = replace(nodes[before], parameters={**parameters, "sample_time": 0.1})
+                return
+
+    def feeds(self, block: Block, signals: Sequence[Signal]) -> dict[str, Signal] | None:
+        """Signals whose shapes the block takes."""
+        ports = block.input_ports()
+        for attempt in range(6):
+            wanted = () if attempt < 4 else (2,)
+            inputs: dict[str, Signal] = {}
+            for port in ports:
+                shape = port.shape
+                fitting = [s for s in signals if s.shape == (wanted if shape is None else shape)]
+                if not fitting:
+                    break
+                # later signals more often, so that chains grow
+                place = int(len(fitting) * math.sqrt(self.random.random()))
+                inputs[port.name] = fitting[place]
+            if len(inputs) < len(ports):
+                continue
+            try:
+                block.output_shapes({name: signal.shape for name, signal in inputs.items()})
+            except ArmblocksError:
+                continue
+            return inputs
+        return None
+
+    def parameters(self, name: str) -> dict[str, Any]:
+        """Parameters of the worked example, some of them altered."""
+        kind = BLOCKS[name]
+        found = (
+            {k: v for k, v in kind.example.parameters.items() if k != "robot"}
+            if self.random.random() < 0.5
+            else {}
+        )
+        for rule in kind.parameters():
+            if rule.name == "sample_time":
+                found[rule.name] = self.period()
+            elif self.random.random() < 0.4:
+                value = self.altered(rule)
+                if value is not None:
+                    found[rule.name] = value
+        try:
+            kind(**found) if not _needs_robot(name) else None
+        except (ArmblocksError, ValueError):
+            found = {k: v for k, v in found.items() if k == "sample_time"}
+        return found
+
+    def altered(self, rule: Parameter) -> Any:
+        """Another value of one parameter, or nothing where it has to stay."""
+        r = self.random
+        if rule.kind is ParameterKind.CHOICE:
+            return str(r.choice(list(rule.choices)))
+        if rule.kind is ParameterKind.BOOLEAN:
+            return bool(r.integers(2)) if rule.name != "zero_crossing" else None
+        if rule.kind in (ParameterKind.NUMBER, ParameterKind.ARRAY) and np.ndim(rule.default) == 0:
+            if rule.default is None or (
+                rule.name in ("order", "inputs") or not isinstance(rule.default, int | float)
+            ):
+                return None
+            value = float(r.choice([*LIMITS, 2.0, r.uniform(-2, 2)]))
+            if rule.unit == "s":
+                value = float(r.choice([0.1, 0.25, 0.5, r.uniform(0.1, 1.0)]))
+            lower = rule.minimum if rule.above is None else max(rule.minimum, rule.above + 0.1)
+            return float(np.clip(value, lower, rule.maximum))
+        return None
+
+    def subsystem(self, nodes: list[Node], signals: list[Signal], depth: int) -> None:
+        """A subsystem of a random kind around a few blocks."""
+        r = self.random
+        scalars = [s for s in signals if s.shape == ()]
+        if len(scalars) < 2:
+            return
+        kinds = (
+            "Subsystem",
+            "EnabledSubsystem",
+            "TriggeredSubsystem",
+            "ResettableSubsystem",
+            "EnabledTriggeredSubsystem",
+            "branches",
+        )
+        kind = str(r.choice(kinds))
+        fed = [scalars[int(r.integers(len(scalars)))] for _ in range(int(r.integers(1, 3)))]
+        calm = "Triggered" in kind
+        if kind == "branches":
+            self.branches(nodes, signals, scalars, fed, depth)
+            return
+        inside = self.inside(fed, depth, calm)
+        if inside is None:
+            return
+        parameters: dict[str, Any] = {}
+        ports: dict[str, Signal] = {f"in{k}": s for k, s in enumerate(fed)}
+        control = scalars[int(r.integers(len(scalars)))]
+        if kind == "EnabledSubsystem":
+            parameters["states_when_enabling"] = str(r.choice(["held", "reset"]))
+        elif kind != "Subsystem":
+            parameters["edge"] = str(r.choice(["rising", "falling", "either"]))
+        names = {
+            "EnabledSubsystem": ["enable"],
+            "TriggeredSubsystem": ["trigger"],
+            "ResettableSubsystem": ["reset"],
+            "EnabledTriggeredSubsystem": ["enable", "trigger"],
+        }
+        for port in names.get(kind, []):
+            ports[port] = control
+            control = scalars[int(r.integers(len(scalars)))]
+        self.add(nodes, signals, kind, parameters, ports, inside)
+
+    def inside(self, fed: Sequence[Signal], depth: int, calm: bool) -> tuple[Node, ...] | None:
+        """In blocks, some others, and one or two Out blocks."""
+        entries = [Node(f"in{k}", "Inport") for k in range(len(fed))]
+        given = [Signal(f"in{k}/y", s.shape, False) for k, s in enumerate(fed)]
+        inner = self.level(int(self.random.integers(1, 4)), depth + 1, given, calm)
+        if not inner:
+            return None
+        ends: list[Node] = []
+        scalars = [s for s in self.latest if s.shape == () and not s.ref.startswith("in")]
+        for number in range(int(self.random.integers(1, 3))):
+            if scalars:
+                chosen = scalars[int(self.random.integers(len(scalars)))]
+                when_off = str(self.random.choice(["held", "reset"]))
+                ends.append(
+                    Node(
+                        f"out{number}",
+                        "Outport",
+                        {"when_off": when_off, "initial": float(self.random.choice(LIMITS))},
+                        {"u": chosen.ref},
+                    )
+                )
+        return (*entries, *inner, *ends) if ends else None
+
+    def branches(
+        self,
+        nodes: list[Node],
+        signals: list[Signal],
+        scalars: Sequence[Signal],
+        fed: Sequence[Signal],
+        depth: int,
+    ) -> None:
+        """An If block, two action subsystems and a Merge."""
+        control = scalars[int(self.random.integers(len(scalars)))]
+        limit = float(self.random.choice(LIMITS))
+        self.add(nodes, signals, "If", {"expressions": f"u > {limit}"}, {"u": control})
+        choice = nodes[-1].name
+        merged: dict[str, Signal] = {}
+        for number, port in enumerate(("if1", "else"), 1):
+            inside = self.inside(fed, depth, False)
+            if inside is None:
+                return
+            inside = tuple(n for n in inside if n.kind != "Outport" or n.name == "out0")
+            ports = {f"in{k}": s for k, s in enumerate(fed)} | {"action": Signal(f"{choice}/{port}", ())}
+            states = str(self.random.choice(["held", "reset"]))
+            if not self.add(
+                nodes, signals, "ActionSubsystem", {"states_when_resuming": states}, ports, inside
+            ):
+                return
+            merged[f"u{number}"] = signals.pop()
+        self.add(nodes, signals, "Merge", {"initial": limit}, merged)
+
+    def ball(self, nodes: list[Node], signals: list[Signal]) -> None:
+        """A ball that falls from a height, later or at once, and bounces until it rests."""
+        r = self.random
+        self.add(
+            nodes,
+            signals,
+            "Step",
+            {"time": float(r.choice([0.0, 0.5, r.uniform(0, 1)])), "initial": 0.0, "final": -9.81},
+        )
+        weight = signals[-1]
+        self.add(nodes, signals, "Bias", {"bias": 0.0}, {"u": weight})
+        place = {"lower": 0.0, "initial": float(r.choice([0.0, 0.3, 1.0])), "reinitialize": True}
+        self.count += 1
+        name = f"ball {self.count}"
+        back = Node(
+            f"bounce {self.count}", "Gain", {"gain": -float(r.uniform(0.1, 0.95))}, {"u": f"{name}/dx"}
+        )
+        ball = Node(name, "SecondOrderIntegratorLimited", place, {"u": weight.ref, "dx0": f"{back.name}/y"})
+        nodes += [back, ball]
+        signals += [Signal(f"{name}/x", ()), Signal(f"{name}/dx", ())]
+
+    def begin_feedback(self, nodes: list[Node], signals: list[Signal]) -> list[str]:
+        """Blocks with states whose inputs are connected at the end."""
+        kind = str(self.random.choice(["FirstOrderLag", "Integrator", "UnitDelay", "Gain"]))
+        parameters: dict[str, Any] = {"UnitDelay": {"sample_time": self.period()}, "Gain": {"gain": 0.3}}.get(
+            kind, {}
+        )
+        self.count += 1
+        name = f"back {self.count}"
+        nodes.append(Node(name, kind, parameters))
+        signals.append(Signal(f"{name}/y", (), kind == "UnitDelay"))
+        return [name]
+
+    def end_feedback(
+        self, nodes: list[Node], signals: list[Signal], loops: Sequence[str]
+    ) -> tuple[Node, ...]:
+        """Close the loops through a bounded block; an integrator leaks."""
+        for name in loops:
+            scalars = [s for s in signals if s.shape == ()]
+            last = scalars[-1 - int(self.random.integers(min(3, len(scalars))))]
+            node = next(n for n in nodes if n.name == name)
+            if node.kind == "Integrator":
+                self.add(nodes, signals, "Sum", {"signs": "+-"}, {"u1": last, "u2": Signal(f"{name}/y", ())})
+                last = signals[-1]
+            nodes[nodes.index(node)] = replace(node, inputs={"u": last.ref})
+        self.latest = signals
+        return tuple(nodes)
+
+
+def _needs_robot(name: str) -> bool:
+    return any(rule.kind is ParameterKind.ROBOT for rule in BLOCKS[name].parameters())
+
+
+def _accepted(nodes: Sequence[Node]) -> bool:
+    try:
+        Recipe(tuple(nodes)).diagram()
+    except ArmblocksError:
+        return False
+    return True
+
+
+def random_recipe(seed: int, size: int = 10) -> Recipe:
+    """The diagram of a seed; those that a builder refuses are made again from the next number."""
+    for number in range(100):
+        try:
+            recipe = Maker(1000 * seed + number, size).recipe()
+            recipe.diagram()
+        except ArmblocksError:
+            continue
+        return recipe
+    raise AssertionError(f"no diagram from seed {seed}")
+
+
+# -- smaller diagrams --------------------------------------------------------------------------------------
+
+
+def reductions(recipe: Recipe) -> Iterator[Recipe]:
+    """Recipes that are smaller by one step: without a node, a source in its place, fewer parameters."""
+    for nodes in _smaller(recipe.nodes):
+        yield replace(recipe, nodes=nodes)
+    if recipe.stop > 0.5:
+        yield replace(recipe, stop=round(recipe.stop / 2 / RECORD) * RECORD)
+
+
+def _smaller(nodes: tuple[Node, ...]) -> Iterator[tuple[Node, ...]]:
+    used = {source.rpartition("/")[0] for node in nodes for source in node.inputs.values()}
+    for node in reversed(nodes):
+        others = tuple(entry for entry in nodes if entry.name != node.name)
+        if node.kind == "Inport":
+            continue
+        if node.name not in used and (node.kind != "Outport" or sum(n.kind == "Outport" for n in nodes) > 1):
+            yield others
+            continue
+        if node.kind == "Outport":
+            continue
+        for source in dict.fromkeys(node.inputs.values()):
+            yield _fed_instead(others, node.name, source)
+        if node.kind != "Constant":
+            constant = Node(node.name, "Constant", {"value": 1.0})
+            yield tuple(
+                constant if entry is node else replace(entry, inputs=_to_constant(entry.inputs, node.name))
+                for entry in nodes
+            )
+    for k, node in enumerate(nodes):
+        for name in node.parameters:
+            kept = {key: value for key, value in node.parameters.items() if key != name}
+            yield (*nodes[:k], replace(node, parameters=kept), *nodes[k + 1 :])
+        for inside in _smaller(node.inside):
+            yield (*nodes[:k], replace(node, inside=inside), *nodes[k + 1 :])
+
+
+def _fed_instead(nodes: tuple[Node, ...], name: str, source: str) -> tuple[Node, ...]:
+    def other(given: str) -> str:
+        return source if given.rpartition("/")[0] == name else given
+
+    return tuple(replace(n, inputs={port: other(given) for port, given in n.inputs.items()}) for n in nodes)
+
+
+def _to_constant(inputs: Mapping[str, str], name: str) -> dict[str, str]:
+    return {p: f"{name}/y" if s.rpartition("/")[0] == name else s for p, s in inputs.items()}
