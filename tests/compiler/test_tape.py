@@ -167,3 +167,12 @@ def test_the_interpreter_broadcasts_and_checks_sizes() -> None:
         interpret(tape, [np.ones(3), np.ones(2)])
     plain = interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)], fused=False)[0]
     np.testing.assert_allclose(plain, interpret(tape, [np.full(3, 1 / 3), np.full(3, 1 / 7)])[0], rtol=1e-14)
+
+
+def test_the_magnitude_of_a_number_with_another_sign_is_its_own() -> None:
+    builder = TapeBuilder([2])
+    a, b = (builder.input(0, place) for place in range(2))
+    signed = builder.add(Opcode.COPY_SIGN, builder.constant(-2.2), b)
+    other = builder.add(Opcode.COPY_SIGN, a, b)
+    tape = builder.build([[builder.add(Opcode.ABSOLUTE, signed), builder.add(Opcode.ABSOLUTE, other)]])
+    assert tape == Tape((2,), (2.2,), (Operation(Opcode.ABSOLUTE, (0,)),), ((2, 3),))

@@ -13,12 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.blocks.complex_arithmetic import magnitude, product, quotient, square_root
 from armblocks.errors import InputError
+from armblocks.rounded_functions import asinh, cos, cosh, power, sin, sinh, tan
 
 Matrix = NDArray[np.float64]
 Roots = NDArray[np.complex128]
@@ -106,7 +107,7 @@ def _sections(zeros: Roots, poles: Roots) -> list[tuple[list[complex], list[comp
     sections: list[tuple[list[complex], list[complex]]] = [([], group) for group in pole_groups]
     for group in sorted(zero_groups, key=len, reverse=True):
         free = [section for section in sections if len(section[0]) + len(group) <= len(section[1])]
-        nearest = min(free, key=lambda section: abs(section[1][0] - group[0]))
+        nearest = min(free, key=lambda section: magnitude(section[1][0] - group[0]))
         nearest[0].extend(group)
     return sections
 
@@ -119,8 +120,8 @@ def _groups(roots: Roots) -> list[list[complex]]:
 
 def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[LinearSystem, float]:
     """``factor`` times the section, and the factor that makes its gain about 1."""
-    size = max(map(abs, poles)) or 1.0
-    factor = size ** len(poles) / math.prod(max(abs(zero), size) for zero in zeros)
+    size = max(map(magnitude, poles)) or 1.0
+    factor = math.prod([size] * len(poles)) / math.prod(max(magnitude(zero), size) for zero in zeros)
     above, below = factor * _polynomial(zeros), _polynomial(poles)
     above = np.concatenate([np.zeros(len(below) - len(above)), above])
     direct = float(above[0])
@@ -135,14 +136,14 @@ def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[Linear
         c = [rest[0] / size, -(rest[1] + rest[0] * sigma) / omega / size]
     else:
         a, b = [[first.real, size], [0.0, poles[1].real]], [0.0, size]
-        c = [(rest[1] + rest[0] * first.real) / size**2, rest[0] / size]
+        c = [(rest[1] + rest[0] * first.real) / (size * size), rest[0] / size]
     return LinearSystem(A=np.array(a), B=np.array(b), C=np.array(c), D=direct), factor
 
 
 def _polynomial(roots: Sequence[complex]) -> Matrix:
     """Its coefficients from the highest power, 1, to the lowest; at most two roots, conjugate or real."""
     if len(roots) == 2:
-        return np.array([1.0, -(roots[0] + roots[1]).real, (roots[0] * roots[1]).real])
+        return np.array([1.0, -(roots[0] + roots[1]).real, product(roots).real])
     return np.array([1.0, *(-root.real for root in roots)])
 
 
@@ -165,22 +166,24 @@ def _in_series(one: LinearSystem, two: LinearSystem) -> LinearSystem:
 def low_pass(design: str, order: int, ripple: float, attenuation: float) -> ZeroPoleGain:
     """The filter whose pass band ends (``chebyshev2``: stop band begins) at 1 rad/s; two numbers in dB."""
     angles = math.pi * (2.0 * np.arange(1, order + 1) - 1.0) / (2.0 * order)
-    circle = np.exp(1j * (angles + math.pi / 2.0))
+    sines, cosines = (np.array([function(angle) for angle in angles.tolist()]) for function in (sin, cos))
+    circle = _complex(-sines, cosines)
     none = np.zeros(0, dtype=np.complex128)
     if design == "butterworth":
         return ZeroPoleGain(zeros=none, poles=_paired(circle), gain=1.0)
-    squeeze = 10.0 ** (ripple / 10.0) - 1.0 if design == "chebyshev1" else 10.0 ** (attenuation / 10.0) - 1.0
-    stretch = math.asinh(math.sqrt(squeeze if design == "chebyshev2" else 1.0 / squeeze)) / order
-    ellipse = _paired(math.sinh(stretch) * np.real(circle) + 1j * math.cosh(stretch) * np.imag(circle))
+    squeeze = power(10.0, (ripple if design == "chebyshev1" else attenuation) / 10.0) - 1.0
+    stretch = asinh(math.sqrt(squeeze if design == "chebyshev2" else 1.0 / squeeze)) / order
+    ellipse = _paired(_complex(sinh(stretch) * -sines, cosh(stretch) * cosines))
     if design == "chebyshev1":
-        gain = float(np.prod(-ellipse).real)
+        gain = product(-ellipse).real
         return ZeroPoleGain(
             zeros=none, poles=ellipse, gain=gain / math.sqrt(1.0 + squeeze) if order % 2 == 0 else gain
         )
-    poles = _paired(1.0 / ellipse)
+    poles = _paired(_quotients(1.0, ellipse))
     middle = order // 2 if order % 2 else None
-    zeros = _paired(np.delete(1j / np.cos(angles), [] if middle is None else [middle]))
-    gain = float((np.prod(-poles) / np.prod(-zeros)).real)
+    heights = [1.0 / cos(angle) for k, angle in enumerate(angles.tolist()) if k != middle]
+    zeros = _paired(_complex(np.zeros(len(heights)), np.array(heights)))
+    gain = quotient(product(-poles), product(-zeros)).real
     return ZeroPoleGain(zeros=zeros, poles=poles, gain=gain)
 
 
@@ -188,24 +191,25 @@ def shifted(base: ZeroPoleGain, kind: str, edge: float, upper_edge: float) -> Ze
     """The low-pass filter of 1 rad/s as ``low_pass``, ``high_pass``, ``band_pass`` or ``band_stop``."""
     z, p, k, excess = base.zeros, base.poles, base.gain, len(base.poles) - len(base.zeros)
     if kind == "low_pass":
-        return ZeroPoleGain(zeros=z * edge, poles=p * edge, gain=k * edge**excess)
-    turned = k * float((np.prod(-z) / np.prod(-p)).real)
+        return ZeroPoleGain(zeros=z * edge, poles=p * edge, gain=k * math.prod([edge] * excess))
+    turned = k * quotient(product(-z), product(-p)).real
     if kind == "high_pass":
-        zeros = np.concatenate([edge / z, np.zeros(excess)])
-        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(edge / p), gain=turned)
+        zeros = np.concatenate([_quotients(edge, z), np.zeros(excess)])
+        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(_quotients(edge, p)), gain=turned)
     width, centre = upper_edge - edge, math.sqrt(edge * upper_edge)
     if kind == "band_pass":
         zeros = np.concatenate([_split(z * width / 2.0, centre), np.zeros(excess)])
         poles = _split(p * width / 2.0, centre)
-        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(poles), gain=k * width**excess)
+        return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(poles), gain=k * math.prod([width] * excess))
     notches = np.concatenate([np.full(excess, 1j * centre), np.full(excess, -1j * centre)])
-    zeros = np.concatenate([_split(width / 2.0 / z, centre), notches])
-    return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(_split(width / 2.0 / p, centre)), gain=turned)
+    zeros = np.concatenate([_split(_quotients(width / 2.0, z), centre), notches])
+    poles = _split(_quotients(width / 2.0, p), centre)
+    return ZeroPoleGain(zeros=_paired(zeros), poles=_paired(poles), gain=turned)
 
 
 def warped(fraction: float) -> float:
     """The frequency that the bilinear transformation of :func:`sampled` takes to this share of Nyquist's."""
-    return math.tan(math.pi * fraction / 2.0)
+    return tan(math.pi * fraction / 2.0)
 
 
 def sampled(system: ZeroPoleGain) -> ZeroPoleGain:
@@ -213,22 +217,34 @@ def sampled(system: ZeroPoleGain) -> ZeroPoleGain:
     z, p = system.zeros, system.poles
     excess = len(p) - len(z)
     return ZeroPoleGain(
-        zeros=_paired(np.concatenate([(1.0 + z) / (1.0 - z), np.full(excess, -1.0)])),
-        poles=_paired((1.0 + p) / (1.0 - p)),
-        gain=system.gain * float((np.prod(1.0 - z) / np.prod(1.0 - p)).real),
+        zeros=_paired(np.concatenate([_quotients(1.0 + z, 1.0 - z), np.full(excess, -1.0)])),
+        poles=_paired(_quotients(1.0 + p, 1.0 - p)),
+        gain=system.gain * quotient(product(1.0 - z), product(1.0 - p)).real,
     )
+
+
+def _complex(real: Matrix, imaginary: Matrix) -> Roots:
+    found = np.empty(len(real), dtype=np.complex128)
+    found.real, found.imag = real, imaginary
+    return found
+
+
+def _quotients(over: complex | Roots, under: Roots) -> Roots:
+    """Quotients by element; one dividend, or as many as divisors."""
+    pairs = zip(np.broadcast_to(over, under.shape).tolist(), under.tolist())
+    return np.array([quotient(complex(a), b) for a, b in pairs], dtype=np.complex128)
 
 
 def _split(roots: Roots, centre: float) -> Roots:
     """The two roots around ``centre`` that one root around 0 becomes."""
-    apart: Any = np.sqrt(roots**2 - centre**2 + 0j)
+    apart = np.array([square_root(product([root, root]) - centre * centre) for root in roots], complex)
     return np.concatenate([roots + apart, roots - apart])
 
 
 def _paired(roots: ArrayLike) -> Roots:
     """The same roots, where what is conjugate but for rounding is exactly so, and what is real is so."""
     given = np.asarray(roots, dtype=np.complex128)
-    tolerance = 1e-9 * np.abs(given)
+    tolerance = np.array([1e-9 * magnitude(root) for root in given])
     real = given[np.abs(given.imag) <= tolerance].real + 0j
     upper = given[given.imag > tolerance]
     found: Roots = np.concatenate([upper, np.conj(upper), real]).astype(np.complex128)

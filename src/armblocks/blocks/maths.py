@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -29,6 +28,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.errors import InputError
+from armblocks.rounded_functions import log
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,7 +198,7 @@ class MatrixProduct(Block):
 
 
 _FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
-    "10^u": lambda u: casadi.exp(u * math.log(10.0)),
+    "10^u": lambda u: casadi.exp(u * log(10.0)),
     "abs": casadi.fabs,
     "cbrt": lambda u: casadi.sign(u) * casadi.fabs(u) ** (1.0 / 3.0),
     "ceil": casadi.ceil,
@@ -209,7 +209,7 @@ _FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
     "log": casadi.log,
     "log10": casadi.log10,
     "log1p": casadi.log1p,
-    "log2": lambda u: casadi.log(u) / math.log(2.0),
+    "log2": lambda u: casadi.log(u) / log(2.0),
     "negate": lambda u: -u,
     "reciprocal": lambda u: 1.0 / u,
     "sign": casadi.sign,

@@ -106,6 +106,6 @@ def _right_side(h: Array, chords: Array) -> Array:
         found[0], found[2] = 2.0 * chords[0], 2.0 * chords[1]
         return found
     first, last = h[0] + h[1], h[-1] + h[-2]
-    found[0] = ((h[0] + 2.0 * first) * h[1] * chords[0] + h[0] ** 2 * chords[1]) / first
-    found[-1] = ((h[-1] + 2.0 * last) * h[-2] * chords[-1] + h[-1] ** 2 * chords[-2]) / last
+    found[0] = ((h[0] + 2.0 * first) * h[1] * chords[0] + h[0] * h[0] * chords[1]) / first
+    found[-1] = ((h[-1] + 2.0 * last) * h[-2] * chords[-1] + h[-1] * h[-1] * chords[-2]) / last
     return found

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armblocks.compiler.butcher_tableau import CONSISTENCY, ButcherTableau, Row
 from armblocks.errors import InputError
@@ -165,22 +165,39 @@ def from_textbook(
     ``(I - h gamma[i][i] J) k[i] = f(t + alpha_i h, x + h sum_j alpha[i][j] k[j]) + h J sum_j gamma[i][j] k[j]
     + h gamma_i T`` with ``alpha_i``, ``gamma_i`` the sums of the rows, ``x_new = x + h sum_j b[j] k[j]``
     (Hairer, Wanner II, IV.7, equation (7.4)). Row i of ``alpha`` has i numbers, row i of ``gamma`` i + 1;
-    ``dense`` and ``error`` are weights of these ``k``.
+    ``dense`` and ``error`` are weights of these ``k``. The fields are computed as fractions and rounded once,
+    because the result of a library's matrix inversion differs from processor to processor.
     """
-    G = _square(gamma)
-    inverse = np.linalg.inv(G)
-    A = _square(alpha)
-    mixed, couplings = A @ inverse, np.diag(1.0 / np.diag(G)) - inverse
+    inverse = _inverse(gamma)
     return {
-        "gamma": float(G[0, 0]),
-        "nodes": _row(A.sum(axis=1)),
-        "matrix": tuple(_row(mixed[i, :i]) for i in range(len(b))),
-        "couplings": tuple(_row(couplings[i, :i]) for i in range(len(b))),
-        "time_weights": _row(G.sum(axis=1)),
-        "weights": _row(np.array(b) @ inverse),
-        "dense": tuple(_row(row) for row in (np.array(dense).T @ inverse).T),
-        "error": None if error is None else _row(np.array(error) @ inverse),
+        "gamma": gamma[0][0],
+        "nodes": tuple(float(sum(map(Fraction, row))) for row in alpha),
+        "matrix": tuple(_over(row, inverse)[:i] for i, row in enumerate(alpha)),
+        "couplings": tuple(tuple(float(-entry) for entry in row[:-1]) for row in inverse),
+        "time_weights": tuple(float(sum(map(Fraction, row))) for row in gamma),
+        "weights": _over(b, inverse),
+        "dense": tuple(zip(*(_over(column, inverse) for column in zip(*dense)))),
+        "error": None if error is None else _over(error, inverse),
     }
+
+
+def _inverse(gamma: Sequence[Sequence[float]]) -> list[list[Fraction]]:
+    """The inverse of a lower triangle, as its rows, by forward substitution."""
+    rows: list[list[Fraction]] = []
+    for i, row in enumerate(gamma):
+        exact = [Fraction(entry) for entry in row]
+        found = [-sum((exact[k] * rows[k][j] for k in range(j, i)), Fraction(0)) / exact[i] for j in range(i)]
+        rows.append([*found, 1 / exact[i]])
+    return rows
+
+
+def _over(weights: Sequence[float], inverse: Sequence[Sequence[Fraction]]) -> Row:
+    """A row of weights, perhaps shorter, times the triangle ``inverse``."""
+    exact = [Fraction(weight) for weight in weights]
+    return tuple(
+        float(sum((exact[k] * inverse[k][j] for k in range(j, len(exact))), Fraction(0)))
+        for j in range(len(inverse))
+    )
 
 
 def stiffly_accurate_dense(weights: Row, inner: Sequence[Row]) -> tuple[Row, ...]:
@@ -205,7 +222,3 @@ def _square(rows: Sequence[Sequence[float]]) -> np.ndarray:
     for i, row in enumerate(rows):
         matrix[i, : len(row)] = row
     return matrix
-
-
-def _row(values: ArrayLike) -> Row:
-    return tuple(float(value) for value in np.asarray(values))

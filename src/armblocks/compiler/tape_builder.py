@@ -67,6 +67,7 @@ class TapeBuilder:
             Opcode.DIVIDE: self._simplify_divide,
             Opcode.NEGATE: self._simplify_negate,
             Opcode.SELECT: self._simplify_select,
+            Opcode.ABSOLUTE: self._simplify_absolute,
         }
         rule = rules.get(opcode)
         return rule(*operands) if rule else None
@@ -145,6 +146,11 @@ class TapeBuilder:
             number = self.value(y)
             if number is not None:
                 return self.add(Opcode.MULTIPLY, x, self.constant(-number))
+        return None
+
+    def _simplify_absolute(self, a: int) -> int | None:
+        if signed := self.operands_of(a, Opcode.COPY_SIGN):
+            return self.add(Opcode.ABSOLUTE, signed[0])
         return None
 
     def _simplify_select(self, condition: int, yes: int, no: int) -> int | None:

@@ -21,7 +21,7 @@ from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.conditional_equations import FIRE, ConditionalBlock
 from armblocks.diagram.parameter import shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, State
-from armblocks.equations import Shape, Slot, flatten, unflatten
+from armblocks.equations import Shape, Slot, call_with_constants, flatten, has_elementary, unflatten
 from armblocks.errors import DiagramError
 
 
@@ -77,6 +77,18 @@ class Group:
     z: SX
     _rates: list[tuple[SX, tuple[SX, ...]]] = field(default_factory=list[tuple[SX, tuple[SX, ...]]])
     _functions: dict[int, Function] = field(default_factory=dict[int, Function])
+    _elementary: dict[int, bool] = field(default_factory=dict[int, bool])
+
+    def value(self, order: int, arguments: Sequence[SX]) -> SX:
+        """What :meth:`rate` gives for these arguments: symbols, expressions, constants."""
+        function = self.rate(order)
+        if order not in self._elementary:
+            self._elementary[order] = has_elementary(function)
+        if self._elementary[order]:
+            (flat,) = call_with_constants(function, arguments)
+        else:
+            (flat,) = function.call(list(arguments), True, False)
+        return flat
 
     def rate(self, order: int) -> Function:
         """The ``order``-th time derivative as a function of ``t, p, z, z', …`` up to that order of z.

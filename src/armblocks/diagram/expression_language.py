@@ -25,6 +25,7 @@ from casadi import SX, evalf, horzcat, logic_and, logic_not, logic_or, mtimes, v
 from armblocks.diagram.formula_functions import CONSTANTS, FUNCTIONS, MAKERS, MATRIX_FUNCTIONS, range_of
 from armblocks.diagram.formula_powers import powers_from_the_left
 from armblocks.diagram.formula_spelling import CALLED_IF, CALLED_RANGE, python_spelling
+from armblocks.equations import elementary
 from armblocks.errors import InputError, UnknownNameError
 
 LONGEST = 4000
@@ -48,7 +49,7 @@ _OPERATORS: Mapping[type[ast.operator], Callable[[SX, SX], SX]] = {
     ast.MatMult: lambda left, right: left * right,  # .*
     ast.Div: _quotient,
     ast.FloorDiv: _quotient,  # ./
-    ast.Pow: lambda left, right: left**right,
+    ast.Pow: lambda left, right: elementary("power", left, right),
 }
 _COMPARISONS: Mapping[type[ast.cmpop], Callable[[SX, SX], SX]] = {
     ast.Lt: lambda left, right: left < right,

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import casadi
 import numpy as np
 from casadi import SX, if_else
 from numpy.typing import NDArray
 
+from armblocks.equations import elementary
+
 MOST_ELEMENTS = 100_000
 """Numbers of an array that a function makes."""
 
 
-def _power(base: SX, exponent: SX) -> SX:
-    return base**exponent
+def _elementary(name: str) -> Callable[..., SX]:
+    return partial(elementary, name)
 
 
 def _where(condition: SX, yes: SX, no: SX) -> SX:
@@ -47,20 +50,21 @@ CONSTANTS: Mapping[str, float] = {
 
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., SX]]] = {
     **{
-        name: (1, getattr(casadi, name))
+        name: (1, _elementary(name))
         for name in (
             *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
-            *("exp", "expm1", "log", "log10", "log1p", "sqrt", "floor", "ceil", "sign", "erf"),
+            *("exp", "expm1", "log", "log10", "log1p", "erf"),
         )
     },
+    **{name: (1, getattr(casadi, name)) for name in ("sqrt", "floor", "ceil", "sign")},
     "abs": (1, casadi.fabs),
-    "ln": (1, casadi.log),
-    "atan2": (2, casadi.atan2),
-    "hypot": (2, casadi.hypot),
+    "ln": (1, _elementary("log")),
+    "atan2": (2, _elementary("atan2")),
+    "hypot": (2, _elementary("hypot")),
     "min": (2, casadi.fmin),
     "max": (2, casadi.fmax),
-    "power": (2, _power),
-    "pow": (2, _power),
+    "power": (2, _elementary("power")),
+    "pow": (2, _elementary("power")),
     "rem": (2, casadi.fmod),
     "deg2rad": (1, _radians),
     "rad2deg": (1, _degrees),

@@ -8,6 +8,7 @@ import numpy as np
 from casadi import SX, Function, densify, depends_on, jacobian, substitute, symvar
 from numpy.typing import NDArray
 
+from armblocks.equations import substituted
 from armblocks.equations.linear_solution import linear_solution
 from armblocks.errors import AlgebraicLoopError
 
@@ -31,7 +32,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
         solved = -_divided(densify(constant), slope)
         # What was solved before is put in last, into a small expression, so that work grows with the count.
         before = sorted({place for row in circle for place in needs[row]} - set(circle))
-        solution[circle] = substitute(solved, w[before], solution[before]) if before else solved
+        solution[circle] = substituted(solved, w[before], solution[before]) if before else solved
     return solution, sorted(remaining)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from casadi import SX, evalf, substitute
+from casadi import SX, evalf
 
 from armblocks.diagram.block import Block
 from armblocks.diagram.diagram import Diagram
@@ -13,7 +13,7 @@ from armblocks.diagram.hierarchy import flat_diagram, joined, levels_of
 from armblocks.diagram.mask import as_symbols, formula_names, formula_symbols
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.structure import DiagramBlock
-from armblocks.equations import HybridSystem, Slot, unflatten
+from armblocks.equations import HybridSystem, Slot, substituted, unflatten
 from armblocks.equations.added_parameters import AddedParameter, with_added_parameters
 from armblocks.errors import InputError, UnknownNameError
 
@@ -87,7 +87,7 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
         )
     still = SX.zeros(slot.size)
     changes = {
-        name: formula - SX(evalf(substitute(formula, change, still)))
+        name: formula - SX(evalf(substituted(formula, change, still)))
         for name, formula in found.tunable.items()
     }
     return AddedParameter(slot=slot, symbol=change, changes=changes)

@@ -36,7 +36,16 @@ from armblocks.diagram.shapes import DiagramShapes
 from armblocks.diagram.structure import Outport
 from armblocks.diagram.tracing import Implicit, Symbols, Tracing
 from armblocks.diagram.units import infer_units
-from armblocks.equations import Delays, HybridSystem, Signature, Slot, TracedFunction, flatten, signature
+from armblocks.equations import (
+    Delays,
+    HybridSystem,
+    Signature,
+    Slot,
+    TracedFunction,
+    flatten,
+    signature,
+    substituted,
+)
 from armblocks.errors import DiagramError
 
 
@@ -157,7 +166,7 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
         # The same equations as those of the flow, perhaps cut elsewhere: their values are known from there.
         known = loops.solved([flow.value(_same(model.flow, value)) for value in tick.unknowns])
         solution = substitute(solution, cuts[remaining], known[remaining])
-    return [substitute(updated, cuts, solution)]
+    return [substituted(updated, cuts, solution)]
 
 
 def _keeps_left_limits(model: Model) -> bool:

@@ -26,7 +26,7 @@ from armblocks.diagram.conditional_equations import ON
 from armblocks.diagram.implicit import check_solvable, solve_affine
 from armblocks.diagram.model import Model
 from armblocks.diagram.ordering import HELD, Network, Node, Value
-from armblocks.equations import Signature, Slot, flatten
+from armblocks.equations import Signature, Slot, flatten, substituted
 from armblocks.errors import DiagramError
 
 
@@ -113,7 +113,7 @@ class Tracing:
             inputs = [self.value(self.network.input(node.block, port, order)) for port in group.inputs]
             columns.append(vertcat(*states, *still, *inputs, *events, SX(0, 1)))
         arguments = [symbols.t, symbols.parameters[node.block], *columns]
-        (flat,) = group.rate(node.order).call(arguments, True, False)
+        flat = group.value(node.order, arguments)
         parts = _split(flat, [slot.size for slot in group.slots])
         self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
         for name in self.network.diagram.blocks[node.block].implicit_outputs:
@@ -201,7 +201,7 @@ class Implicit:
             guesses = [_guess(network, symbols, *entry) for entry in tracing.unknowns.items()]
             self.guesses = vertcat(*guesses)[remaining]
             self.residual = substitute(
-                substitute(residual[remaining], cuts, solution), cuts[remaining], self.w
+                substituted(residual[remaining], cuts, solution), cuts[remaining], self.w
             )
             solution = substitute(solution, cuts[remaining], self.w)
         self._cuts, self._solution = cuts, solution
@@ -209,7 +209,7 @@ class Implicit:
     def solved(self, parts: Sequence[SX]) -> SX:
         """One column with the solutions in place of the cuts."""
         column = vertcat(*parts, SX(0, 1))
-        return substitute(column, self._cuts, self._solution) if self._cuts.numel() else column
+        return substituted(column, self._cuts, self._solution) if self._cuts.numel() else column
 
 
 def _guess(network: Network, symbols: Symbols, value: Value, unknown: SX) -> SX:

@@ -5,6 +5,12 @@ from typing import TYPE_CHECKING
 from armblocks.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
+    from armblocks.equations.constant_folding import (
+        call_with_constants,
+        elementary,
+        has_elementary,
+        substituted,
+    )
     from armblocks.equations.continuous import continuous_system
     from armblocks.equations.flow_jacobian import FlowJacobian, trace_flow_jacobian
     from armblocks.equations.hybrid_system import Delays, HybridSystem, SampleClock
@@ -26,12 +32,16 @@ else:
             "SimulationOptions": "armblocks.equations.options",
             "Slot": "armblocks.equations.signatures",
             "TracedFunction": "armblocks.equations.traced_function",
+            "call_with_constants": "armblocks.equations.constant_folding",
             "continuous_system": "armblocks.equations.continuous",
+            "elementary": "armblocks.equations.constant_folding",
             "flatten": "armblocks.equations.symbols",
+            "has_elementary": "armblocks.equations.constant_folding",
             "last_at_or_below": "armblocks.equations.table_reading",
             "matrix_shape": "armblocks.equations.symbols",
             "read_entry": "armblocks.equations.table_reading",
             "signature": "armblocks.equations.signatures",
+            "substituted": "armblocks.equations.constant_folding",
             "trace_flow_jacobian": "armblocks.equations.flow_jacobian",
             "unflatten": "armblocks.equations.symbols",
         },
@@ -47,12 +57,16 @@ __all__ = [
     "SimulationOptions",
     "Slot",
     "TracedFunction",
+    "call_with_constants",
     "continuous_system",
+    "elementary",
     "flatten",
+    "has_elementary",
     "last_at_or_below",
     "matrix_shape",
     "read_entry",
     "signature",
+    "substituted",
     "trace_flow_jacobian",
     "unflatten",
 ]

@@ -47,7 +47,7 @@ class Motor:
     @property
     def reflected_inertia(self) -> float:
         """``G^2 Jm``: what the joint feels of the rotor, kg m2 (kg for a prismatic joint)."""
-        return self.gear_ratio**2 * self.inertia
+        return self.gear_ratio * self.gear_ratio * self.inertia
 
 
 @dataclass(frozen=True, kw_only=True)

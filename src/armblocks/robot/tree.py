@@ -9,6 +9,7 @@ import numpy as np
 
 from armblocks.robot.link import Link, Motor
 from armblocks.robot.robot import Robot
+from armblocks.rounded_functions import hypot
 from armblocks.spatial import Transform, Vector3, rotation_x, rotation_y
 from armblocks.spatial.inertia import RigidInertia
 
@@ -98,13 +99,13 @@ class KinematicTree:
             else:
                 carrier = bodies[frame.body]
                 bodies[frame.body] = replace(carrier, inertia=carrier.inertia.plus(inertia))
-        gravity = robot.base.R.T @ np.array(robot.gravity)
+        gravity = Transform(rotation=robot.base.inverse().rotation).apply(robot.gravity)
         return cls(
             robot=robot,
             bodies=tuple(bodies),
             links=tuple(frames[link.name] for link in robot.links),
             base=robot.base,
-            gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2])),
+            gravity=gravity,
             grounded=grounded,
         )
 
@@ -159,5 +160,5 @@ def _axis_to_z(axis: Vector3) -> tuple[Transform, float]:
         return Transform(rotation=rotation_x(-np.pi / 2)), 1.0 if y > 0 else -1.0
     k = np.array(axis)
     across = np.cross(k, np.eye(3)[int(np.argmin(np.abs(k)))])
-    across /= np.linalg.norm(across)
+    across /= hypot(*across.tolist())
     return Transform(rotation=np.column_stack((across, np.cross(k, across), k))), 1.0

@@ -60,5 +60,26 @@ def _step(compiled: CompiledSystem, start: RunPoint, w: Array, p: Array) -> Arra
         return None
     if np.linalg.cond(jacobian) > SINGULAR:
         return None
-    step: Array = np.asarray(np.linalg.solve(jacobian, here), dtype=np.float64)
+    step = _solved(jacobian, here)
     return step if (np.abs(step) < FARTHEST * (1.0 + np.abs(w))).all() else None
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """The solution of linear equations by elimination with row pivoting.
+
+    LAPACK's last bits differ from processor to processor, and those of a guess show in the run.
+    """
+    rows = np.column_stack([matrix, right])
+    n = len(right)
+    for k in range(n):
+        pivot = k + int(np.argmax(np.abs(rows[k:, k])))
+        rows[[k, pivot]] = rows[[pivot, k]]
+        factors = rows[k + 1 :, k] / rows[k, k]
+        rows[k + 1 :] -= factors[:, np.newaxis] * rows[k]
+    found = np.zeros(n)
+    for k in reversed(range(n)):
+        rest = rows[k, n]
+        for j in range(k + 1, n):
+            rest = rest - rows[k, j] * found[j]
+        found[k] = rest / rows[k, k]
+    return found

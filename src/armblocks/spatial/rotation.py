@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.errors import InputError
+from armblocks.rounded_functions import cos, sin
 
 Vector3: TypeAlias = tuple[float, float, float]
 """x, y, z."""
@@ -65,13 +66,13 @@ def _numbers(value: ArrayLike, where: str) -> NDArray[np.float64]:
 def cos_exact(angle: float) -> float:
     """cos of an angle in rad; exactly 1, 0 or -1 where the angle is a quarter turn to rounding."""
     quarter = _quarter_turn(angle)
-    return math.cos(angle) if quarter is None else (1.0, 0.0, -1.0, 0.0)[quarter]
+    return cos(angle) if quarter is None else (1.0, 0.0, -1.0, 0.0)[quarter]
 
 
 def sin_exact(angle: float) -> float:
     """sin of an angle in rad; exactly 1, 0 or -1 where the angle is a quarter turn to rounding."""
     quarter = _quarter_turn(angle)
-    return math.sin(angle) if quarter is None else (0.0, 1.0, 0.0, -1.0)[quarter]
+    return sin(angle) if quarter is None else (0.0, 1.0, 0.0, -1.0)[quarter]
 
 
 def _quarter_turn(angle: float) -> int | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.errors import InputError
+from armblocks.rounded_functions import atan2, cos, hypot, sin
 from armblocks.spatial.rotation import (
     IDENTITY3,
     SINGULAR,
@@ -90,11 +90,11 @@ class Transform:
         For numbers what :func:`armblocks.spatial.orientation.to_rpy` is for symbols, convention ``zyx``.
         """
         (_, xy, xz), (_, yy, yz), (zx, zy, zz) = self.rotation
-        cosine = math.hypot(zz, zy)
-        roll = 0.0 if cosine < SINGULAR else math.atan2(zy, zz)
+        cosine = hypot(zz, zy)
+        roll = 0.0 if cosine < SINGULAR else atan2(zy, zz)
         # The y axis once the roll is undone: it does not depend on the pitch.
-        c, s = math.cos(roll), math.sin(roll)
-        return roll, math.atan2(-zx, cosine), math.atan2(s * xz - c * xy, c * yy - s * yz)
+        c, s = cos(roll), sin(roll)
+        return roll, atan2(-zx, cosine), atan2(s * xz - c * xy, c * yy - s * yz)
 
     @cached_property
     def is_identity(self) -> bool:

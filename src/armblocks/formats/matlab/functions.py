@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from armblocks import rounded_functions
 from armblocks.formats.matlab.source import Place
 from armblocks.formats.matlab.values import (
+    ROUNDED_WORK,
     Array,
     Budget,
     Cell,
@@ -21,6 +24,7 @@ from armblocks.formats.matlab.values import (
     number_of,
     scalar,
 )
+from armblocks.rounded_functions import atan2
 from armblocks.spatial import Transform, transl, trotx, troty, trotz
 
 Arguments = list[Value]
@@ -33,6 +37,8 @@ class NumericFunction:
     fewest: int
     most: int
     compute: Callable[[Place, Arguments], Value]
+    work: int = 1
+    """What an element of the result costs, in elements of a sum."""
 
 
 def call_function(place: Place, budget: Budget, name: str, arguments: Arguments) -> Value:
@@ -45,6 +51,8 @@ def call_function(place: Place, budget: Budget, name: str, arguments: Arguments)
             else (f"{function.fewest} to {function.most}")
         )
         raise place.error(f"{name} is called with {len(arguments)} arguments", allowed=counts)
+    if function.work > 1:
+        budget.spend(place, function.work * array_of(place, arguments[0], f"the argument of {name}").size)
     with np.errstate(all="ignore"):
         value = function.compute(place, arguments)
     budget.spend(place, value.size if isinstance(value, np.ndarray) else 1)
@@ -52,8 +60,11 @@ def call_function(place: Place, budget: Budget, name: str, arguments: Arguments)
 
 
 def _elementwise(
-    name: str, compute: Callable[[Array], Array], low: float = -math.inf, high: float = math.inf
-):
+    name: str,
+    compute: Callable[[Array], Array],
+    low: float = -math.inf,
+    high: float = math.inf,
+) -> NumericFunction:
     """A real function of one matrix, with the interval in which its values are real."""
 
     def apply(place: Place, arguments: Arguments) -> Value:
@@ -65,6 +76,13 @@ def _elementwise(
         return compute(array)
 
     return NumericFunction(1, 1, apply)
+
+
+def _rounded(name: str, low: float = -math.inf, high: float = math.inf) -> NumericFunction:
+    """A function of :mod:`armblocks.rounded_functions`, element by element."""
+    every = np.vectorize(rounded_functions.FUNCTIONS[name], otypes=[np.float64])
+    plain = _elementwise(name, every, low, high)
+    return dataclasses.replace(plain, work=ROUNDED_WORK)
 
 
 def _constant(value: float) -> NumericFunction:
@@ -113,7 +131,7 @@ def _length(place: Place, arguments: Arguments) -> Value:
 
 def _atan2(place: Place, arguments: Arguments) -> Value:
     y, x = (number_of(place, argument, "an argument of atan2") for argument in arguments)
-    return scalar(math.atan2(y, x))
+    return scalar(atan2(y, x))
 
 
 def _linspace(place: Place, arguments: Arguments) -> Value:
@@ -183,14 +201,14 @@ FUNCTIONS: dict[str, NumericFunction] = {
     "rad2deg": _elementwise("rad2deg", lambda array: array * (180 / math.pi)),
     "sqrt": _elementwise("sqrt", np.sqrt, low=0.0),
     "abs": _elementwise("abs", np.abs),
-    "sin": _elementwise("sin", np.sin),
-    "cos": _elementwise("cos", np.cos),
-    "tan": _elementwise("tan", np.tan),
-    "asin": _elementwise("asin", np.arcsin, low=-1.0, high=1.0),
-    "acos": _elementwise("acos", np.arccos, low=-1.0, high=1.0),
-    "atan": _elementwise("atan", np.arctan),
+    "sin": _rounded("sin"),
+    "cos": _rounded("cos"),
+    "tan": _rounded("tan"),
+    "asin": _rounded("asin", low=-1.0, high=1.0),
+    "acos": _rounded("acos", low=-1.0, high=1.0),
+    "atan": _rounded("atan"),
     "atan2": NumericFunction(2, 2, _atan2),
-    "exp": _elementwise("exp", np.exp),
+    "exp": _rounded("exp"),
     "transl": NumericFunction(1, 3, _transl),
     "trotx": _turn("trotx", trotx),
     "troty": _turn("troty", troty),

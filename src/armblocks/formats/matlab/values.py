@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.formats.matlab.records import LinkRecord, RobotRecord
 from armblocks.formats.matlab.source import Place
+from armblocks.rounded_functions import power
 
 Array = NDArray[np.float64]
 """MATLAB's only number: a matrix, always with two axes. A scalar is (1, 1), nothing is (0, 0)."""
@@ -21,6 +23,8 @@ MOST_LINKS = 1000
 """Elements of one cell array or array of links."""
 MOST_WORK = 20_000_000
 """Elements that one script may compute: a bound on time and memory that no robot script comes near."""
+ROUNDED_WORK = 1000
+"""What a sine or a power costs beside a sum."""
 
 
 @dataclass
@@ -166,7 +170,7 @@ _SCALAR_OPERATIONS: dict[str, Callable[[Array, Array], Array]] = {
     "*": np.multiply,
     "/": np.divide,
     "\\": lambda a, b: np.divide(b, a),
-    "^": np.power,
+    "^": np.vectorize(power, otypes=[np.float64]),
 }
 
 
@@ -175,7 +179,7 @@ def _elementwise(place: Place, budget: Budget, operator: str, a: Array, b: Array
         raise place.error(
             f"'{operator}' of {kind_of(a)} and {kind_of(b)}", allowed="equal sizes, or a number on one side"
         )
-    budget.spend(place, max(a.size, b.size))
+    budget.spend(place, max(a.size, b.size) * (ROUNDED_WORK if operator == "^" else 1))
     if operator == "^" and np.any((a < 0) & (b != np.floor(b))):
         raise place.error("a root of a negative number is complex", allowed="real numbers")
     return _SCALAR_OPERATIONS[operator](a, b)
@@ -189,7 +193,7 @@ def _matmul(place: Place, budget: Budget, a: Array, b: Array) -> Array:
         )
     check_size(place, a.shape[0], b.shape[1])
     budget.spend(place, a.size * b.shape[1] // 8 + a.shape[0] * b.shape[1])
-    return a @ b
+    return _product(a, b)
 
 
 def _solve(place: Place, budget: Budget, a: Array, b: Array) -> Array:
@@ -212,7 +216,15 @@ def _matrix_power(place: Place, budget: Budget, a: Array, b: Array) -> Array:
             fix="write .^ for powers element by element",
         )
     budget.spend(place, a.size * (a.shape[0] + 8))
-    return np.linalg.matrix_power(a, int(exponent))
+    return reduce(_product, [a] * int(exponent), np.eye(len(a)))
+
+
+def _product(a: Array, b: Array) -> Array:
+    """``a b``, product by product from left to right: the bits of a library differ by processor."""
+    total = np.zeros((a.shape[0], b.shape[1]))
+    for k in range(a.shape[1]):
+        total += a[:, k : k + 1] * b[k]
+    return total
 
 
 def concatenate(place: Place, budget: Budget, rows: list[list[Value]]) -> Value:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from armblocks.errors import RobotError
+from armblocks.rounded_functions import hypot
 from armblocks.spatial import Transform, Vector3, rotation_about, vector3
 
 
@@ -60,7 +61,7 @@ class Joint(ABC):
 
     def __post_init__(self) -> None:
         axis = vector3(self.axis, where="axis of a joint")
-        length = math.hypot(*axis)
+        length = hypot(*axis)
         # An axis that is normal up to rounding stays as it is: what a file gives back must be the same axis.
         if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):
             axis = (axis[0] / length, axis[1] / length, axis[2] / length)

@@ -1,0 +1,48 @@
+"""Complex arithmetic with one rounding for each real operation: the same bits on every machine.
+
+Products and quotients of complex numbers in Python and NumPy are up to the compiler, which may contract a
+product and a sum into one rounding; their magnitudes and roots are the C library's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from armblocks.rounded_functions import hypot
+
+
+def magnitude(z: complex) -> float:
+    """``|z|``."""
+    return hypot(z.real, z.imag)
+
+
+def product(factors: Iterable[complex]) -> complex:
+    """The product of all factors, from left to right; 1 of none."""
+    re, im = 1.0, 0.0
+    for factor in factors:
+        re, im = re * factor.real - im * factor.imag, re * factor.imag + im * factor.real
+    return complex(re, im)
+
+
+def quotient(over: complex, under: complex) -> complex:
+    """``over / under`` by R. L. Smith's algorithm (Algorithm 116, Comm. ACM 5(8), 1962)."""
+    if abs(under.real) >= abs(under.imag):
+        ratio = under.imag / under.real
+        scale = under.real + under.imag * ratio
+        re, im = over.real + over.imag * ratio, over.imag - over.real * ratio
+    else:
+        ratio = under.real / under.imag
+        scale = under.real * ratio + under.imag
+        re, im = over.real * ratio + over.imag, over.imag * ratio - over.real
+    return complex(re / scale, im / scale)
+
+
+def square_root(z: complex) -> complex:
+    """The root with a real part that is not negative; its imaginary part has the sign of that of ``z``."""
+    if z == 0.0:
+        return complex(0.0, z.imag)
+    large = math.sqrt((abs(z.real) + magnitude(z)) / 2.0)
+    small = abs(z.imag) / (2.0 * large)
+    re, im = (large, small) if z.real >= 0.0 else (small, large)
+    return complex(re, math.copysign(im, z.imag))
