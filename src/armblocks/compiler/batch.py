@@ -11,7 +11,7 @@ from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 
-__all__ = ["BatchLayout", "Layout", "emit_batch"]
+__all__ = ["BatchLayout", "Layout", "emit_batch", "emit_shares"]
 
 
 def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str) -> None:
@@ -58,6 +58,55 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
         ]
     head = f"define void @{name}(i64 %start, i64 %stop, {declared}) nounwind {{\nentry:"
     module.add(name, "\n".join([head, *lines, "  ret void\n}"]))
+
+
+def emit_shares(module: Module, tape: Tape, name: str) -> None:
+    """Add ``void @name.shares(ptr job, i64 hold, i64 patience, ptr in0, …, ptr out0, …)``.
+
+    Several threads call it with one ``job`` of four i64: the next sample, the count of threads at work, the
+    samples of a share, the samples of the batch. Each takes shares until there are none. Then it spins:
+    ``hold`` turns in any case, and up to ``patience`` turns while other threads are at work.
+    """
+    pointers = [f"%i{k}" for k in range(len(tape.input_sizes))] + [f"%o{k}" for k in range(len(tape.outputs))]
+    passed = ", ".join(f"ptr {pointer}" for pointer in pointers)
+    call = f"  call void @{name}(i64 %start, i64 %stop, i64 %samples, {passed})"
+    lines = [
+        f"define void @{name}.shares(ptr %job, i64 %hold, i64 %patience, {passed}) nounwind {{",
+        "entry:",
+        "  %running = getelementptr inbounds i64, ptr %job, i64 1",
+        "  %share.at = getelementptr inbounds i64, ptr %job, i64 2",
+        "  %samples.at = getelementptr inbounds i64, ptr %job, i64 3",
+        "  %share = load i64, ptr %share.at",
+        "  %samples = load i64, ptr %samples.at",
+        "  %joined = atomicrmw add ptr %running, i64 1 acq_rel",
+        "  br label %take",
+        "take:",
+        "  %start = atomicrmw add ptr %job, i64 %share acq_rel",
+        "  %some = icmp slt i64 %start, %samples",
+        "  br i1 %some, label %work, label %leave",
+        "work:",
+        "  %end = add nsw i64 %start, %share",
+        "  %whole = icmp slt i64 %end, %samples",
+        "  %stop = select i1 %whole, i64 %end, i64 %samples",
+        call,
+        "  br label %take",
+        "leave:",
+        "  %left = atomicrmw sub ptr %running, i64 1 acq_rel",
+        "  br label %spin",
+        "spin:",
+        "  %turn = phi i64 [ 0, %leave ], [ %turn.next, %spin ]",
+        "  %turn.next = add nsw i64 %turn, 1",
+        "  %others = load atomic i64, ptr %running acquire, align 8",
+        "  %busy = icmp ne i64 %others, 0",
+        "  %patient = icmp slt i64 %turn, %patience",
+        "  %waiting = and i1 %busy, %patient",
+        "  %holding = icmp slt i64 %turn, %hold",
+        "  %stays = or i1 %holding, %waiting",
+        "  br i1 %stays, label %spin, label %done",
+        "done:",
+        "  ret void\n}",
+    ]
+    module.add(f"{name}.shares", "\n".join(lines))
 
 
 def _loop(name: str, start: str, stop: str, step: int, body: list[str]) -> list[str]:

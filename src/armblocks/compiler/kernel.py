@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-import itertools
-import os
 import threading
 from collections.abc import Callable, Sequence
-from functools import cache, cached_property
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +18,7 @@ from armblocks.compiler.arguments import (
     new_outputs,
     read_input,
 )
+from armblocks.compiler.batch_threads import Shares, evaluate_in_threads, worth_while
 from armblocks.compiler.entry import ENTRY, TABLE, make_entry, offer_batch
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.native import NativeCode, load_code
@@ -30,15 +29,9 @@ from armblocks.equations import Shape, Signature
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
 
-if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
-
 Array = NDArray[np.float64]
 
 _ROWS, _COLUMNS, _SHARED = Layout.ROWS.value, Layout.COLUMNS.value, Layout.SHARED.value
-
-_SMALLEST_SHARE = 2048
-"""Samples below which a share of a batch is not worth another thread."""
 
 
 def compile_function(traced: TracedFunction) -> Kernel:
@@ -67,7 +60,7 @@ class Kernel:
         self.outputs = outputs
         self._digest = digest
         self._make_tape = tape
-        self._batches: dict[str, Callable[..., None]] = {}
+        self._batches: dict[str, tuple[Callable[..., None], Shares]] = {}
         self._loaded: dict[str, NativeCode] = {}  # what the functions above run in
         self._lock = threading.RLock()
 
@@ -142,9 +135,13 @@ class Kernel:
             self._evaluate(*(_address(array) for array in (*arrays, *written)))
         else:
             key, arrays = self._lay_out(arrays, columns=columns)
-            batch = self._batches.get(key) or self._load_batch(key)
+            batch, shares = self._batches.get(key) or self._load_batch(key)
             addresses = [_address(array) for array in (*arrays, *written)]
-            _share(batch, samples, addresses, workers)
+            workers = worth_while(samples, workers)
+            if workers == 1:
+                batch(0, samples, samples, *addresses)
+            else:
+                evaluate_in_threads(shares, samples, addresses, workers, kept=self)
         for source, result in zip(written, results):
             if source is not result:
                 result[...] = source
@@ -189,14 +186,15 @@ class Kernel:
         prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (len(self.inputs) + len(self.outputs)))
         return prototype(code.address("evaluate"))
 
-    def _load_batch(self, key: str) -> Callable[..., None]:
+    def _load_batch(self, key: str) -> tuple[Callable[..., None], Shares]:
         with self._lock:
             if key not in self._batches:
                 code = load_code(("batch", self._digest, key), lambda: self._write_batch(key))
                 pointers = [ctypes.c_void_p] * (len(self.inputs) + len(self.outputs))
-                prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *pointers)
+                batch = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *pointers)
+                shares = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *[ctypes.c_int64] * 2, *pointers)
                 self._loaded[key] = code
-                self._batches[key] = prototype(code.address("batch"))
+                self._batches[key] = batch(code.address("batch")), shares(code.address("batch.shares"))
                 if "_single" in self.__dict__:
                     self._offer_batch(self._single, key)
             return self._batches[key]
@@ -209,11 +207,12 @@ class Kernel:
             offer_batch(single, [kind == _ROWS for kind in inputs], address)
 
     def _write_batch(self, key: str) -> str:
-        from armblocks.compiler.batch import emit_batch
+        from armblocks.compiler.batch import emit_batch, emit_shares
         from armblocks.compiler.ir_text import Module
 
         module = Module()
         emit_batch(module, self.tape, BatchLayout.of(key), host_target().lanes, "batch")
+        emit_shares(module, self.tape, "batch")
         return module.text
 
     def __repr__(self) -> str:
@@ -236,36 +235,3 @@ def _in_place(array: Array) -> Array:
 
 def _address(array: Array) -> int:
     return array.__array_interface__["data"][0]
-
-
-def _share(batch: Callable[..., None], samples: int, addresses: Sequence[int], workers: int) -> None:
-    """Evaluate all samples; the native code does not hold the interpreter's lock."""
-    workers = min(workers, max(1, samples // _SMALLEST_SHARE))
-    if workers == 1:
-        batch(0, samples, samples, *addresses)
-        return
-    # More shares than workers, so that a delayed worker does not hold up the others; whole cache lines each.
-    share = max(_SMALLEST_SHARE, -(-samples // (workers * 4)))
-    share += -share % 64
-    starts = itertools.count(0, share)  # handing out the next number is atomic
-
-    def work() -> None:
-        while (start := next(starts)) < samples:
-            batch(start, min(start + share, samples), samples, *addresses)
-
-    helpers = [_pool().submit(work) for _ in range(workers - 1)]
-    work()
-    for helper in helpers:
-        helper.result()
-
-
-@cache
-def _pool() -> ThreadPoolExecutor:
-    from concurrent.futures import ThreadPoolExecutor
-
-    return ThreadPoolExecutor(max_workers=max(64, os.cpu_count() or 1), thread_name_prefix="armblocks")
-
-
-if hasattr(os, "register_at_fork"):
-    # Threads do not survive a fork: the child makes its own.
-    os.register_at_fork(after_in_child=_pool.cache_clear)
