@@ -27,7 +27,7 @@ _PATIENCE = 50_000
 """For so long the thread that called waits for helpers before it goes to sleep."""
 
 Shares = Callable[..., None]
-"""The function of :func:`~armblocks.compiler.batch.emit_shares`: job, hold, patience, addresses of the arrays."""
+"""Function of :func:`~armblocks.compiler.batch.emit_shares`: job, hold, patience, addresses of the arrays."""
 
 
 def worth_while(samples: int, threads: int) -> int:
