@@ -2,15 +2,25 @@
 
 ``python3 scripts/test.py`` runs all steps, goes on after a failure so that one run tells all, and ends with
 exit code 1 if any step failed. ``python3 scripts/test.py format types`` runs only the steps named.
+
+The static checks run one after the other while the tests run. What a step says is shown as if all of them ran
+one after the other: the output of the first step that is still running appears as it comes, and that of a
+later one is kept until its turn.
 """
 
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Event
 
-from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, run, say
+from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py")
 
@@ -22,12 +32,94 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "types": (BINARIES / "pyright", "--warnings"),
     "layers": (BINARIES / "lint-imports", "--no-cache"),
     "docs": (PYTHON, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"),
-    "tests": (PYTHON, "-m", "pytest", "-n", "auto"),
+    "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
+BEFORE_ALL = ("page",)
+"""Steps whose result the others need."""
+SIDE_BY_SIDE = (("web types", "lint", "format", "types", "layers", "docs"), ("tests",))
+"""Steps that run one after the other, beside those of the other rows."""
+GLANCE_SECONDS = 0.1
+
+
+class Step:
+    """One command, with its output in a file."""
+
+    def __init__(self, name: str, folder: Path) -> None:
+        self.name = name
+        self.command = [str(part) for part in STEPS[name]]
+        self.code: int | None = None
+        self.seconds = 0.0
+        self._output = folder / f"{name}.txt"
+        self._output.touch()
+        self._ended = Event()
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def run(self) -> None:
+        """Run the command to its end, without standard input."""
+        start = time.perf_counter()
+        try:
+            with self._output.open("wb") as output:
+                self._process = subprocess.Popen(
+                    self.command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT
+                )
+                self.code = self._process.wait()
+        except OSError as error:
+            self._output.write_text(f"{error}\n", encoding="utf-8")
+            self.code = 127
+        finally:
+            self.seconds = time.perf_counter() - start
+            self._ended.set()
+
+    def follow(self) -> None:
+        """Show the output so far, and what is added until the command ends."""
+        say(f"== {self.name}: {' '.join(self.command).replace(f'{ROOT}/', '')}")
+        with self._output.open("rb") as output:
+            while True:
+                ended = self._ended.wait(GLANCE_SECONDS)
+                if said := output.read():
+                    sys.stdout.buffer.write(said)
+                    sys.stdout.buffer.flush()
+                if ended:
+                    return
+
+    def end(self) -> None:
+        """Stop the command if it is still running."""
+        if self._process is not None and self._process.poll() is None:
+            self._process.terminate()
+
+
+def run_steps(names: Sequence[str]) -> list[Step]:
+    """Run these steps, each once, and show what they say in the order of ``STEPS``."""
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor() as pool:
+        steps = {name: Step(name, Path(folder)) for name in names}
+
+        stopped = Event()
+
+        def run_row(row: Sequence[str]) -> None:
+            for name in row:
+                if name in steps and not stopped.is_set():
+                    steps[name].run()
+
+        try:
+            for name in names:
+                if name in BEFORE_ALL:
+                    pool.submit(steps[name].run)
+                    steps[name].follow()
+            for row in SIDE_BY_SIDE:
+                pool.submit(run_row, row)
+            for name in names:
+                if name not in BEFORE_ALL:
+                    steps[name].follow()
+        except BaseException:
+            stopped.set()
+            for step in steps.values():
+                step.end()
+            raise
+        return list(steps.values())
 
 
 def main() -> int:
-    """Run the steps asked for, in order; 0 if all passed."""
+    """Run the steps asked for; 0 if all passed."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -40,19 +132,14 @@ def main() -> int:
             parser.error(f"there is no step named '{name}'; the steps are {', '.join(STEPS)}")
     prepare("test")
     prepare_browser()
-    outcome: dict[str, tuple[int, float]] = {}
-    for name, command in STEPS.items():
-        if asked and name not in asked:
-            continue
-        shown = " ".join(str(part) for part in command).replace(f"{ROOT}/", "")
-        say(f"== {name}: {shown}")
-        start = time.perf_counter()
-        code = run(*(str(part) for part in command))
-        outcome[name] = (code, time.perf_counter() - start)
+    start = time.perf_counter()
+    done = run_steps([name for name in STEPS if not asked or name in asked])
     say("== summary")
-    for name, (code, seconds) in outcome.items():
-        say(f"   {name:<8} {'passed' if code == 0 else f'FAILED (exit code {code})':<24} {seconds:6.1f} s")
-    return 1 if any(code != 0 for code, _ in outcome.values()) else 0
+    for step in done:
+        verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"
+        say(f"   {step.name:<9} {verdict:<24} {step.seconds:6.1f} s")
+    say(f"   all together {time.perf_counter() - start:31.1f} s")
+    return 1 if any(step.code != 0 for step in done) else 0
 
 
 if __name__ == "__main__":

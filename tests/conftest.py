@@ -10,6 +10,11 @@ from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Journeys in a browser come first: they are the longest, and would be waited for at the end."""
+    items.sort(key=lambda item: "browser" not in getattr(item, "fixturenames", ()))
+
+
 @pytest.fixture(params=LAW_ROBOTS.values(), ids=list(LAW_ROBOTS))
 def robot(request: pytest.FixtureRequest) -> Robot:
     """Each robot of the law tests in turn: every shipped one, and random trees."""
