@@ -8,6 +8,8 @@ from playwright.sync_api import Locator, Page, expect
 
 from conftest import PATIENCE_MS
 
+MOST_PANS = 50
+
 
 def block(page: Page, name: str) -> Locator:
     """A block on the sheet."""
@@ -40,7 +42,10 @@ def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
 
 
 def wire(page: Page, source: str, target: str) -> None:
-    """Draw a wire with the mouse, between two handles ``block/port``."""
+    """Draw a wire with the mouse, between two handles ``block/port``.
+
+    The sheet pans while the mouse is near its edge: the mouse follows the target until it stays below it.
+    """
 
     def middle(port: str) -> tuple[float, float]:
         name, _, handle = port.partition("/")
@@ -50,7 +55,12 @@ def wire(page: Page, source: str, target: str) -> None:
 
     page.mouse.move(*middle(source))
     page.mouse.down()
-    page.mouse.move(*middle(target), steps=5)
+    place = middle(target)
+    for _ in range(MOST_PANS):
+        page.mouse.move(*place, steps=5)
+        before, place = place, middle(target)
+        if place == before:
+            break
     page.mouse.up()
 
 
