@@ -1,0 +1,153 @@
+"""Two or more checkouts beside each other, turn by turn: is a run, or a batch of a robot, slower than before?
+
+    python benchmarks/compare.py OLD NEW [--turns 40] [--only multirate]
+
+``OLD`` and ``NEW`` are folders of checkouts. Each gets a process of its own, which compiles every model once.
+Then the processes work one after the other, some 20 ms each, turn by turn. Times are processor time (user and
+system, all threads), so that other work on the machine counts only by what it does to caches and clocks.
+Compare the smallest and the lower quartile; the ratio is the old one over the new one, above 1 is faster.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+TURN_SECONDS = 0.02
+
+
+def works() -> dict[str, Callable[[], object]]:
+    """What is measured, by name; all of it compiled."""
+    import numpy as np
+
+    import armblocks as ab
+    from armblocks.blocks import Gain, Integrator, Step, Sum
+
+    def five_blocks() -> ab.Diagram:
+        builder = ab.DiagramBuilder("five blocks")
+        total = builder.add("total", Sum(signs="+--"), builder.add("step", Step(time=0.0, final=1.0)))
+        speed = builder.add("speed", Integrator(), builder.add("gain", Gain(gain=4.0), total))
+        place = builder.add("place", Integrator(), speed)
+        builder.connect(place, total["u2"])
+        builder.connect(speed, total["u3"])
+        return builder.build()
+
+    def run_of(diagram: ab.Diagram, **options: Any) -> Callable[[], object]:
+        return lambda: ab.simulate(diagram, **options)
+
+    found: dict[str, Callable[[], object]] = {
+        name: run_of(ab.load_diagram(model))
+        for name, model in (
+            ("A kr180model", "kr180model"),
+            ("B computed torque", "puma560_computed_torque"),
+            ("C van der Pol, PID", "van_der_pol_pid"),
+            ("multirate", "puma560_multirate"),
+        )
+    }
+    fixed = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
+    found["five blocks"] = run_of(five_blocks(), **fixed)
+    arm = ab.load_robot("puma560").nofriction("all")
+    q, qd, qdd = np.random.default_rng(0).uniform(-2, 2, (3, 100_000, arm.n))
+    out = np.empty_like(q)
+    found["puma560 rne, 100 000"] = lambda: arm.rne(q, qd, qdd, out=out)
+    found["puma560 jacob0, 100 000, new array"] = lambda: arm.jacob0(q)
+    found["puma560 inertia, 100 000, new array"] = lambda: arm.inertia(q)
+    few = [part[:8].copy() for part in (q, qd, qdd)]
+    one = [part[0].copy() for part in (q, qd, qdd)]
+    found["puma560 rne, 8 samples"] = lambda: arm.rne(*few)
+    found["puma560 rne, one sample"] = lambda: arm.rne(*one)
+    for work in found.values():
+        work()
+    return found
+
+
+def serve() -> None:
+    """The process of one checkout: for each line with a name, one turn of that work."""
+    import armblocks
+
+    found = works()
+    counts: dict[str, int] = {}
+    print(json.dumps([str(Path(armblocks.__file__).parents[2]), list(found)]), flush=True)
+    for line in sys.stdin:
+        name = json.loads(line)
+        work = found[name]
+        if name not in counts:
+            begin = time.perf_counter()
+            work()
+            counts[name] = max(1, round(TURN_SECONDS / (time.perf_counter() - begin)))
+        begin = time.process_time()
+        for _ in range(counts[name]):
+            work()
+        print(json.dumps((time.process_time() - begin) / counts[name]), flush=True)
+
+
+class Checkout:
+    """The process of a checkout, seen from outside."""
+
+    def __init__(self, folder: Path) -> None:
+        command = [sys.executable, str(Path(__file__).resolve()), "--serve"]
+        environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
+        self._process = subprocess.Popen(
+            command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self.place, self.names = self._answer()
+
+    def turn(self, name: str) -> float:
+        """Seconds of one unit of the work, in one turn."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(name) + "\n")
+        self._process.stdin.flush()
+        return self._answer()
+
+    def _answer(self) -> Any:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise SystemExit(f"a checkout ended with {self._process.wait()}")
+        return json.loads(line)
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("checkouts", nargs="*", type=Path)
+    parser.add_argument("--turns", type=int, default=40)
+    parser.add_argument("--only", default="", help="names that hold this text")
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.serve:
+        serve()
+        return
+    checkouts = [Checkout(folder.resolve()) for folder in given.checkouts]
+    for checkout in checkouts:
+        print(checkout.place)
+    print(f"{'µs, smallest / lower quartile':36}" + "".join(f"{k + 1:>22}" for k in range(len(checkouts))))
+    for name in checkouts[0].names:
+        if given.only not in name:
+            continue
+        seconds: list[list[float]] = [[] for _ in checkouts]
+        for _ in range(given.turns):
+            for row, checkout in zip(seconds, checkouts):
+                row.append(checkout.turn(name))
+        cells = [(1e6 * min(row), 1e6 * statistics.quantiles(row, n=4)[0]) for row in seconds]
+        text = "".join(f"{least:>12.2f} /{quartile:>8.2f}" for least, quartile in cells)
+        ratios = [f"{cells[0][k] / cells[-1][k]:.2f}" for k in (0, 1)]
+        print(f"{name:36}{text}   {' / '.join(ratios)}", flush=True)
+    for checkout in checkouts:
+        checkout.close()
+
+
+if __name__ == "__main__":
+    main()
