@@ -8,6 +8,7 @@ import numpy as np
 from casadi import SX, Function, densify, depends_on, jacobian, substitute, symvar
 from numpy.typing import NDArray
 
+from armblocks.diagram.components import strongly_connected
 from armblocks.equations import substituted
 from armblocks.equations.linear_solution import linear_solution
 from armblocks.errors import AlgebraicLoopError
@@ -23,7 +24,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
     solution, remaining = SX(w), list[int]()
     slopes = jacobian(residual, w)
     needs = _needs(slopes)
-    for circle in _circles(needs):
+    for circle in strongly_connected(needs):
         unknowns, slope = w[circle], slopes[circle, circle]
         if depends_on(slope, unknowns):
             remaining.extend(circle)
@@ -58,41 +59,6 @@ def _needs(slope: SX) -> list[list[int]]:
     return needs
 
 
-def _circles(needs: list[list[int]]) -> list[list[int]]:
-    """The strongly connected components of who needs whom, those needed first (Tarjan, iterative)."""
-    count = len(needs)
-    number: dict[int, int] = {}
-    lowest: dict[int, int] = {}
-    stack: list[int] = []
-    closed: set[int] = set()
-    circles: list[list[int]] = []
-    for root in range(count):
-        if root in number:
-            continue
-        path = [(root, iter(needs[root]))]
-        number[root] = lowest[root] = len(number)
-        stack.append(root)
-        while path:
-            node, rest = path[-1]
-            following = next(rest, None)
-            if following is None:
-                path.pop()
-                if path:
-                    lowest[path[-1][0]] = min(lowest[path[-1][0]], lowest[node])
-                if lowest[node] == number[node]:
-                    place = stack.index(node)
-                    circles.append(sorted(stack[place:]))
-                    closed.update(stack[place:])
-                    del stack[place:]
-            elif following not in number:
-                number[following] = lowest[following] = len(number)
-                stack.append(following)
-                path.append((following, iter(needs[following])))
-            elif following not in closed:
-                lowest[node] = min(lowest[node], number[following])
-    return circles
-
-
 def check_solvable(
     w: SX, residual: SX, p: SX, values: NDArray[np.float64], loops: Sequence[tuple[str, ...]], where: str
 ) -> None:
@@ -103,7 +69,7 @@ def check_solvable(
     """
     slopes = jacobian(residual, w)
     parameters = _symbols_in(p)
-    for circle in _circles(_needs(slopes)):
+    for circle in strongly_connected(_needs(slopes)):
         unknowns, own, slope = w[circle], residual[circle], slopes[circle, circle]
         if not _symbols_in(slope) <= parameters:
             continue

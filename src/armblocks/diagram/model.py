@@ -13,6 +13,7 @@ from armblocks.diagram.hierarchy import flatten_hierarchy
 from armblocks.diagram.ordering import Evaluation, Network, evaluation_order
 from armblocks.diagram.sampling import Sampling, check_triggered, moving_blocks, resolve_sampling
 from armblocks.diagram.shapes import DiagramShapes, check_stated, infer_shapes
+from armblocks.diagram.sums_on_loops import sums_on_loops
 from armblocks.errors import ArmblocksError, DiagramError
 
 
@@ -63,10 +64,17 @@ def diagram_model(diagram: Diagram) -> Model:
         shapes=shapes,
         sampling=sampling,
         flow=flow,
-        flow_order=evaluation_order(flow),
+        flow_order=_order(flow),
         tick=tick,
-        tick_order=evaluation_order(tick),
+        tick_order=_order(tick),
     )
+
+
+def _order(network: Network) -> Evaluation:
+    """The order of evaluation, with loops that are linear cut at their sums."""
+    order = evaluation_order(network)
+    sums = sums_on_loops(network, order)
+    return evaluation_order(network, sums) if sums else order
 
 
 def _equations(

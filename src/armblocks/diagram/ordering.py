@@ -121,10 +121,15 @@ class Evaluation:
 
     order: tuple[Node, ...]
     loops: Mapping[Node, tuple[str, ...]]
+    sums: frozenset[Node] = frozenset()
+    """Nodes of loops whose outputs are unknowns for all who read them."""
 
 
-def evaluation_order(network: Network) -> Evaluation:
+def evaluation_order(network: Network, sums: Mapping[Node, tuple[str, ...]] | None = None) -> Evaluation:
     """In which order the nodes are worked out; the same for the same diagram, however it was built.
+
+    ``sums`` are nodes on loops at which these are cut first, each with a loop; loops that remain are cut
+    where they close.
 
     Depth-first and without recursion, so that a chain may be as long as it likes.
 
@@ -136,7 +141,8 @@ def evaluation_order(network: Network) -> Evaluation:
     loops: dict[Node, tuple[str, ...]] = {}
     done: set[Node] = set()
     where = f"diagram '{network.diagram.name}'"
-    for root in network.roots():
+    sums = sums or {}
+    for root in (*network.roots(), *sums):
         if root in done:
             continue
         path: list[tuple[Node, tuple[str, ...]]] = [(root, ())]
@@ -152,7 +158,7 @@ def evaluation_order(network: Network) -> Evaluation:
                 order.append(node)
                 continue
             node, _ = step
-            if node in done:
+            if node in done or node in sums:
                 continue
             orders = open_orders.setdefault((node.block, node.group), [])
             if orders and node.order > min(orders):
@@ -173,7 +179,7 @@ def evaluation_order(network: Network) -> Evaluation:
             orders.append(node.order)
             path.append(step)
             pending.append(network.needs(node))
-    return Evaluation(tuple(order), loops)
+    return Evaluation(tuple(order), {**loops, **sums}, frozenset(sums))
 
 
 def _loop(path: list[tuple[Node, tuple[str, ...]]], closing: tuple[Node, tuple[str, ...]]) -> list[str]:

@@ -64,7 +64,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     model = diagram_model(diagram)
     diagram = (form := flatten_hierarchy(diagram)).diagram
     symbols = Symbols(model)
-    flow = Tracing(model.flow, symbols)
+    flow = Tracing(model.flow, symbols, model.flow_order.sums)
     for node in model.flow_order.order:
         flow.work_out(node)
     signals = _signal_values(model.flow, model.flow_order.order, model.shapes)
@@ -136,7 +136,7 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
 
     Raises ``DiagramError`` where a loop that is not linear hangs on what is sampled at the same instant.
     """
-    tick = Tracing(model.tick, symbols, model.sampling.clock_of)
+    tick = Tracing(model.tick, symbols, model.tick_order.sums, model.sampling.clock_of)
     for node in model.tick_order.order:
         tick.work_out(node)
     equations, discrete = model.tick.equations, dict(symbols.discrete)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from casadi import (
@@ -78,8 +78,15 @@ class Symbols:
 class Tracing:
     """The values of one network worked out so far; lives only while it is traced."""
 
-    def __init__(self, network: Network, symbols: Symbols, clock_of: Mapping[str, int] | None = None) -> None:
+    def __init__(
+        self,
+        network: Network,
+        symbols: Symbols,
+        sums: Collection[Node],
+        clock_of: Mapping[str, int] | None = None,
+    ) -> None:
         self.network = network
+        self._sums = sums
         self.symbols = symbols
         self._clock_of = clock_of or {}
         self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
@@ -121,6 +128,11 @@ class Tracing:
                 unknown = Value(node, SlotKind.OUTPUT, name)
                 self._left_over[unknown] = self._values[node].pop((SlotKind.OUTPUT, name))
                 self.value(unknown)  # also where nothing reads it
+        if node in self._sums:
+            for slot in group.slots:
+                if slot.kind is SlotKind.OUTPUT:
+                    unknown = Value(node, slot.kind, slot.name)
+                    self._left_over[unknown] = self._values[node].pop((slot.kind, slot.name)) - self.value(unknown)
         if node.block in self._clock_of:
             ticks = symbols.m[self._clock_of[node.block]]
             if ON in self.network.diagram.gates.get(node.block, {}):
