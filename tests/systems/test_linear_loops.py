@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +15,7 @@ from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.interpret import interpret
 from armblocks.diagram import DiagramBuilder, trace_diagram
 from armblocks.equations import HybridSystem
+from armblocks.simulation.loop_conditions import loop_conditions
 
 EPS = np.finfo(np.float64).eps
 
@@ -90,7 +92,10 @@ def test_every_signal_of_a_loop_is_as_accurate_as_its_own_condition_allows(seed:
             builder.connect(second, sums[i][f"u{port + 2}"])
     signals = interpreted(trace_diagram(builder.build()))
 
-    G = [[Fraction(gains[0, i, j]) * Fraction(gains[1, i, j]) * int(fed[i, j]) for j in range(n)] for i in range(n)]
+    G = [
+        [Fraction(gains[0, i, j]) * Fraction(gains[1, i, j]) * int(fed[i, j]) for j in range(n)]
+        for i in range(n)
+    ]
     A = [[int(i == j) - G[i][j] for j in range(n)] for i in range(n)]
     x = exact_solution(A, [Fraction(value) for value in c])
     # Skeel's condition of each signal: every term of every sum may be rounded.
@@ -116,6 +121,29 @@ def test_a_follower_of_high_gain_has_an_accurate_error_signal() -> None:
     signals = interpreted(trace_diagram(builder.build()))
     assert float(signals["e/y"]) == pytest.approx(1.3 / (1.0 + 1e9), rel=4.0 * EPS)
     assert float(signals["y/y"]) == pytest.approx(1.3e9 / (1.0 + 1e9), rel=4.0 * EPS)
+
+
+def test_a_loop_that_has_lost_half_of_the_digits_is_named_at_the_end_of_the_run() -> None:
+    message = ab.simulate(loop(np.eye(8) - hilbert(8), np.ones(8)), stop_time=0.0).run.message
+    assert re.search(
+        r"the loop of 's/y\[0\]', .* and 5 more signals has the condition 2e\+10 at 0 s", message
+    )
+    assert "about 6 right digits" in message
+    assert not ab.simulate(loop(np.eye(6) - hilbert(6), np.ones(6)), stop_time=0.0).run.message
+
+
+def test_the_condition_of_a_loop_does_not_depend_on_units() -> None:
+    random = np.random.default_rng(4)
+    gains = np.array([0.5, -3.0, 0.999])
+    assert loop_conditions(gains[:, None, None] - 1.0) == pytest.approx(
+        (1 + np.abs(gains)) / np.abs(1 - gains)
+    )
+    M = random.normal(size=(4, 4))
+    units = 10.0 ** random.uniform(-9.0, 9.0, 4)
+    both = np.array([M, units[:, None] * M / units]) - np.eye(4)
+    radius = np.abs(np.linalg.eigvals(np.abs(np.linalg.inv(both[0])) @ (np.eye(4) + np.abs(M)))).max()
+    assert loop_conditions(both) == pytest.approx(radius, rel=0.1)
+    assert loop_conditions(np.zeros((1, 2, 2))) == [0.0]
 
 
 def test_a_loop_of_fifty_unknowns_runs() -> None:

@@ -106,6 +106,8 @@ class CompiledSystem:
         self.guard_actions: tuple[str, ...] = tuple(description["guard_actions"])
         self.called: tuple[str, ...] = tuple(description["called"])
         """Blocks that Python works out at their ticks."""
+        self.loops: tuple[tuple[str, ...], ...] = tuple(tuple(names) for names in description["loops"])
+        """The signals of each loop that is linear and solved where it stands."""
         self.sizes = LoopSizes(
             states=self.states.size,
             discrete=self.discrete.size,
@@ -233,6 +235,19 @@ class CompiledSystem:
             self._signals(0, t.size, t.size, *addresses)
         return y
 
+    def loop_matrices(self, t: Vector, x: Vector, z: Vector, w: Vector, p: Vector) -> list[Vector]:
+        """For each of ``loops`` with n signals the matrices ``(N, n, n)`` of its equations, at N instants.
+
+        By the tape's interpreter: the few instants at which the condition of a loop is estimated are not
+        worth native code.
+        """
+        from armblocks.compiler.interpret import interpret
+
+        (entries,) = interpret(self.tape("loop_matrices"), [t[:, None], x, z, w, p], fused=False)
+        sizes = [len(names) for names in self.loops]
+        parts = np.split(entries, np.cumsum([size**2 for size in sizes])[:-1], axis=-1)
+        return [part.reshape(t.size, size, size) for part, size in zip(parts, sizes)]
+
     @cached_property
     def _flow_jacobian(self) -> KeptJacobian:
         return kept_jacobian(self._digests["derivative"], self._digests["residual"], self._trace)
@@ -263,6 +278,8 @@ def _functions(system: HybridSystem) -> dict[str, TracedFunction]:
         functions["delay_inputs"] = system.delays.inputs
         functions["delay_times"] = system.delays.times
         functions["delay_bounds"] = system.delays.bounds
+    if system.loops is not None:
+        functions["loop_matrices"] = system.loops.matrices
     return functions
 
 
@@ -283,6 +300,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "delays": []
         if system.delays is None
         else list(zip(system.delays.values, system.delays.slopes, system.delays.fixed)),
+        "loops": [] if system.loops is None else [list(names) for names in system.loops.signals],
         "parameters": slots_to_json(system.parameters),
         "signals": slots_to_json(system.signals_layout),
         "parameter_values": np.asarray(system.parameter_values, dtype=np.float64).tolist(),

@@ -14,14 +14,16 @@ from armblocks.equations.linear_solution import linear_solution
 from armblocks.errors import AlgebraicLoopError
 
 
-def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
+def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[int], SX]]]:
     """The unknowns ``w (n,)`` of ``residual(w) = 0`` as far as elimination gets.
 
-    Returns all of them over the ones that remain, and the places of those. Unknowns that depend on each other
+    Returns all of them over the ones that remain, the places of those, and the circles that are solved: the
+    places of their unknowns, and the derivative of their residual by them. Unknowns that depend on each other
     in circles are solved together, each circle by itself, in the order in which they need each other; a
     circle whose residual is not linear in its unknowns remains.
     """
     solution, remaining = SX(w), list[int]()
+    circles: list[tuple[list[int], SX]] = []
     slopes = jacobian(residual, w)
     needs = _needs(slopes)
     for circle in strongly_connected(needs):
@@ -29,12 +31,13 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int]]:
         if depends_on(slope, unknowns):
             remaining.extend(circle)
             continue
+        circles.append((circle, densify(slope)))
         constant = substitute(residual[circle], unknowns, SX.zeros(len(circle)))
         solved = -_divided(densify(constant), slope)
         # What was solved before is put in last, into a small expression, so that work grows with the count.
         before = sorted({place for row in circle for place in needs[row]} - set(circle))
         solution[circle] = substituted(solved, w[before], solution[before]) if before else solved
-    return solution, sorted(remaining)
+    return solution, sorted(remaining), circles
 
 
 def _divided(right: SX, matrix: SX) -> SX:

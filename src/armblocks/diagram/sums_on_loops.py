@@ -1,8 +1,9 @@
 """The sums on loops that are linear: the signals of such a loop that are solved for.
 
-A loop can be cut at any of its signals. The others follow from the cut, and a sum among them may lose all of its
-digits: behind a follower with the gain 1e9 the error ``r - y`` is 1e-9 of r. Products keep the relative accuracy
-of their factors. Solved for all sums, every signal of the loop is as accurate as its own condition allows.
+A loop can be cut at any of its signals. The others follow from the cut, and a sum among them may lose all of
+its digits: in a follower with the gain 1e9 the error ``r - y`` is 1e-9 of r. Products keep the relative
+accuracy of their factors. Solved for all sums, every signal of the loop is as accurate as its own condition
+allows.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def _unknowns(network: Network, nodes: list[Node]) -> int:
 
 
 def _is_linear(network: Network, node: Node, tangle: set[Node]) -> bool:
-    """Whether a node is linear in all that comes out of a tangle of loops, which flows and is not implicit."""
+    """Whether a node is a value, neither held nor implicit, and linear in what comes out of the tangle."""
     if node.group == HELD or node.order or network.diagram.blocks[node.block].implicit_outputs:
         return False
     if network.diagram.clocked(node.block):

@@ -39,6 +39,7 @@ from armblocks.diagram.units import infer_units
 from armblocks.equations import (
     Delays,
     HybridSystem,
+    LinearLoops,
     Signature,
     Slot,
     TracedFunction,
@@ -128,6 +129,18 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         ),
         aliases=_aliases(form, layout),
         delays=_delays(model, symbols, flow, loops, ends),
+        loops=_linear_loops(loops, ends),
+    )
+
+
+def _linear_loops(loops: Implicit, ends: Mapping[str, SX]) -> LinearLoops | None:
+    """What is known of the loops that are solved."""
+    if not loops.linear:
+        return None
+    matrices = loops.solved([flatten(matrix, matrix.shape) for _, matrix in loops.linear])
+    return LinearLoops(
+        signals=tuple(names for names, _ in loops.linear),
+        matrices=_flat_function("loop_matrices", ends, {"A": matrices}),
     )
 
 
@@ -152,7 +165,7 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
         return [updated]
     cuts = vertcat(*tick.unknowns.values())
     residual = tick.residuals()
-    solution, remaining = solve_affine(cuts, residual)
+    solution, remaining, _ = solve_affine(cuts, residual)
     if remaining and depends_on(residual[remaining], symbols.m):
         value = next(iter(tick.unknowns))
         raise DiagramError(

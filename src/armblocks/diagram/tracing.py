@@ -132,7 +132,9 @@ class Tracing:
             for slot in group.slots:
                 if slot.kind is SlotKind.OUTPUT:
                     unknown = Value(node, slot.kind, slot.name)
-                    self._left_over[unknown] = self._values[node].pop((slot.kind, slot.name)) - self.value(unknown)
+                    self._left_over[unknown] = self._values[node].pop((slot.kind, slot.name)) - self.value(
+                        unknown
+                    )
         if node.block in self._clock_of:
             ticks = symbols.m[self._clock_of[node.block]]
             if ON in self.network.diagram.gates.get(node.block, {}):
@@ -187,6 +189,8 @@ class Implicit:
         self.w = SX.sym("w", 0)
         self.residual = SX(0, 1)
         self.guesses = SX(0, 1)
+        self.linear: list[tuple[tuple[str, ...], SX]] = []
+        """Names of the unknowns of each loop that is solved, and the matrix of its equations."""
         self._cuts, self._solution = SX(0, 1), SX(0, 1)
         if not tracing.unknowns:
             return
@@ -201,12 +205,13 @@ class Implicit:
             for _ in range(cut.numel())
         ]
         check_solvable(cuts, residual, symbols.p, values, around, where)
-        solution, remaining = solve_affine(cuts, residual)
+        solution, remaining, circles = solve_affine(cuts, residual)
         names = [
             _unknown_name(value) + (f"[{k}]" if cut.numel() > 1 else "")
             for value, cut in tracing.unknowns.items()
             for k in range(cut.numel())
         ]
+        self.linear = [(tuple(names[k] for k in circle), matrix) for circle, matrix in circles]
         self.slots = Signature(tuple(Slot(names[k]) for k in remaining))
         self.w = SX.sym("w", len(remaining))
         if remaining:

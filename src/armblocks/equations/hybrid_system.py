@@ -53,6 +53,18 @@ class Delays:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class LinearLoops:
+    """Loops ``x = M x + c`` that are solved where they stand, and how to know their condition.
+
+    ``signals``: the names of the unknowns of each. ``matrices``: from ``t, x, z, w, p`` all ``M - 1`` row by
+    row, one after another.
+    """
+
+    signals: tuple[tuple[str, ...], ...]
+    matrices: TracedFunction
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HybridSystem:
     """Continuous flow, sampled parts, events and implicit equations of one diagram.
 
@@ -120,3 +132,5 @@ class HybridSystem:
     """Whether some discrete variable keeps how things were just before an instant."""
     called: tuple[str, ...] = ()
     """Blocks that are no equations: Python works out at each of their ticks what they give."""
+    loops: LinearLoops | None = None
+    """Loops that are solved already."""

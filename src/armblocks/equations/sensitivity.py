@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from casadi import SX, Function, densify, depends_on, jacobian, jtimes, vertcat
 
 from armblocks.equations.evaluation import refuse_called
-from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_instants import Instants
 from armblocks.equations.sensitivity_layout import OWN, Columns, sensitivity_name
@@ -193,4 +193,11 @@ class _Augmented:
             initial_algebraic=self.start(old.initial_algebraic, "w0"),
             delays=self.delays.delays(),
             captures=old.captures or instants is not None,
+            loops=None if old.loops is None else self.loops(old.loops),
         )
+
+    def loops(self, old: LinearLoops) -> LinearLoops:
+        """The loops of the system itself: those of the derivatives have the same matrices."""
+        c = self.columns
+        matrices = c.function("loop_matrices", {}, A=c.value(old.matrices))
+        return dataclasses.replace(old, matrices=matrices)

@@ -134,6 +134,10 @@ class Recording:
         failure, count = bad
         return Recorded(time=time[:count], states=states[:count], signals=signals[:, :count], failure=failure)
 
+    def held(self) -> list[Rows]:
+        """The rows that are in memory."""
+        return self._rows(0)
+
     def finish(self, result: SimulationResult) -> None:
         """Complete the file of a logged run, with how the run went."""
         if self._log is not None:

@@ -21,6 +21,7 @@ from armblocks.simulation.diagnosis import (
     stiffness_hint,
     warnings_of_blocks,
 )
+from armblocks.simulation.loop_conditions import warnings_of_loops
 from armblocks.simulation.plan import LogRequest, changed_parameters, make_plan, parameter_vector
 from armblocks.simulation.recording import Recording, Samples
 from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult
@@ -311,6 +312,8 @@ class Simulation:
             self._note(stiffness_hint(compiled, integrations[-1], self._stretches[-1].p))
             for warning in warnings_of_blocks(compiled, integrations[-1]):
                 self._note(warning)
+        for warning in warnings_of_loops(compiled, self._recording.held()):
+            self._note(warning)
         self._failure = failure = good.failure or failure
         if failure is not None:
             self._message = " ".join(part for part in (failure.what + ".", self._message) if part)
