@@ -1,0 +1,231 @@
+"""Print one hash for each group of numbers that the documents promise to be the same on every machine.
+
+``python scripts/bits_hashes.py [--cpu NAME --lanes N]``, with armblocks importable; ``scripts/bits.py`` runs
+it for several processors and compares. ``--cpu`` compiles for that processor of LLVM's list.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from armblocks.compiler import target as targets
+
+Numbers = Iterator[tuple[str, np.ndarray]]
+ROWS = 37
+"""Samples of a batch: whole vectors of any length, and a rest."""
+OF_TWO = ("atan2", "hypot", "fmod", "remainder", "power")
+
+
+def compile_for(cpu: str, lanes: int) -> None:
+    """Make all code of this process for another processor; before anything else of armblocks is imported."""
+    chosen = replace(targets.host_target(), cpu=cpu, features="", lanes=lanes)
+    targets.host_target = lambda: chosen  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def spread(rng: np.random.Generator, count: int, exponents: int) -> np.ndarray:
+    """Numbers of both signs with binary exponents up to this; made without a function of the C library."""
+    return np.ldexp(2.0 * rng.random(count) - 1.0, rng.integers(-exponents, exponents, count, endpoint=True))
+
+
+def elementary_functions() -> Numbers:
+    """Every function that kernels have, of arguments of all sizes, one by one and in batches."""
+    import casadi
+
+    from armblocks.compiler import compile_function
+    from armblocks.equations import TracedFunction, signature
+
+    names = [
+        *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+        *("exp", "expm1", "log", "log1p", "erf", "sqrt", *OF_TWO),
+    ]
+    rng = np.random.default_rng(9)
+    ends = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, 2.3e-308, 1e308, 710.0, -745.0, 1e22]
+    sizes = spread(rng, 400, 1000)
+    pool = np.concatenate([ends, spread(rng, 2000, 1), 20.0 * spread(rng, 1000, 1), sizes])
+    first, second = (rng.choice(pool, 4001).reshape(-1, 1) for _ in range(2))
+    for name in names:
+        operation = (lambda a, b: a**b) if name == "power" else getattr(casadi, name)
+        one = name not in OF_TWO
+        traced = TracedFunction.trace(
+            name,
+            signature(("a", (1,)), ("b", (1,))),
+            signature(("y", (1,))),
+            (lambda a, b, f=operation: f(a)) if one else operation,
+        )
+        kernel = compile_function(traced)
+        yield name, kernel(first, second)
+        yield f"{name} single", np.array([kernel(a, b) for a, b in zip(first[:400], second[:400])])
+
+
+def rounded_constants() -> Numbers:
+    """The functions that work out constants."""
+    from armblocks.rounded_functions import FUNCTIONS
+
+    rng = np.random.default_rng(10)
+    for name, function in FUNCTIONS.items():
+        values = np.concatenate([spread(rng, 200, 1), spread(rng, 100, 40), spread(rng, 20, 1000)])
+        arguments = (
+            zip(values, rng.permutation(values)) if name in ("atan2", "hypot", "power") else zip(values)
+        )
+        yield name, np.array([function(*map(float, given)) for given in arguments])
+
+
+def robots() -> Numbers:
+    """Every function of every robot, and of one with angles that are no quarter turns."""
+    import armblocks as ab
+    from armblocks import dynamics
+    from armblocks.compiler import compile_function
+
+    turned = ab.modified_dh("base", alpha=0.4, theta=0.9).before
+    skew = ab.Robot(
+        name="skew",
+        base=turned,
+        links=tuple(
+            ab.modified_dh(
+                f"l{k}",
+                parent=f"l{k - 1}" if k else None,
+                alpha=0.3 + k,
+                a=0.1 * k,
+                d=0.2,
+                sigma=k % 2,
+                offset=0.7 * k,
+                mass=1.0 + k,
+                centre_of_mass=(0.1, 0.2, 0.3 * k),
+            )
+            for k in range(3)
+        ),
+    )
+    every = [ab.load_robot(name).robot for name in ab.list_robots()]
+    rng = np.random.default_rng(11)
+    for robot in (*every, skew):
+        for name in sorted(name for name in dir(dynamics) if name.startswith("trace_")):
+            try:
+                traced = getattr(dynamics, name)(robot)
+            except TypeError:
+                continue  # a function that needs more than a robot
+            if not hasattr(traced, "casadi_function"):
+                continue
+            kernel = compile_function(traced)
+            given = [4.0 * rng.random((ROWS, *slot.shape)) - 2.0 for slot in traced.inputs]
+            results = kernel(*given)
+            for part in results if isinstance(results, tuple) else (results,):
+                yield f"{robot.name} {name}", part
+            single = kernel(*(array[0] for array in given))
+            for part in single if isinstance(single, tuple) else (single,):
+                yield f"{robot.name} {name} single", part
+
+
+FORMULAS = (
+    *("u*cos(1.995)", "u*exp(0.529)", "u*expm1(1.769)", "u*erf(0.31)", "u*acosh(1.7)", "u*sinh(0.7)^u"),
+    *("u*2.2^u", "u*3^0.41", "u*atan2(0.3, 1.1)", "u*log10(7)", "sin([0.3; u; 1.4])", "u*hypot(0.3, 0.41)"),
+    *("atan2(-(u*3-6), -1)", "u*norm([0.1 0.2 0.7])", "u*tan(1.3)/atanh(0.35)"),
+)
+
+
+def constants() -> Numbers:
+    """Runs of diagrams with constants in formulas and in filters."""
+    import armblocks as ab
+    from armblocks.blocks import AnalogFilter, Clock, DigitalFilter, Expression, Integrator
+
+    def run(name: str, solver: str, put: Callable[[ab.DiagramBuilder], object]) -> Numbers:
+        builder = ab.DiagramBuilder("d")
+        builder.log(put(builder))  # pyright: ignore[reportArgumentType]
+        result = ab.simulate(builder.build(), stop_time=1.0, sample_time=0.1, solver=solver)
+        for path in result.names:
+            yield f"{name} {solver} {path}", np.asarray(result[path])
+
+    for text in FORMULAS:
+        yield from run(
+            text, "rk4", lambda d, text=text: d.add("e", Expression(formula=text), d.add("c", Clock()))
+        )
+    for text in ("2.2^u - u", "cos(1.2)*u - 3^u"):
+
+        def feedback(d: ab.DiagramBuilder, text: str = text) -> object:
+            state = d.add("x", Integrator(initial=0.3))
+            d.connect(d.add("e", Expression(formula=text), state), state)
+            return state
+
+        for solver in ("rodas5p", "ros23", "dopri5"):
+            yield from run(text, solver, feedback)
+    for design in ("butterworth", "chebyshev1", "chebyshev2"):
+        for kind in ("low_pass", "high_pass", "band_pass", "band_stop"):
+            for block in (AnalogFilter, DigitalFilter):
+                given = {"edge": 0.31, "upper_edge": 0.47, "order": 5, "design": design, "filter_type": kind}
+                more = {"sample_time": 0.01} if block is DigitalFilter else {}
+                yield from run(
+                    f"{block.__name__} {design} {kind}",
+                    "rk4",
+                    lambda d, block=block, all=given | more: d.add("f", block(**all), d.add("c", Clock())),
+                )
+
+
+def shipped_blocks() -> Numbers:
+    """The worked example of every block."""
+    import armblocks as ab
+
+    for kind in ab.list_blocks():
+        result = ab.simulate(ab.block_example(kind))
+        for path in result.names:
+            yield f"{kind} {path}", np.asarray(result[path])
+
+
+def shipped_diagrams() -> Numbers:
+    """Every shipped diagram, for its first 0.2 s."""
+    import armblocks as ab
+
+    for name in ab.list_examples():
+        result = ab.simulate(ab.load_diagram(name), stop_time=0.2)
+        for path in result.names:
+            yield f"{name} {path}", np.asarray(result[path])
+
+
+GROUPS: dict[str, Callable[[], Numbers]] = {
+    "elementary functions": elementary_functions,
+    "rounded constants": rounded_constants,
+    "robots": robots,
+    "constants": constants,
+    "blocks": shipped_blocks,
+    "diagrams": shipped_diagrams,
+}
+
+
+def canonical(numbers: np.ndarray) -> bytes:
+    """The bytes of numbers; every NaN has the same, because its sign and payload are promised to nobody."""
+    array = np.array(numbers, dtype=np.float64)
+    array[np.isnan(array)] = np.nan
+    return array.tobytes()
+
+
+def main() -> None:
+    """Print a line for each group, and with ``--details`` one for each array."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cpu")
+    parser.add_argument("--lanes", type=int, default=2)
+    parser.add_argument("--details", action="store_true", help="a line for each array, too")
+    parser.add_argument("groups", nargs="*", help=f"which: {', '.join(GROUPS)} (default: all)")
+    asked = parser.parse_args()
+    if asked.cpu:
+        compile_for(asked.cpu, asked.lanes)
+    warnings.simplefilter("ignore")
+    for group in asked.groups or GROUPS:
+        whole = hashlib.sha256()
+        count = 0
+        for name, numbers in GROUPS[group]():
+            data = canonical(numbers)
+            whole.update(name.encode() + data)
+            count += 1
+            if asked.details:
+                print(f"  {group} | {name} {hashlib.sha256(data).hexdigest()[:12]}")
+        print(f"{group}: {whole.hexdigest()[:24]} ({count} arrays)")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
