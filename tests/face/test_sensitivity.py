@@ -11,28 +11,34 @@ import pytest
 import armblocks as ab
 from armblocks.blocks import (
     PWM,
+    Abs,
     Constant,
     Derivative,
     EnabledSubsystem,
     Expression,
+    FirstOrderHold,
     FromFile,
     Gain,
     Inport,
     Integrator,
     Outport,
     Ramp,
+    RandomNumber,
     ResettableIntegrator,
     ResettableSubsystem,
     Saturation,
+    Sign,
     SignalGenerator,
     SineWave,
     Step,
+    StickSlipFriction,
     Sum,
     TransportDelay,
     TriggeredSubsystem,
     VariableTimeDelay,
     ZeroOrderHold,
 )
+from armblocks.diagram import Block
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "stop_time": 3.0, "sample_time": 0.1}
@@ -300,6 +306,44 @@ def test_delays_and_implicit_equations_together_are_refused() -> None:
     builder.connect(builder.add("late", TransportDelay(), gain), state["u"])
     with pytest.raises(InputError, match=r"the delayed signals and the implicit equation of '.*' are in one"):
         ab.sensitivity(builder.build(), "gain.gain", "x")
+
+
+def test_a_source_that_a_parameter_moves_and_an_implicit_equation_together_are_refused() -> None:
+    builder = ab.DiagramBuilder("both")
+    total = builder.add("sum", Sum(signs="+-"), builder.add("step", Step()))
+    builder.connect(builder.add("cube", Expression(formula="u^3"), total), total["u2"])
+    builder.add("x", Integrator(), total)
+    with pytest.raises(InputError, match=r"the parameter that says when a signal jumps and the implicit equ"):
+        ab.sensitivity(builder.build(), "step.time", "x")
+
+
+def test_events_at_the_start_that_a_parameter_moves_are_refused_where_they_change_something() -> None:
+    def behind(block: Block) -> ab.Diagram:
+        builder = ab.DiagramBuilder("start")
+        builder.add("x", Integrator(), builder.add("y", block, builder.add("wave", SineWave())))
+        return builder.build()
+
+    for block, parameter in ((Sign(), "wave.phase"), (PWM(), "y.offset"), (FirstOrderHold(), "y.offset")):
+        with pytest.raises(InputError, match=f"event of 'y' at the start moves with .* '{parameter}'"):
+            ab.sensitivity(behind(block), parameter, "x")
+    # The magnitude has a kink there and does not jump: dx/dphase = |sin(t)|.
+    result = ab.sensitivity(behind(Abs()), "wave.phase", "x", **TIGHT)
+    assert np.allclose(result["x", "wave.phase"], np.sin(result.time), atol=1e-9)
+
+
+def test_by_the_speed_of_a_mass_that_rests_is_refused() -> None:
+    builder = ab.DiagramBuilder("rest")
+    mass = builder.add("mass", StickSlipFriction(), builder.add("force", Ramp(slope=0.8)))
+    builder.add("x", Integrator(), mass["x"])
+    with pytest.raises(InputError, match=r"event of 'mass' at the start moves with .* 'mass.initial_speed'"):
+        ab.sensitivity(builder.build(), "mass.initial_speed", "x")
+
+
+def test_a_seed_is_refused() -> None:
+    builder = ab.DiagramBuilder("noise")
+    builder.add("x", Integrator(), builder.add("noise", RandomNumber(sample_time=0.1)))
+    with pytest.raises(InputError, match=r"'noise.seed' acts by comparisons or by its whole part only"):
+        ab.sensitivity(builder.build(), "noise.seed", "x")
 
 
 def test_what_cannot_be_differentiated_is_refused() -> None:

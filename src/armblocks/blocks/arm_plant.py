@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from casadi import SX, dot, fmax, fmin, if_else, logic_and, logic_or, vertcat
+from casadi import SX, dot, fmax, fmin, if_else, logic_and, logic_not, logic_or, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.robot_ports import check_joint_values, q_port, qd_port, qdd_port, tau_port
@@ -271,7 +271,10 @@ class ArmPlant(Block):
         if self._lower() or self._upper():
             values["contact"] = found.contact if self.stops == "hard" else contact
         happened = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
-        return {name: if_else(happened, value, x[name]) for name, value in values.items()}
+        after = {name: if_else(happened, value, x[name]) for name, value in values.items()}
+        # At rest the speed is 0 whatever the parameters are: the derivatives of the speed are 0 too.
+        rests = logic_and(found.mode == 0.0, x["qd"] == 0.0)
+        return {**after, "qd": if_else(logic_and(rests, logic_not(happened)), 0.0, after["qd"])}
 
     # -- parts
 

@@ -222,9 +222,11 @@ class StickSlipFriction(Block):
         stops = logic_and(x["mode"] != 0.0, e["stop"] * x["mode"] < 0.0)
         broken = if_else(e["forwards"] > 0.0, 1.0, if_else(e["backwards"] < 0.0, -1.0, 0.0))
         moving = if_else(x["mode"] == 0.0, broken, x["mode"])
+        # At rest the speed is 0 whatever the parameters are: the derivatives of the speed are 0 too.
+        rests = logic_and(x["v"] == 0.0, self._breaking(u, p) == 0.0)
         return {
             "mode": if_else(stops, self._breaking(u, p), moving),
-            "v": if_else(stops, 0.0, x["v"]),
+            "v": if_else(logic_or(stops, rests), 0.0, x["v"]),
         }
 
     def _breaking(self, u: Signals, p: Signals) -> SX:

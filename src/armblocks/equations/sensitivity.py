@@ -19,6 +19,7 @@ from armblocks.equations.hybrid_system import HybridSystem, LinearLoops
 from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_instants import Instants
 from armblocks.equations.sensitivity_layout import OWN, Columns, sensitivity_name
+from armblocks.equations.sensitivity_start import refuse_moving_start
 from armblocks.equations.signatures import Signature, Slot, signature
 from armblocks.equations.symbols import flatten
 from armblocks.equations.table_reading import tables_read
@@ -53,10 +54,13 @@ def sensitivity_system(
     """The system with the derivatives of ``outputs`` (paths of signals) by ``parameters`` (paths) as signals.
 
     Raises ``UnknownNameError`` for names, ``InputError`` for a parameter that is a table that is read by
-    index, and for what :func:`_refuse` names.
+    index, that acts by its whole part only, or that moves an event at the start; and for implicit equations
+    together with delays or with a parameter that says when a signal jumps.
     """
     refuse_called(system, "derivatives")
     _refuse_tables(system, parameters)
+    _refuse_whole_numbers(system, parameters)
+    refuse_moving_start(system, parameters)
     return _Augmented(system, parameters, outputs).system()
 
 
@@ -82,6 +86,43 @@ def _refuse(system: HybridSystem, *, sources: bool) -> None:
             allowed="sensitivities of diagrams with one or the other",
             fix="break the loop with a state, or take the difference of two runs",
         )
+
+
+def _refuse_whole_numbers(system: HybridSystem, parameters: Sequence[str]) -> None:
+    """Raise ``InputError`` for a parameter that acts, but by comparisons or its whole part only (a seed)."""
+    for name in parameters:
+        acts, smoothly = False, False
+        for traced in _functions(system):
+            if "p" not in traced.inputs.names or smoothly:
+                continue
+            p = traced.arguments[traced.inputs.names.index("p")]
+            results = vertcat(*traced.results, SX(0, 1))
+            if results.numel() and depends_on(results, p[system.parameters.ranges[name]]):
+                acts = True
+                smoothly = not jtimes(results, p, _direction(system, name)).is_zero()
+        if acts and not smoothly:
+            raise InputError(
+                f"the parameter '{name}' acts by comparisons or by its whole part only",
+                where=system.name,
+                allowed="parameters that something follows smoothly",
+                fix="compare runs with different values",
+            )
+
+
+def _functions(system: HybridSystem) -> list[TracedFunction]:
+    """All functions of a system."""
+    delays = () if system.delays is None else (system.delays.inputs, system.delays.times)
+    found = [getattr(system, entry.name) for entry in dataclasses.fields(system)]
+    return [*(value for value in found if isinstance(value, TracedFunction)), *delays]
+
+
+def _direction(system: HybridSystem, name: str) -> SX:
+    """A change of all entries of a parameter, in p."""
+    direction = SX.zeros(system.parameters.size)
+    places = system.parameters.ranges[name]
+    for number, place in enumerate(range(places.start, places.stop)):
+        direction[place] = 1.0 + 0.37 * number
+    return direction
 
 
 class _Augmented:

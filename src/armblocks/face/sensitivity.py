@@ -79,13 +79,13 @@ def sensitivity(
 
     The traced equations are differentiated and integrated beside the equations themselves, natively, under
     the same error control. The instants of events, of jumps at known times and of the arrival of delayed
-    jumps are differentiated too, and so are implicit equations. An event at the start stays there.
+    jumps are differentiated too, and so are implicit equations.
     ``values``: other values of parameters; ``settings`` those of the run, as in :func:`simulate`.
 
     Raises ``UnknownNameError`` for names; ``InputError`` for a parameter that is a table that is read by
-    index, and where implicit equations come together with delays or with a parameter that says when a signal
-    jumps; ``SimulationError`` as a run does, and where events come together at one instant that a change of a
-    parameter would part: there is no derivative then.
+    index, that acts by its whole part only, or that moves an event at the start, and where implicit equations
+    come together with delays or with a parameter that says when a signal jumps; ``SimulationError`` as a run
+    does, and where events coincide that a change of a parameter would part: there is no derivative then.
     """
     described = described_diagram(diagram, values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)

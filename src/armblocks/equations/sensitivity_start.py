@@ -1,0 +1,145 @@
+"""Events at the start, which a change of a parameter would move into the run or out of it.
+
+There is one derivative for a change that moves the event into the run and another one for a change that moves
+it out, unless both sides of the event are alike. The start is evaluated in Python, once, before a run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from casadi import SX, Function, densify, jtimes, vertcat
+from numpy.typing import NDArray
+
+from armblocks.equations.hybrid_system import HybridSystem
+from armblocks.equations.traced_function import TracedFunction
+from armblocks.errors import InputError
+
+Array = NDArray[np.float64]
+
+AT_ZERO = 1e-8
+"""A guard that would be 0 within this time (s) is at 0."""
+ALIKE = 1e-9
+"""Derivatives of states and signals that differ by less, beside their size, are alike."""
+
+
+def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
+    """Raise ``InputError`` where an event is at the start, a parameter moves it, and its sides differ.
+
+    Not checked: diagrams with implicit equations, whose unknowns are not known yet.
+    """
+    if not system.guard_directions or system.algebraic.size:
+        return
+    start = _Start(system)
+    for name in parameters:
+        entries = system.parameters.ranges[name]
+        guards = [system.guard_names[guard] for guard in start.moving_guards(entries)]
+        for block in [*guards, *start.held_states(entries)]:
+            raise InputError(
+                f"an event of '{block}' at the start moves with the parameter '{name}'",
+                where=system.name,
+                allowed="events at the start that no parameter moves, or that change nothing",
+                fix=f"choose '{name}' so that the event is a little later",
+            )
+
+
+class _Start:
+    """The instant 0 of a run: after the ticks, and with consistent modes."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        p = self.p = np.asarray(system.parameter_values, dtype=np.float64)
+        x, z = system.initial_states(p)[0].ravel(), system.initial_discrete(p)[0].ravel()
+        marks = np.array([float(clock.offset == 0.0) for clock in system.clocks])
+        if marks.any():
+            (z,) = self._at(system.update, x, z, marks)
+        self.before = (x, z)
+        quiet = np.zeros(len(system.guard_directions))
+        for _ in range(quiet.size):
+            after = self._at(system.reset, x, z, quiet)
+            same = np.array_equal(after[0], x) and np.array_equal(after[1], z)
+            x, z = after
+            if same:
+                break
+        self.after = (x, z)
+
+    def _at(self, traced: TracedFunction, x: Array, z: Array, *more: Array) -> tuple[Array, ...]:
+        return tuple(value.ravel() for value in traced(0.0, x, z, np.empty(0), self.p, *more))
+
+    def moving_guards(self, entries: slice) -> list[int]:
+        """The guards that are at zero, move with some of these parameters, and have sides that differ."""
+        found: set[int] = set()
+        for point in (self.before, self.after):
+            g, rate, moves = self._guards(*point, entries)
+            zero = np.isfinite(rate) & (np.abs(g) <= AT_ZERO * np.abs(rate)) & (rate != 0.0)
+            for guard in np.flatnonzero(zero & (moves > AT_ZERO * np.abs(rate))).tolist():
+                direction = self.system.guard_directions[guard]
+                # A guard of one direction fires in that direction only.
+                fires = direction * rate[guard] > 0.0
+                if fires or (direction == 0 and self._sides_differ(guard, rate[guard])):
+                    found.add(guard)
+        return sorted(found)
+
+    def held_states(self, entries: slice) -> list[str]:
+        """The blocks that hold a state at the start, whatever these parameters say."""
+        system = self.system
+        t, x, z, w, p, e = system.reset.arguments
+        after = vertcat(*system.reset.results)[: x.numel()]
+        changes: list[SX] = []
+        for of_states, of_discrete, seed in self._initial_rates(p, entries):
+            changes.append(jtimes(after, vertcat(x, z, p), vertcat(of_states, of_discrete, seed)) - of_states)
+        moved = self._numbers([t, x, z, w, p, e], changes, self.after, np.zeros(e.numel()))
+        found = np.abs(np.array(moved)).max(axis=0)
+        names = [element for slot in system.states for element in slot.elements]
+        return [names[place].rpartition("/")[0] for place in np.flatnonzero(found > AT_ZERO)]
+
+    def _initial_rates(self, p: SX, entries: slice) -> list[tuple[SX, SX, SX]]:
+        """Of each parameter the derivatives of the states and of the discrete variables at the start."""
+        found: list[tuple[SX, SX, SX]] = []
+        for place in range(entries.start, entries.stop):
+            seed = SX.zeros(p.numel())
+            seed[place] = 1.0
+            rates: list[SX] = []
+            for traced in (self.system.initial_states, self.system.initial_discrete):
+                (own,) = traced.arguments
+                initial = Function("i", [own], [vertcat(*traced.results, SX(0, 1))])
+                (value,) = initial.call([p], True, False)
+                rates.append(densify(jtimes(value, p, seed)) if value.numel() else value)
+            found.append((rates[0], rates[1], seed))
+        return found
+
+    def _guards(self, x: Array, z: Array, entries: slice) -> tuple[Array, Array, Array]:
+        """The guards, their time derivatives, and by how much the parameters move them, each (ng,)."""
+        t, states, discrete, w, p = self.system.guards.arguments
+        g = vertcat(*self.system.guards.results)
+        derivative = self.system.derivative
+        flow = Function("f", list(derivative.arguments), [vertcat(*derivative.results, SX(0, 1))])
+        (f,) = flow.call([t, states, discrete, w, p], True, False)
+        moves = [
+            jtimes(g, vertcat(states, discrete, p), vertcat(*rates))
+            for rates in self._initial_rates(p, entries)
+        ]
+        rate = jtimes(g, vertcat(t, states), vertcat(SX(1.0), f))
+        found = self._numbers([t, states, discrete, w, p], [g, rate, *moves], (x, z))
+        return found[0], found[1], np.abs(np.array(found[2:])).max(axis=0)
+
+    def _numbers(
+        self, symbols: list[SX], results: list[SX], point: tuple[Array, Array], *more: Array
+    ) -> list[Array]:
+        """Expressions of ``t, x, z, w, p`` and what comes behind them, at the start."""
+        given = [np.zeros(1), *point, np.empty(0), self.p, *more]
+        values = Function("f", symbols, [densify(result) for result in results]).call(given)
+        return [np.array(value, dtype=np.float64).ravel() for value in values]
+
+    def _sides_differ(self, guard: int, rate: float) -> bool:
+        """Whether the flow or a signal jumps where a guard of both directions fires."""
+        event = np.zeros(len(self.system.guard_directions))
+        event[guard] = -np.sign(rate)
+        other = self._at(self.system.reset, *self.after, event)
+        here, there = (
+            np.concatenate([*self._at(self.system.derivative, *side), *self._at(self.system.signals, *side)])
+            for side in (self.after, other)
+        )
+        with np.errstate(invalid="ignore"):
+            return bool((np.abs(here - there) > ALIKE * (1.0 + np.abs(here))).any())

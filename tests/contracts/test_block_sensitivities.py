@@ -1,0 +1,178 @@
+"""Sensitivities by the tunable parameters of every block, against differences of runs.
+
+A case is the worked example of a block with random parameters: as it is, with the block in an enabled
+subsystem, or with a delay behind it. Each output is integrated, and the integrals are differentiated. A few
+cases are tried in every run of the tests. With the environment variable ``ARMBLOCKS_LONG=seed`` all are.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS, EnabledSubsystem, Inport, Integrator, Outport, SineWave, TransportDelay
+from armblocks.diagram import Block, Diagram, DiagramBuilder, PortRef
+from armblocks.errors import ArmblocksError, InputError, SimulationError
+from armblocks.face.block_examples import block_name
+
+SETTINGS = {"rtol": 1e-10, "atol": 1e-11, "stop_time": 3.0, "sample_time": 3.0 / 37.3, "solver": "rk45"}
+PLACES = ("plain", "enabled", "delayed")
+SHORT = (
+    ("FirstOrderHold", "plain"),
+    ("PWM", "delayed"),
+    ("SignalGenerator", "enabled"),
+    ("SecondOrderIntegratorLimited", "plain"),
+    ("DiscreteIntegrator", "delayed"),
+    ("VariableTimeDelay", "plain"),
+    ("Relay", "enabled"),
+    ("StickSlipFriction", "plain"),
+    ("PID", "enabled"),
+)
+LONG = os.environ.get("ARMBLOCKS_LONG", "")
+SEED = int(LONG) if LONG.isdigit() else 1
+CASES = [(kind, place) for kind in sorted(BLOCKS) for place in PLACES] if LONG else SHORT
+REFUSED = (
+    "is a table that is read by index",
+    "acts by comparisons or by its whole part only",
+    "at the start moves with the parameter",
+    "are in one diagram",
+    "calls Python, which has no derivatives",
+    "several events coincide at",
+)
+
+Array = NDArray[np.float64]
+
+
+def shaken(block: Block, random: np.random.Generator) -> Block:
+    """The block with other values of its tunable parameters, as far as they are allowed."""
+    for rule in block.own_parameters():
+        value = np.asarray(block.parameter_value(rule.name)) if rule.tunable else np.array("")
+        if value.dtype.kind == "f" and np.isfinite(value).all():
+            try:
+                changed = value * (1.0 + 0.15 * random.uniform(-1.0, 1.0, value.shape))
+                block = block.with_parameters(**{rule.name: changed if value.ndim else float(changed)})
+            except ArmblocksError:
+                continue  # parameters that belong together
+    return block
+
+
+def enabled(name: str, block: Block) -> Block:
+    """A subsystem with the block of this name in it, and with ports of the same names."""
+    inside = DiagramBuilder("inside")
+    inside.add(name, block)
+    for port in block.input_ports():
+        inside.connect(inside.add(port.name, Inport()), PortRef(name, port.name))
+    for port in block.output_ports():
+        inside.connect(PortRef(name, port.name), inside.add(f"{port.name} out", Outport()))
+    return EnabledSubsystem(diagram=inside.build())
+
+
+def case(kind: str, place: str, seed: int) -> tuple[Diagram, str, Sequence[str]]:
+    """The diagram, the path of the block, and the integrals of its outputs."""
+    random = np.random.default_rng([seed, *map(ord, kind + place)])
+    example, name = ab.block_example(kind), block_name(BLOCKS[kind])
+    builder = DiagramBuilder("case")
+    shown = [other for other, block in example.blocks.items() if block.views() and other != name]
+    for other, block in example.blocks.items():
+        if other not in shown:
+            changed = shaken(block, random)
+            builder.add(other, enabled(name, changed) if (other, place) == (name, "enabled") else changed)
+    if place == "enabled":
+        control = SineWave(frequency=1.7, bias=0.31, phase=0.4)
+        builder.connect(builder.add("control", control), PortRef(name, "enable"))
+
+    def source(end: PortRef) -> PortRef:
+        return PortRef(name, f"{end.port} out") if (end.block, place) == (name, "enabled") else end
+
+    for wire in example.connections:
+        if wire.target.block not in shown:
+            builder.connect(source(wire.source), wire.target)
+    integrals: list[str] = []
+    for port in example.blocks[name].output_ports():
+        last = source(PortRef(name, port.name))
+        if place == "delayed":
+            last = builder.add(f"late {port.name}", TransportDelay(delay=0.37), last)
+        integrals.append(builder.add(f"integral of {port.name}", Integrator(), last).name)
+    return builder.build(), f"{name}/{name}" if place == "enabled" else name, integrals
+
+
+def differences(
+    diagram: Diagram, parameter: str, value: Array, along: Array, step: float, outputs: Sequence[str]
+) -> list[tuple[Array, Array]]:
+    """For each output the extrapolated differences along a direction, and what half the step changes."""
+
+    def run(change: float) -> list[Array]:
+        result = ab.simulate(diagram, parameters={parameter: value + change * along}, **SETTINGS)
+        return [result[output] for output in outputs]
+
+    plain = [
+        [(above - below) / (2.0 * h) for above, below in zip(run(h), run(-h))]
+        for h in (step, 0.5 * step, 0.25 * step)
+    ]
+    found: list[tuple[Array, Array]] = []
+    for number in range(len(outputs)):
+        first, second = ((4.0 * fine[number] - coarse[number]) / 3.0 for coarse, fine in pairwise(plain))
+        found.append((second, np.abs(second - first) + 0.05 * np.abs(plain[-1][number] - second)))
+    return found
+
+
+def agree(
+    diagram: Diagram, result: ab.SensitivityResult, parameter: str, value: Array, outputs: Sequence[str]
+) -> bool:
+    """Whether the derivatives are the differences, or there are no differences to compare with."""
+    random = np.random.default_rng(len(parameter))
+    along = random.uniform(0.5, 1.0, value.shape) * np.maximum(np.abs(value), 0.1)
+    judged = False
+    for step in (1e-3, 1e-5):
+        try:
+            compared = differences(diagram, parameter, value, along, step, outputs)
+        except ArmblocksError:
+            continue  # at the border of what is allowed
+        judged, wrong = True, False
+        for output, (expected, doubt) in zip(outputs, compared):
+            found = result[output, parameter].reshape(*expected.shape, -1) @ along.ravel()
+            scale = 1e-3 + np.abs(expected).max()
+            wrong |= bool((~(np.abs(found - expected) <= 2e-5 * scale + 10.0 * doubt)).any())
+        if not wrong:
+            return True
+    return not judged
+
+
+@pytest.mark.parametrize(("kind", "place"), CASES)
+def test_sensitivities_by_a_blocks_parameters_are_differences_of_runs(kind: str, place: str) -> None:
+    try:
+        diagram, path, outputs = case(kind, place, SEED)
+        ab.simulate(diagram, **SETTINGS)
+    except ArmblocksError:
+        assert LONG, "a case of the short list can be built and run"
+        pytest.skip("no such case")
+    system = ab.compile_diagram(diagram).system
+    values = system.parameters.unpack(system.parameter_values)
+    names = [
+        slot.name
+        for slot in system.parameters
+        if slot.name.rpartition(".")[0] == path and slot.size <= 12 and np.isfinite(values[slot.name]).all()
+    ]
+    for result in sensitivities(diagram, names, outputs):
+        for name in result.parameters:
+            assert agree(diagram, result, name, np.asarray(values[name]), outputs), name
+
+
+def sensitivities(
+    diagram: Diagram, names: Sequence[str], outputs: Sequence[str]
+) -> Iterator[ab.SensitivityResult]:
+    """By all parameters at once, or one by one where some are refused."""
+    if not names or not outputs:
+        return
+    try:
+        yield ab.sensitivity(diagram, names, outputs, **SETTINGS)
+    except (InputError, SimulationError) as error:
+        assert any(reason in error.what for reason in REFUSED), error
+        for name in names if len(names) > 1 else ():
+            yield from sensitivities(diagram, [name], outputs)
