@@ -203,9 +203,13 @@ def contradictions(
     near = exact.copy()
     for moves in itertools.product((0.0, BORDER, -BORDER), repeat=len(wide)):
         near |= fits(moves)[0]
-    # An instant may be found a little late, at a few rows; what stays at a border has a side.
-    late = (~exact).sum(axis=0) <= 2 + len(y) // 10
-    right = exact | (near & late)
+    # An instant may be found a little late, at one row; what stays at a border has a side.
+    wrong = np.pad(~exact, [(2, 2)] + [(0, 0)] * (rank - 1))
+    n = len(y)
+    stays = np.any(
+        [wrong[k : k + n] & wrong[k + 1 : k + n + 1] & wrong[k + 2 : k + n + 2] for k in range(3)], axis=0
+    )
+    right = exact | (near & ~stays)
     if right.all():
         return None
     place = tuple(np.argwhere(~right)[0])

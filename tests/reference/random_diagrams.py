@@ -20,11 +20,11 @@ from armblocks.equations import Shape
 from armblocks.errors import ArmblocksError
 from armblocks.face.block_examples import example_block
 
-RECORD = 0.05
-"""s; the interval of the record, a multiple of which many times of the sources are."""
+RECORD = 0.0625
+"""s; the interval of the record. Times of sources are often multiples of it, exactly: it is a power of 2."""
 LIMITS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Values at which blocks switch and that sources reach exactly."""
-PERIODS = (0.05, 0.1, 0.2, 0.25, 0.3, (0.1, 0.05), (0.2, 0.1))
+PERIODS = (0.0625, 0.125, 0.25, 0.1, 0.3, (0.125, 0.0625), (0.2, 0.1))
 LEFT_OUT = (
     # They make or read files, call Python, end the run, or stand for wires that are made by hand here.
     "FromFile ToFile PythonFunction CalledPythonFunction StopSimulation Assertion Spectrum ManualSwitch "
@@ -175,7 +175,7 @@ class Maker:
         r = self.random
         height, low = float(r.choice([0.5, 1.0, 1.0, r.uniform(0.3, 2.5)])), float(r.choice(LIMITS))
         grid = float(RECORD * r.integers(1, 30))
-        frequency = float(r.choice([1.0, 2.0, 0.5, 2.5, 1 / 0.3, r.uniform(0.3, 3.0)]))
+        frequency = float(r.choice([1.0, 2.0, 0.5, 4.0, r.uniform(0.3, 3.0), r.uniform(0.3, 3.0)]))
         choices: list[tuple[str, dict[str, Any]]] = [
             ("SignalGenerator", {"waveform": "sawtooth", "amplitude": height, "frequency": frequency}),
             ("SignalGenerator", {"waveform": "square", "amplitude": height, "frequency": frequency}),
@@ -183,18 +183,25 @@ class Maker:
                 "Step",
                 {"time": float(r.choice([grid, r.uniform(0.1, 1.5)])), "initial": low, "final": -low + 0.5},
             ),
-            ("Pulse", {"start": grid, "width": float(r.choice([0.25, 0.3, 0.4])), "amplitude": height}),
+            (
+                "Pulse",
+                {
+                    "start": grid,
+                    "width": float(r.choice([0.25, 0.5, r.uniform(0.1, 1.0)])),
+                    "amplitude": height,
+                },
+            ),
             (
                 "PulseGenerator",
                 {
-                    "period": float(r.choice([0.2, 0.4, 0.5, 0.7])),
+                    "period": float(r.choice([0.25, 0.5, r.uniform(0.2, 1.0)])),
                     "width": float(r.choice([50.0, 25.0, 37.0])),
                     "amplitude": height,
                 },
             ),
             (
                 "RepeatingSequence",
-                {"times": (0.0, 0.3, 0.5, 0.8), "values": tuple(float(r.choice(LIMITS)) for _ in range(4))},
+                {"times": (0.0, 0.25, 0.5, 0.75), "values": tuple(float(r.choice(LIMITS)) for _ in range(4))},
             ),
             (
                 "SineWave",
@@ -210,7 +217,7 @@ class Maker:
                 "Ramp",
                 {
                     "slope": float(r.choice([1.0, -0.5, 2.0])),
-                    "start": float(r.choice([0.0, grid])),
+                    "start": float(r.choice([0.0, grid, r.uniform(0.1, 1.0)])),
                     "initial": low,
                 },
             ),
