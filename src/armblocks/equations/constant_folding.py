@@ -73,7 +73,7 @@ def _power(base: SX, exponent: SX) -> SX:
 
 
 def _has_constants(value: SX) -> bool:
-    if value.is_symbolic() or value.is_constant():
+    if value.numel() <= 1 or value.is_symbolic() or value.is_constant():
         return value.is_constant()
     return any(value[k].is_constant() for k in range(value.numel()))
 
