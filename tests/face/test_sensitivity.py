@@ -191,7 +191,7 @@ def limited_loop() -> ab.Diagram:
         (implicit, 1e-3, ["cube.values"]),
         (limited, 1e-3, ["gain.gain", "limit.upper", "wave.frequency"]),
         (limited_loop, 1e-3, ["gain.gain", "cube.values", "limit.upper", "wave.frequency"]),
-        (delayed, 1e-3, ["square.frequency", "loop.delay", "gain.gain", "x.initial"]),
+        (delayed, 4e-3, ["square.frequency", "loop.delay", "gain.gain", "x.initial"]),
         (
             delayed,
             4e-3,

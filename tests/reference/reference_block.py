@@ -15,9 +15,12 @@ from casadi import SX, Function, densify, depends_on, fabs, fmax, if_else, jtime
 from reference_history import History
 
 from armblocks.blocks import FromFile
-from armblocks.blocks.rate_limits import SMALLEST_JUMP, RateLimiting
+from armblocks.blocks.rate_limits import RateLimiting
 from armblocks.diagram import Block, shape_of
 from armblocks.equations import Shape, flatten, unflatten
+
+SMALLEST_JUMP = 2e-6
+"""Of a rate limiter's input, beside its size: above what integrating its rate adds up to here."""
 
 
 class UnsupportedError(Exception):
@@ -40,7 +43,7 @@ def own_modes(block: Block, x: Mapping[str, SX], u: Mapping[str, SX], p: Mapping
         return {}
     limits, gap, m = block.limits(u, p), u["u"] - x["y"], x["mode"]
     by_rate = if_else(u["u'"] > limits["rising"], 1.0, if_else(u["u'"] < limits["falling"], -1.0, 0.0))
-    passed_on = 2.0 * SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
+    passed_on = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
     following = if_else(gap > passed_on, 1.0, if_else(gap < -passed_on, -1.0, by_rate))
     rising, falling = if_else(gap > 0.0, 1.0, following), if_else(gap < 0.0, -1.0, following)
     return {"mode": if_else(m > 0.0, rising, if_else(m < 0.0, falling, following))}

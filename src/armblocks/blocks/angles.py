@@ -19,7 +19,7 @@ from armblocks.blocks.rounding import (
     turn_modes,
     turns_of,
 )
-from armblocks.blocks.switching import zero_crossing_parameter
+from armblocks.blocks.switching import beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
     Guard,
@@ -173,7 +173,13 @@ class AngleDifference(Block):
         return turn_guard_values("mod", _raised(u), _TURN, x["turns"]) if self.zero_crossing else {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"turns": turns_of("mod", _raised(u), _TURN)} if self.zero_crossing else {}
+        if not self.zero_crossing:
+            return {}
+        now = turns_of("mod", _raised(u), _TURN)
+        return {"turns": cell_of(now, x["turns"], self.guard_values(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return (

@@ -242,6 +242,19 @@ class ArmPlant(Block):
         values = {"mode": found.mode, "contact": found.contact if self.stops == "hard" else contact}
         return {state.name: values[state.name] for state in self.modes({})}
 
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # By the guards: the consistent modes themselves are the solution of a complementarity problem.
+        found = dict[str, SX]()
+        guards = self.guard_values(t, x, u, p)
+        if self._holdable():
+            turned = self._spread("rest", guards) < 0.0 if "rest" in guards else SX.zeros(self.robot.n)
+            away = logic_or(self._spread("forwards", guards) > 0.0, self._spread("backwards", guards) < 0.0)
+            found["mode"] = logic_or(turned, away)
+        if self._lower() or self._upper():
+            contact = self._elastic_contact(x["q"], x["qd"], p) if self.stops == "elastic" else x["contact"]
+            found["contact"] = contact != x["contact"]
+        return found
+
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not e:
             return {}

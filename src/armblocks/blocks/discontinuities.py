@@ -9,7 +9,15 @@ from typing import ClassVar
 from casadi import SX, floor, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST, limits_in_order, zone, zone_after
+from armblocks.blocks.switching import (
+    JUST,
+    beyond,
+    cell_of,
+    limits_in_order,
+    since,
+    zone,
+    zone_after,
+)
 from armblocks.diagram import (
     Block,
     Guard,
@@ -173,8 +181,9 @@ class Relay(Block):
         return {"on": u["u"] - p["on_point"] + JUST, "off": u["u"] - p["off_point"] - JUST}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        stays = if_else(u["u"] <= p["off_point"], 0.0, x["mode"])
-        return {"mode": if_else(u["u"] >= p["on_point"], 1.0, stays)}
+        sides = self.guard_values(t, x, u, p)
+        stays = if_else(sides["off"] < 0.0, 0.0, x["mode"])
+        return {"mode": if_else(sides["on"] > 0.0, 1.0, stays)}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"mode": if_else(e["on"] > 0.0, 1.0, if_else(e["off"] < 0.0, 0.0, x["mode"]))}
@@ -220,7 +229,11 @@ class Quantizer(Block):
         return {"up": within - 0.5 + JUST, "down": within + 0.5 + 1e-9}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"step": floor(u["u"] / p["interval"] + 0.5)}
+        now = floor(u["u"] / p["interval"] + 0.5)
+        return {"step": cell_of(now, x["step"], self.guard_values(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"step": beyond(self.guard_values(t, x, u, p))}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         # A jump may pass several edges at once; at an edge, rounding must not undo the step.
@@ -277,9 +290,7 @@ class Switch(Block):
         return {"control": u["u2"] - p["threshold"] + (JUST if self.criterion == ">=" else -JUST)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        if self.criterion == ">=":
-            return {"mode": u["u2"] >= p["threshold"]}
-        return {"mode": u["u2"] > p["threshold"]}
+        return {"mode": self.guard_values(t, x, u, p)["control"] > 0.0}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"mode": if_else(e["control"] == 0.0, x["mode"], e["control"] > 0.0)}
@@ -319,14 +330,18 @@ class PulseGenerator(Block):
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         pulses = floor(x["edges"] / 2.0)
         high = x["edges"] - 2.0 * pulses
-        return {"edge": t - (p["delay"] + (pulses + high * p["width"] / 100.0) * p["period"]) + JUST}
+        return {"edge": since(t, p["delay"] + (pulses + high * p["width"] / 100.0) * p["period"])}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         # k * period / period may come out a little below k.
         periods = (t - p["delay"]) / p["period"] * (1.0 + 1e-14)
         pulses = floor(periods)
         over = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)
-        return {"edges": if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + over)}
+        passed = if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + over)
+        return {"edges": fmax(passed, x["edges"] + self.contradictions(t, x, u, p)["edges"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"edges": self.guard_values(t, x, u, p)["edge"] > 0.0}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"edges": x["edges"] + (e["edge"] > 0.0)}

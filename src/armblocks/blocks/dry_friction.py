@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fabs, if_else, logic_and, logic_or, sign
+from casadi import SX, fabs, fmax, fmin, if_else, logic_and, logic_or, sign
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST, limits_in_order, zone
+from armblocks.blocks.switching import JUST, SMALLEST_JUMP, limits_in_order
 from armblocks.diagram import (
     Block,
     Guard,
@@ -76,8 +76,8 @@ class CoulombFriction(Block):
 class Backlash(Block):
     """Play between two parts: y rests while u moves within the play, and follows at its ends.
 
-    y' = u' while y = u - width/2 and u' > 0, or y = u + width/2 and u' < 0; else y' = 0. The input must be
-    continuous.
+    y' = u' while y = u - width/2 and u' > 0, or y = u + width/2 and u' < 0; else y' = 0. Where u jumps beyond
+    the play, y jumps with it.
     """
 
     family: ClassVar[str] = "discontinuities"
@@ -104,7 +104,7 @@ class Backlash(Block):
         return {"y": inputs["u"]}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("rest", inputs["u"], "where the driven part rests"),)
+        return (State("rest", inputs["u"], "the output just before the latest instant"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("mode", inputs["u"], "1 driven upwards, -1 downwards, 0 at rest"),)
@@ -131,16 +131,23 @@ class Backlash(Block):
             "turn": if_else(free, 0.0, u["u'"]),
         }
 
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"rest": self.outputs(t, x, u, p)["y"]}
+
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": zone(u["u"], x["rest"] - p["width"] / 2.0, x["rest"] + p["width"] / 2.0)}
+        ahead, half = u["u"] - x["rest"], p["width"] / 2.0
+        band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
+        by_place = if_else(ahead - half > 0.0, 1.0, if_else(ahead + half < 0.0, -1.0, 0.0))
+        # A driven part stops where u turns, or has jumped back; it is driven the other way if u has gone on.
+        released = logic_or(u["u'"] < 0.0, ahead < half - band)
+        released_down = logic_or(u["u'"] > 0.0, ahead > band - half)
+        upwards = if_else(released, fmin(by_place, 0.0), 1.0)
+        downwards = if_else(released_down, fmax(by_place, 0.0), -1.0)
+        return {"mode": if_else(x["mode"] > 0.0, upwards, if_else(x["mode"] < 0.0, downwards, by_place))}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        turned = logic_or(
-            logic_and(x["mode"] > 0.0, e["turn"] < 0.0), logic_and(x["mode"] < 0.0, e["turn"] > 0.0)
-        )
-        driven = if_else(e["upper"] > 0.0, 1.0, if_else(e["lower"] < 0.0, -1.0, x["mode"]))
-        rest = if_else(turned, u["u"] - x["mode"] * p["width"] / 2.0, x["rest"])
-        return {"mode": if_else(turned, 0.0, driven), "rest": rest}
+        happened = logic_or(e["turn"] != 0.0, logic_or(e["upper"] > 0.0, e["lower"] < 0.0))
+        return {"mode": if_else(happened, self.mode_values(t, x, u, p)["mode"], x["mode"])}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"rest": p["initial"]}

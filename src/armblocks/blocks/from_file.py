@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, vertcat
 
-from armblocks.blocks.switching import JUST
+from armblocks.blocks.switching import since
 from armblocks.diagram import (
     Block,
     Guard,
@@ -78,12 +78,17 @@ class FromFile(Block):
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         last = self._size[0] - 1.0
-        coming = t - self._entry(p, fmin(x["row"] + 1.0, last), 0) + JUST
+        coming = since(t, self._entry(p, fmin(x["row"] + 1.0, last), 0))
         return {"next": if_else(x["row"] < last, coming, -1.0)}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count, width = self._size
-        return {"row": last_at_or_below(p["data"].T, t, count=count, stride=width)}
+        now = last_at_or_below(p["data"].T, t, count=count, stride=width)
+        passed = self.contradictions(t, x, u, p)["row"]
+        return {"row": if_else(passed, fmax(now, x["row"] + 1.0), now)}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"row": self.guard_values(t, x, u, p)["next"] > 0.0}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"row": x["row"] + (e["next"] > 0.0)}

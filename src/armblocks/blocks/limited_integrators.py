@@ -145,7 +145,7 @@ class ResettableIntegrator(Block):
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         held = {"held": self._level(u) > 0.0} if self._by_level else {}
-        return {**held, **({"mode": _limit_side(x["x"], u, p)} if self.limit_output else {})}
+        return {**held, **({"mode": _limit_side(x["x"], x["mode"], u, p)} if self.limit_output else {})}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"kept": self._start(u, p)} if self.external_reset == "level hold" else {}
@@ -168,7 +168,7 @@ class ResettableIntegrator(Block):
             after["begun"] = SX(1.0)
         after["x"] = if_else(anew, start, after["x"])
         if self.limit_output:
-            after["mode"] = if_else(anew, _limit_side(after["x"], u, p), after["mode"])
+            after["mode"] = if_else(anew, _limit_side(after["x"], SX(0.0), u, p), after["mode"])
         return after
 
     @property
@@ -240,7 +240,7 @@ class IntegratorLimited(Block):
         return _limit_guard_values(x, u, p)
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": _limit_side(x["x"], u, p)}
+        return {"mode": _limit_side(x["x"], x["mode"], u, p)}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return _limited(x, p, e)
@@ -271,10 +271,12 @@ def _limit_guard_values(x: Signals, u: Signals, p: Signals) -> dict[str, SX]:
     }
 
 
-def _limit_side(x: SX, u: Signals, p: Signals) -> SX:
-    """The mode by the values of the moment."""
-    at_lower = logic_and(x <= p["lower"], u["u"] < 0.0)
-    at_upper = logic_and(x >= p["upper"], u["u"] > 0.0)
+def _limit_side(x: SX, mode: SX, u: Signals, p: Signals) -> SX:
+    """The consistent mode: a state at a limit stays there until its rate leads away from it."""
+    downwards = logic_or(u["u"] < 0.0, logic_and(mode < 0.0, u["u"] == 0.0))
+    upwards = logic_or(u["u"] > 0.0, logic_and(mode > 0.0, u["u"] == 0.0))
+    at_lower = logic_and(x <= p["lower"], downwards)
+    at_upper = logic_and(x >= p["upper"], upwards)
     return if_else(at_upper, 1.0, if_else(at_lower, -1.0, 0.0))
 
 
@@ -289,5 +291,6 @@ def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
     inner = if_else(freed, 0.0, x["mode"])
     return {
         "mode": if_else(upper, 1.0, if_else(lower, -1.0, inner)),
-        "x": if_else(upper, p["upper"], if_else(lower, p["lower"], x["x"])),
+        # Also where the mode follows from the values alone, a state a little beyond a limit is put onto it.
+        "x": fmin(fmax(x["x"], p["lower"]), p["upper"]),
     }

@@ -242,7 +242,10 @@ class LookupTableDynamic(Block):
         return self._axes(u["positions"]).guard_values(x, u)
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(u["positions"]).mode_values(u)
+        return self._axes(u["positions"]).mode_values(x, u)
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(u["positions"]).contradictions(x, u)
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return self._axes(u["positions"]).resets(x, u, e)

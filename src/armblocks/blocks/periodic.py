@@ -12,7 +12,7 @@ from typing import ClassVar
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST
+from armblocks.blocks.switching import since
 from armblocks.diagram import (
     Block,
     Guard,
@@ -51,7 +51,7 @@ def _look(t: SX, x: Signals, p: Signals, e: Signals) -> tuple[SX, SX, Signals]:
 
 
 def _look_guards(t: SX, x: Signals, p: Signals) -> Signals:
-    return {"instant": t - _instant(p, x["count"]) + JUST, "again": 0.5 - x["fresh"]}
+    return {"instant": since(t, _instant(p, x["count"])), "again": 0.5 - x["fresh"]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +161,7 @@ class PWM(Block):
         return dict.fromkeys(("count", "fresh", "duty", "high"), SX(0.0))
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        edge = t - _instant(p, x["count"] - 1.0 + x["duty"]) + JUST
+        edge = since(t, _instant(p, x["count"] - 1.0 + x["duty"]))
         return {**_look_guards(t, x, p), "edge": edge}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:

@@ -1,7 +1,8 @@
 """Limits on how fast a signal changes, in continuous time: each beginning and end of a limit is an event.
 
-The output y is a state. While it follows, y is u, and y' is u'; else y' is one of the two limits, until y and
-u meet again.
+While the output follows, it is u; else it is a state y with y' at one of the two limits, until y and u meet
+again. The output is continuous: ``kept`` is its left limit at the latest tick, event or breakpoint, so that
+a jump of u is seen as ``u - kept`` at that instant.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fabs, fmax, if_else, logic_and, logic_or
+from casadi import SX, fabs, fmax, if_else, logic_and, logic_or, sign
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST
+from armblocks.blocks.switching import SMALLEST_JUMP
 from armblocks.diagram import (
     Block,
     Guard,
@@ -27,10 +28,12 @@ from armblocks.diagram import (
     made,
     parameter,
 )
-from armblocks.equations import Shape
 
-SMALLEST_JUMP = 1e-6
-"""Of a rate limiter's input, beside its size: a smaller one is passed on."""
+APART = 1e-3
+"""A limiter that is switched on, in an enabled subsystem, follows an input that is nearer to its last output
+than this, beside its size."""
+SAME_INSTANT = 2.0**-50
+"""Times that differ less, beside their size, are one instant."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,31 +53,80 @@ class RateLimiting(Block):
         return {"y": inputs["u"]}
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("y", self.output_shapes(inputs)["y"], "the output"),)
+        return (State("y", self.output_shapes(inputs)["y"], "the output while it is at a limit"),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        kept = State("kept", self.output_shapes(inputs)["y"], "the output just before the latest instant")
+        return (kept, State("kept_at", (), "that instant", "s"))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (_mode(self.output_shapes(inputs)["y"]),)
+        doc = "1 rising at the limit, -1 falling at the limit, 0 following u"
+        return (State("mode", self.output_shapes(inputs)["y"], doc),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return _guards(self.output_shapes(inputs)["y"])
+        shape = self.output_shapes(inputs)["y"]
+        return (
+            Guard("gap", shape, "y meets u"),
+            Guard("fast", shape, "u' - rising"),
+            Guard("fast_down", shape, "u' - falling"),
+        )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": if_else(x["mode"] == 0.0, u["u"], x["y"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": _rate(x, u, self.limits(u, p))}
+        limits = self.limits(u, p)
+        limit = if_else(x["mode"] > 0.0, limits["rising"], limits["falling"])
+        return {"y": if_else(x["mode"] == 0.0, u["u'"], limit)}
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"y": p["initial"]}
+        return {"y": p["initial"], "kept": p["initial"], "kept_at": SX(0.0)}
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"kept": self.outputs(t, x, u, p)["y"], "kept_at": t}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return _guard_values(x, u, self.limits(u, p))
+        limits = self.limits(u, p)
+        return {
+            "gap": if_else(x["mode"] == 0.0, 0.0, u["u"] - x["y"]),
+            "fast": u["u'"] - limits["rising"],
+            "fast_down": u["u'"] - limits["falling"],
+        }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"mode": _mode_value(x, u, self.limits(u, p))}
+        # Where the block is switched on, y is what it gave last, and there may be no jump at this instant.
+        gap = u["u"] - x["y"]
+        apart = logic_and(x["mode"] == 0.0, fabs(gap) > APART * fmax(1.0, fabs(u["u"])))
+        return {"mode": if_else(apart, sign(gap), self._law(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"mode": self._law(t, x, u, p) != x["mode"]}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return _after(x, u, self.limits(u, p), e)
+        law = self._law(t, x, u, p)
+        fired = logic_or(e["gap"] != 0.0, logic_or(e["fast"] != 0.0, e["fast_down"] != 0.0))
+        leaves = logic_and(x["mode"] == 0.0, law != 0.0)
+        at_instant = fabs(t - x["kept_at"]) <= SAME_INSTANT * fabs(t)
+        return {
+            "mode": if_else(fired, law, x["mode"]),
+            "y": if_else(logic_and(leaves, at_instant), x["kept"], x["y"]),
+        }
+
+    def _law(self, t: SX, x: Signals, u: Signals, p: Signals) -> SX:
+        """The mode after this instant, from the one before it."""
+        limits, guards = self.limits(u, p), self.guard_values(t, x, u, p)
+        band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
+        too_fast, too_fast_down = guards["fast"] > 0.0, guards["fast_down"] < 0.0
+        by_rate = if_else(too_fast, 1.0, if_else(too_fast_down, -1.0, 0.0))
+        at_instant = fabs(t - x["kept_at"]) <= SAME_INSTANT * fabs(t)
+        jump = if_else(at_instant, u["u"] - x["kept"], 0.0)
+        follows = if_else(jump > band, 1.0, if_else(jump < -band, -1.0, by_rate))
+        gap = guards["gap"]
+        met = logic_and(gap <= 0.0, u["u'"] <= limits["rising"])
+        met_down = logic_and(gap >= 0.0, u["u'"] >= limits["falling"])
+        rises = if_else(gap < -band, -1.0, if_else(met, by_rate, 1.0))
+        falls = if_else(gap > band, 1.0, if_else(met_down, by_rate, -1.0))
+        return if_else(x["mode"] == 0.0, follows, if_else(x["mode"] > 0.0, rises, falls))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,56 +193,3 @@ class RateLimiterDynamic(RateLimiting):
 
     def limits(self, u: Signals, p: Signals) -> Signals:
         return u
-
-
-def _mode(shape: Shape) -> State:
-    return State("mode", shape, "1 rising at the limit, -1 falling at the limit, 0 following u")
-
-
-def _guards(shape: Shape) -> tuple[Guard, ...]:
-    return (
-        Guard("ahead", shape, "u leaves y upwards, or y has met it", 0),
-        Guard("behind", shape, "u leaves y downwards, or y has met it", 0),
-        Guard("fast", shape, "u' - rising", 1),
-        Guard("fast_down", shape, "u' - falling", -1),
-    )
-
-
-def _rate(x: Signals, u: Signals, limits: Signals) -> SX:
-    limit = if_else(x["mode"] > 0.0, limits["rising"], limits["falling"])
-    return if_else(x["mode"] == 0.0, u["u'"], limit)
-
-
-def _guard_values(x: Signals, u: Signals, limits: Signals) -> Signals:
-    gap = u["u"] - x["y"]
-    # While it follows, y is u but for rounding: what is wider is a jump.
-    band = if_else(x["mode"] == 0.0, SMALLEST_JUMP * fmax(1.0, fabs(u["u"])), 0.0)
-    return {
-        "ahead": gap - band - JUST,
-        "behind": gap + band + JUST,
-        "fast": u["u'"] - limits["rising"] - JUST,
-        "fast_down": u["u'"] - limits["falling"] + JUST,
-    }
-
-
-def _mode_value(x: Signals, u: Signals, limits: Signals) -> SX:
-    gap = u["u"] - x["y"]
-    band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
-    up = logic_or(gap > band, logic_and(gap >= -band, u["u'"] > limits["rising"]))
-    down = logic_or(gap < -band, logic_and(gap <= band, u["u'"] < limits["falling"]))
-    return if_else(up, 1.0, if_else(down, -1.0, 0.0))
-
-
-def _after(x: Signals, u: Signals, limits: Signals, e: Signals) -> Signals:
-    """Mode and output after events."""
-    follows = x["mode"] == 0.0
-    up = logic_and(follows, logic_or(e["ahead"] > 0.0, e["fast"] > 0.0))
-    down = logic_and(follows, logic_or(e["behind"] < 0.0, e["fast_down"] < 0.0))
-    met = logic_or(
-        logic_and(x["mode"] > 0.0, logic_or(e["ahead"] < 0.0, e["behind"] < 0.0)),
-        logic_and(x["mode"] < 0.0, logic_or(e["ahead"] > 0.0, e["behind"] > 0.0)),
-    )
-    # Where it meets u on its way, u may be too fast the other way.
-    after = if_else(u["u'"] > limits["rising"], 1.0, if_else(u["u'"] < limits["falling"], -1.0, 0.0))
-    mode = if_else(up, 1.0, if_else(down, -1.0, if_else(met, after, x["mode"])))
-    return {"mode": mode, "y": if_else(logic_and(met, mode == 0.0), u["u"], x["y"])}

@@ -16,7 +16,7 @@ from casadi import SX, dot, floor, fmax, if_else, sin, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.interpolation import cells, weights
-from armblocks.blocks.switching import JUST
+from armblocks.blocks.switching import since
 from armblocks.blocks.table_axes import rising
 from armblocks.diagram import (
     Block,
@@ -78,10 +78,18 @@ class SignalGenerator(Block):
         return {"y": p["amplitude"] * (1.0 - 2.0 * (t - x["edges"] * self._spacing(p)) / self._spacing(p))}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {} if self.waveform == "sine" else {"edge": t - (x["edges"] + 1.0) * self._spacing(p) + JUST}
+        return {} if self.waveform == "sine" else {"edge": since(t, (x["edges"] + 1.0) * self._spacing(p))}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {} if self.waveform == "sine" else {"edges": floor(t / self._spacing(p) * _ROUNDED)}
+        if self.waveform == "sine":
+            return {}
+        passed = floor(t / self._spacing(p) * _ROUNDED)
+        return {"edges": fmax(passed, x["edges"] + self.contradictions(t, x, u, p)["edges"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.waveform == "sine":
+            return {}
+        return {"edges": self.guard_values(t, x, u, p)["edge"] > 0.0}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {} if self.waveform == "sine" else {"edges": x["edges"] + (e["edge"] > 0.0)}
@@ -134,14 +142,18 @@ class RepeatingSequence(Block):
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
         periods, here = self._piece(x["pieces"])
-        return {"corner": t - (periods * times[-1] + dot(here, SX(times[1:]))) + JUST}
+        return {"corner": since(t, periods * times[-1] + dot(here, SX(times[1:])))}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         times = _numbers(self.times)
         periods = floor(t / times[-1] * _ROUNDED)
         into = (t - periods * times[-1]) + 1e-14 * t
         passed = sum((into >= corner for corner in times[1:-1]), SX(0.0))
-        return {"pieces": periods * (len(times) - 1) + passed}
+        passed = periods * (len(times) - 1) + passed
+        return {"pieces": fmax(passed, x["pieces"] + self.contradictions(t, x, u, p)["pieces"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"pieces": self.guard_values(t, x, u, p)["corner"] > 0.0}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"pieces": x["pieces"] + (e["corner"] > 0.0)}

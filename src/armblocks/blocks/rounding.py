@@ -9,7 +9,7 @@ from typing import ClassVar
 from casadi import SX, ceil, fabs, floor, fmax, fmin, fmod, if_else, logic_and, sign
 
 from armblocks.blocks.elementwise import common_unit
-from armblocks.blocks.switching import JUST, zero_crossing_parameter
+from armblocks.blocks.switching import JUST, beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
     Guard,
@@ -106,7 +106,13 @@ class Rounding(Block):
         }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"integer": _ROUNDINGS[self.function](u["u"])} if self.zero_crossing else {}
+        if not self.zero_crossing:
+            return {}
+        now = _ROUNDINGS[self.function](u["u"])
+        return {"integer": cell_of(now, x["integer"], self.guard_values(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"integer": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not self.zero_crossing:
@@ -155,7 +161,13 @@ class Modulo(Block):
         return turn_guard_values(self.function, u["u"], u["v"], x["turns"]) if self.zero_crossing else {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"turns": turns_of(self.function, u["u"], u["v"])} if self.zero_crossing else {}
+        if not self.zero_crossing:
+            return {}
+        now = turns_of(self.function, u["u"], u["v"])
+        return {"turns": cell_of(now, x["turns"], self.guard_values(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         if not self.zero_crossing:
@@ -204,7 +216,9 @@ def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
     rule = _QUOTIENTS[function]
     edge, owned = _rounding_edges(rule, turns)
     below, below_owned = _rounding_edges(rule, -turns, mirrored=True)
-    return {
+    found = {
         "up": (u - edge * v) * sign(v) + if_else(owned, JUST, -JUST),
         "down": (u + below * v) * sign(v) - if_else(below_owned, JUST, -JUST),
     }
+    # Nothing is taken away by a divisor of zero, and no turn ends.
+    return {name: if_else(v == 0.0, 0.0, value) for name, value in found.items()}

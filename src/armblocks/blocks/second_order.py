@@ -174,17 +174,36 @@ class SecondOrderIntegratorLimited(Block):
         }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        at_upper = logic_and(x["x"] >= p["upper"], logic_and(x["dx"] >= 0.0, u["u"] > 0.0))
-        at_lower = logic_and(x["x"] <= p["lower"], logic_and(x["dx"] <= 0.0, u["u"] < 0.0))
-        fast = logic_and(x["dx"] >= p["upper_speed"], u["u"] > 0.0)
-        fast_back = logic_and(x["dx"] <= p["lower_speed"], u["u"] < 0.0)
+        still = u["u"] == 0.0
+
+        def driven(mode: SX) -> tuple[SX, SX]:
+            """Towards the upper limit, the lower one; a mode at a limit lasts until u leads away from it."""
+            upwards = logic_or(u["u"] > 0.0, logic_and(mode > 0.0, still))
+            return upwards, logic_or(u["u"] < 0.0, logic_and(mode < 0.0, still))
+
+        up, down = driven(x["rests"])
+        at_upper = logic_and(x["x"] >= p["upper"], logic_and(x["dx"] >= 0.0, up))
+        at_lower = logic_and(x["x"] <= p["lower"], logic_and(x["dx"] <= 0.0, down))
+        up, down = driven(x["fastest"])
+        fast = logic_and(x["dx"] >= p["upper_speed"], up)
+        fast_back = logic_and(x["dx"] <= p["lower_speed"], down)
         return {
             "rests": if_else(at_upper, 1.0, if_else(at_lower, -1.0, 0.0)),
             "fastest": if_else(fast, 1.0, if_else(fast_back, -1.0, 0.0)),
         }
 
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        found = dict(super().contradictions(t, x, u, p))
+        found["rests"] = logic_or(found["rests"], logic_or(*self._impacts(x, p)))
+        return found
+
+    def _impacts(self, x: Signals, p: Signals) -> tuple[SX, SX]:
+        """Whether the speed leads beyond the upper limit, the lower one, at which the state stands."""
+        upper = logic_and(x["x"] >= p["upper"], x["dx"] > 0.0)
+        return upper, logic_and(x["x"] <= p["lower"], x["dx"] < 0.0)
+
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        at_upper, at_lower = e["upper"] > 0.0, e["lower"] < 0.0
+        at_upper, at_lower = self._impacts(x, p)
         hits = logic_or(at_upper, at_lower)
         bounced = fmin(fmax(u["dx0"] if self.reinitialize else SX(0.0), p["lower_speed"]), p["upper_speed"])
         # Away from the limit, or not worth it.

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from casadi import SX, if_else, logic_or
+from casadi import SX, fmax, fmin, if_else, logic_or
 
 from armblocks.diagram import (
     Block,
@@ -20,6 +20,21 @@ from armblocks.errors import InputError
 
 JUST = 1e-300
 """Beside a threshold by less than any signal can tell: it gives the threshold itself a side."""
+
+
+SMALLEST_JUMP = 1e-9
+"""A smaller jump of a signal, beside its size, cannot be told from rounding by a block that looks for one."""
+_SAME_INSTANT = 1.0 + 2.0**-51
+"""Half of what the numerics take for one instant."""
+
+
+def since(t: SX, instant: SX) -> SX:
+    """The time since an instant that follows from parameters (s), positive from it on: a guard.
+
+    An instant that is rounded, such as 5 times 0.2 s, and a recorded time or a tick that is rounded otherwise
+    are one instant: the guard is positive two units in the last place before it.
+    """
+    return t * _SAME_INSTANT - instant + JUST
 
 
 def zero_crossing_parameter() -> Any:
@@ -47,8 +62,24 @@ def limits_in_order(block: Block, lower: str, upper: str) -> None:
 
 
 def zone(u: SX, lower: SX, upper: SX) -> SX:
-    """-1 below both limits, 1 above, 0 between."""
-    return if_else(u > upper, 1.0, if_else(u < lower, -1.0, 0.0))
+    """-1 below both limits, 1 above, 0 between.
+
+    It compares the same differences as the guards ``u - upper`` and ``u - lower``: where a product and this
+    subtraction become one rounded operation, mode and guard still agree.
+    """
+    return if_else(u - upper > 0.0, 1.0, if_else(u - lower < 0.0, -1.0, 0.0))
+
+
+def beyond(guards: Signals, up: str = "up", down: str = "down") -> SX:
+    """Whether a signal has left the cell that a mode counts, by the guards at both ends of the cell."""
+    return logic_or(guards[up] > 0.0, guards[down] < 0.0)
+
+
+def cell_of(now: SX, before: SX, guards: Signals, up: str = "up", down: str = "down") -> SX:
+    """The consistent cell: ``now`` by the values of the moment, another one than ``before`` where the signal
+    is beyond the cell, also where rounding does not tell that by ``now``."""
+    left = if_else(guards[down] < 0.0, fmin(now, before - 1.0), now)
+    return if_else(guards[up] > 0.0, fmax(now, before + 1.0), left)
 
 
 def zone_after(mode: SX, e: Signals) -> SX:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.blocks.interpolation import borders, contract, weights
 from armblocks.blocks.long_tables import inputs_with, is_spline
 from armblocks.blocks.splines import spline_corners, with_slopes
-from armblocks.blocks.switching import JUST
+from armblocks.blocks.switching import JUST, beyond, cell_of
 from armblocks.diagram import Block, Guard, Parameter, Shapes, Signals, State, shape_of
 from armblocks.equations import Shape, flatten, last_at_or_below, read_entry
 from armblocks.errors import InputError
@@ -237,9 +237,18 @@ class Axes:
             found[f"down{k}"] = by_element(place, axis.to_last) + JUST
         return found
 
-    def mode_values(self, u: Signals) -> Signals:
+    def mode_values(self, x: Signals, u: Signals) -> Signals:
         """The cells by the values of the moment."""
-        return {f"cell{k}": by_element([u[port]], axis.cell) for port, k, axis in self._moving()}
+        guards = self.guard_values(x, u)
+        return {
+            f"cell{k}": cell_of(by_element([u[port]], axis.cell), x[f"cell{k}"], guards, f"up{k}", f"down{k}")
+            for port, k, axis in self._moving()
+        }
+
+    def contradictions(self, x: Signals, u: Signals) -> Signals:
+        """Whether a position is beyond its cell."""
+        guards = self.guard_values(x, u)
+        return {f"cell{k}": beyond(guards, f"up{k}", f"down{k}") for _, k, _ in self._moving()}
 
     def cell(self, port: str, x: Signals, u: Signals) -> SX:
         """The cell along one axis: the mode, or by the values of the moment."""
@@ -317,7 +326,10 @@ class BlockWithAxes(Block):
         return self._axes(p).guard_values(x, u)
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return self._axes(p).mode_values(u)
+        return self._axes(p).mode_values(x, u)
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(p).contradictions(x, u)
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return self._axes(p).resets(x, u, e)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from armblocks.compiler.hybrid_functions import call_guards
 from armblocks.compiler.integrator_workspace import Count, Real, Status
 from armblocks.compiler.ir_text import number_text
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
 """Two times within these factors of one another are the same instant."""
+
+TURNS_TOGETHER, MOST_TURNS = 8, 32
+"""Modes are changed together in so many turns, and one for each mode; in all, so many turns for each mode."""
 
 
 class Happenings:
@@ -46,14 +50,22 @@ class Happenings:
         w.place(on)
 
     def captures(self, time: str) -> None:
-        """What keeps how things were just before this instant, from the flow with the old ``z``."""
+        """What keeps how things were just before this instant, from the flow with the old ``z``.
+
+        Nothing was before the start: there it keeps its start values.
+        """
         loop, w, places = self.loop, self.loop.w, self.loop.places
         zero = number_text(0.0)
+        capture, on = w.fresh("capture"), w.fresh("captured")
+        begins = w.word_test("ne", w.get(w.at("%counts", Count.SETTLE, "i64"), "i64"), "0")
+        w.branch(begins, on, capture)
+        w.place(capture)
         for clock in range(len(loop.sizes.clocks)):
             w.put(zero, loop.at(places.ticking + clock))
         before = w.from_bits(w.word_op("sub", w.bits(time), "1"))
         w.put(w.select(w.compare("ogt", time, zero), before, time), loop.instant)
         self.update()
+        w.place(on)
 
     def update(self) -> None:
         """``z`` becomes what ``update`` gives for the clocks that are marked."""
@@ -135,35 +147,83 @@ class Happenings:
         w.place(on)
 
     def fire(self, time: str) -> None:
-        """Fire guards until none fires any more."""
+        """Fire guards and make modes consistent, in turns, until nothing is left to change.
+
+        In a turn in which guards fire, ``reset`` is told which. Where none fires and modes contradict their
+        conditions, they take their consistent values: all of them at once in the first turns, then the first
+        of them alone, which ends for every complementarity problem with a P-matrix (Murty 1974, the least
+        index rule). Where that does not end either, no choice of the modes is consistent.
+        """
         loop, w, places = self.loop, self.loop.w, self.loop.places
-        turn, fire, settled, on = (w.fresh(stem) for stem in ("guards", "fire", "settled", "on"))
+        modes = len(loop.sizes.modes)
+        turn, act, settled, on = (w.fresh(stem) for stem in ("guards", "fire", "settled", "on"))
+        turns = w.variable("i64", "0")
         w.place(turn)
-        fired = loop.watch(time, places.x)
+        changes = loop.watch(time, places.x)
         w.do("call void @take_signs(ptr %reals, i1 false)")
         loop.copy(places.guards, places.guards_before, loop.guards)
         unknown = number_text(float("nan"))
         w.for_each(loop.guards, lambda i: w.put(unknown, loop.step.element(places.guard_slopes, i)))
-        w.branch(w.word_test("eq", fired, "0"), settled, fire)
-        w.place(fire)
+        w.branch(w.word_test("eq", changes, "0"), settled, act)
+        w.place(act)
         w.put("1", loop.counts[Count.FRESH], "i64")
-        bound = w.let(f"call double @note_events(double {time}, ptr %reals, ptr %counts)")
-        w.put(bound, loop.kept[Real.BOUND])
-        # A negative bound is how the count of events says that there is no end to them.
-        loop.leave_unless(w.compare("oge", bound, number_text(0.0)), Status.ENDLESS_EVENTS)
-        arguments = (places.x, places.z, places.trial_w)
-        x, z, unknowns = (f"ptr {loop.at(place)}" for place in arguments)
-        e, new_x, new_z = (f"ptr {loop.at(place)}" for place in (places.fired, places.new_x, places.new_z))
-        w.do(f"call void @reset(ptr {loop.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
-        loop.copy(places.new_x, places.x, loop.n)
-        loop.copy(places.new_z, places.z, loop.sizes.discrete)
+        # A turn counts as a step, so that a call of few steps ends soon also where there are many events.
+        w.increase(loop.taken)
+        if modes:
+            event, first, more, reset = (w.fresh(stem) for stem in ("event", "first", "more", "reset"))
+            quiet = w.fresh("quiet")
+            w.branch(w.let("call i1 @any_fired(ptr %reals)"), event, quiet)
+            w.place(quiet)
+            before = w.get(turns, "i64")
+            w.increase(turns)
+            w.branch(w.word_test("eq", before, "0"), first, more)
+            w.place(first)
+            self.count_events(time, bounds=False)
+            w.jump(more)
+            w.place(more)
+            loop.leave_unless(
+                w.word_test("slt", w.get(turns, "i64"), str(MOST_TURNS * modes)), Status.INCONSISTENT_MODES
+            )
+            w.jump(reset)
+            w.place(event)
+            self.count_events(time, bounds=True)
+            w.jump(reset)
+            w.place(reset)
+        else:
+            self.count_events(time, bounds=True)
+        self.reset(quiet_turns=turns if modes else None)
         # Guards that fired take the sign that the reset gives them; the others keep theirs, to be compared.
         loop.emit_solve(loop.instant, loop.at(places.x))
-        arguments = (places.x, places.z, places.trial_w)
-        x, z, unknowns = (f"ptr {loop.at(place)}" for place in arguments)
-        g = f"ptr {loop.at(places.guards)}"
-        w.do(f"call void @guards(ptr {loop.instant}, {x}, {z}, {unknowns}, ptr %p, {g})")
+        call_guards(w, places, modes, loop.instant, loop.at(places.x))
         w.do("call void @take_signs(ptr %reals, i1 true)")
         w.jump(turn)
         w.place(settled)
         w.place(on)
+
+    def count_events(self, time: str, *, bounds: bool) -> None:
+        """Leave where events follow one another without end; the first step after an event is short."""
+        loop, w = self.loop, self.loop.w
+        bound = w.let(f"call double @note_events(double {time}, ptr %reals, ptr %counts)")
+        if bounds:
+            w.put(bound, loop.kept[Real.BOUND])
+        # A negative bound is how the count of events says that there is no end to them.
+        loop.leave_unless(w.compare("oge", bound, number_text(0.0)), Status.ENDLESS_EVENTS)
+
+    def reset(self, quiet_turns: str | None) -> None:
+        """States and discrete variables after the events that are marked, or with consistent modes."""
+        loop, w, places = self.loop, self.loop.w, self.loop.places
+        arguments = (places.x, places.z, places.trial_w)
+        x, z, unknowns = (f"ptr {loop.at(place)}" for place in arguments)
+        e, new_x, new_z = (f"ptr {loop.at(place)}" for place in (places.fired, places.new_x, places.new_z))
+        w.do(f"call void @reset(ptr {loop.instant}, {x}, {z}, {unknowns}, ptr %p, {e}, {new_x}, {new_z})")
+        if quiet_turns is not None:
+            hold, done = w.fresh("hold"), w.fresh("held")
+            w.branch(w.let("call i1 @any_fired(ptr %reals)"), done, hold)
+            w.place(hold)
+            together = TURNS_TOGETHER + len(loop.sizes.modes)
+            one_by_one = w.word_test("sgt", w.get(quiet_turns, "i64"), str(together))
+            w.do(f"call void @hold_modes(ptr %reals, i1 {one_by_one})")
+            w.jump(done)
+            w.place(done)
+        loop.copy(places.new_x, places.x, loop.n)
+        loop.copy(places.new_z, places.z, loop.sizes.discrete)

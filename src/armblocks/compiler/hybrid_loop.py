@@ -6,7 +6,8 @@ At an instant (a tick, an event, a breakpoint, the start) things happen in this 
    keeps left limits, ``update`` is called for that with no clock marked;
 2. all clocks that tick now are marked and ``update`` gives ``z``;
 3. guards whose sign the jump has changed fire, and so do those whose zero was located here; ``reset`` gives
-   ``x`` and ``z``; this is repeated until none fires;
+   ``x`` and ``z``; this is repeated until none fires; then modes that contradict their conditions take their
+   consistent values, and all this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
 5. the integration starts anew. The first step after an event is at most a hundredth of the time since the
    event before it, and later ones grow tenfold at most: no step leaps over a bounce that is getting shorter.
@@ -17,7 +18,8 @@ although their doubles differ, and a breakpoint or a recorded instant coincides 
 
 A guard fires where its sign is the opposite of the one it had after the last step, tick or event, in a step
 that its direction allows. A zero takes no side: a guard that is zero keeps its last sign, and one that is
-zero right after it fired, or at the start, counts with the sign it takes first.
+zero at the start counts with the sign that it takes first. Right after it fired, a zero guard of one
+direction is on the side that it came from, and one of both directions counts with the sign it takes first.
 """
 
 from __future__ import annotations
@@ -194,6 +196,11 @@ class HybridLoop(Loop):
         w = self.w
         time = w.get(self.kept[Real.TIME])
         until = w.multiply(time, number_text(SAME_ABOVE))
+        # A record that is one instant with a tick or breakpoint is of that instant. An event is located to
+        # the last place: what is recorded later comes later.
+        known = w.compare("oge", time, w.multiply(w.get(self.end), number_text(SAME_BELOW)))
+        recorded = w.variable("double", time)
+        w.put(w.select(known, until, time), recorded)
         if self.sizes.captures:
             self.happenings.captures(time)
         if self.delays:
@@ -203,6 +210,7 @@ class HybridLoop(Loop):
             self.happenings.settle(time)
             self.happenings.fire(time)
         else:
+            w.put("0", w.at("%counts", Count.SETTLE, "i64"), "i64")
             w.put(time, self.instant)
             self.emit_solve(self.instant, self.at(self.places.x))
         if self.delays:
@@ -211,7 +219,7 @@ class HybridLoop(Loop):
             self.keep(self.instant, self.at(self.places.x), "keep_change")
             w.do(f"call void @arrive(double {time}, ptr %reals, ptr %counts)")
         self.accept_unknowns()
-        self.emit_samples(time, until, None)
+        self.emit_samples(time, w.get(recorded), None)
         if self.sizes.stops:
             self.happenings.stop(time)
         finished = w.word_test("slt", w.get(self.counts[Count.SEGMENT], "i64"), self.segments)
@@ -340,7 +348,17 @@ class HybridLoop(Loop):
         if self.guards:
             self.emit_search(time, h)
         new_time = w.get(self.new_time)
-        self.emit_samples(time, w.multiply(new_time, number_text(SAME_BELOW)), h)
+        before = w.multiply(new_time, number_text(SAME_BELOW))
+        if self.guards:
+            # An event is located to the last place: a record before it shows what was before it, unless a
+            # tick or breakpoint is at this instant as well.
+            apart = w.both(
+                w.word_test("ne", w.get(self.event, "i64"), "0"),
+                w.compare("olt", new_time, w.multiply(w.get(self.end), number_text(SAME_BELOW))),
+            )
+            just_before = w.from_bits(w.word_op("sub", w.bits(new_time), "1"))
+            before = w.select(apart, just_before, before)
+        self.emit_samples(time, before, h)
         if self.delays:
             self.emit_past(time, new_time, h)
         step.copy(step.y, step.x)
@@ -412,8 +430,11 @@ class HybridLoop(Loop):
         a = w.get(low)
         middle = w.fma(number_text(0.5), w.get(scan), a)
         reached = w.add(a, w.get(scan))
-        # What would leave less than half a stretch goes along with it.
+        # What would leave less than half a stretch goes along with it, and so does all that is left where the
+        # middle of a stretch cannot be told from its ends.
         whole = w.compare("oge", w.fma(number_text(0.5), w.get(scan), reached), end)
+        apart = w.both(w.compare("ogt", middle, a), w.compare("olt", middle, reached))
+        whole = w.either(whole, w.let(f"xor i1 {apart}, true"))
         middle = w.select(whole, w.fma(number_text(0.5), w.subtract(end, a), a), middle)
         reached = w.select(whole, end, reached)
         w.put(middle, high)
@@ -540,9 +561,10 @@ class HybridLoop(Loop):
         return self.watch(self.w.minimum(instant, self.w.get(self.clamp)), self.places.new_x)
 
     def emit_bisection(self, low: str, high: str, time: str, h: str) -> None:
-        """Move ``high`` to the first instant, within 4 units in the last place, at which a guard has fired.
+        """Move ``high`` to the first instant, to the last place, at which a guard has fired.
 
-        None has at ``low``, some has at ``high``.
+        None has at ``low``, some has at ``high``. Instants within four units in the last place are one
+        instant: located to the last place, an event at a recorded instant or a tick belongs to it.
         """
         w = self.w
         turn, evaluate, before, after, located = (
@@ -553,8 +575,7 @@ class HybridLoop(Loop):
         width = w.subtract(b, a)
         middle = w.fma(number_text(0.5), width, a)
         inside = w.both(w.compare("ogt", middle, a), w.compare("olt", middle, b))
-        wide = w.compare("ogt", width, w.multiply(b, number_text(2.0**-50)))
-        w.branch(w.both(inside, wide), evaluate, located)
+        w.branch(inside, evaluate, located)
         w.place(evaluate)
         w.branch(w.word_test("eq", self.watch_inside(middle, time, h), "0"), before, after)
         w.place(before)

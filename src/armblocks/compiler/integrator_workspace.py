@@ -28,6 +28,8 @@ class Status(IntEnum):
     """A guard that ends the run is positive; what holds then is recorded."""
     CRAWLING = 8
     """Steps so short that what changes in one is within the tolerance, and far more to come."""
+    INCONSISTENT_MODES = 9
+    """No choice of the modes is consistent with the signals that follow from it."""
 
 
 class Real(IntEnum):
@@ -82,7 +84,7 @@ class Count(IntEnum):
     EVENTS = 11
     """Events so far."""
     CLOSE = 12
-    """Events in a row that are as good as at one instant."""
+    """Events in a row that follow one another closely and do not come to an end."""
     GUARD = 13
     """The guard that fired last, counted from 1."""
     SAVED = 14
@@ -134,7 +136,7 @@ class LoopSizes:
 
     ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
     those that end the run where they are positive. ``captures``: whether ``update`` is also called just
-    before every instant.
+    before every instant. ``modes``: the places of the modes in ``z``.
     """
 
     states: int
@@ -145,6 +147,7 @@ class LoopSizes:
     directions: tuple[int, ...] = ()
     stops: tuple[int, ...] = ()
     captures: bool = False
+    modes: tuple[int, ...] = ()
 
     @property
     def hybrid(self) -> bool:
@@ -161,11 +164,13 @@ class Workspace:
     implicit equations at the point evaluated last, ``guards``, those at the beginning and in the middle of
     the stretch that is looked at (``guards_before``, ``guards_middle``), how fast they changed at the end of
     the stretch before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet),
-    ``fired``, when each fired last (``last``), how long after the time before (``gap``) and how often in a
-    row this became shorter (``shrinking``); ``ticking``; and for Newton's method ``residual``, ``jacobian``,
-    ``before``, and ``pivots`` and ``swaps`` (integers) of its elimination. For delayed signals: how long each
-    is delayed (``taus``), between which bounds (``bounds``: all shortest, all longest), the ``longest`` of
-    all; the ``past`` comes behind everything.
+    ``fired``, when each fired last (``last``), how long after the time before (``gap``), how often in a row
+    this became shorter (``shrinking``), and how often it fired among the latest events that follow one
+    another closely (``repeats``); ``contradictions``, not 0 for the modes that contradict their conditions;
+    ``ticking``; and for Newton's method ``residual``, ``jacobian``, ``before``, and ``pivots`` and ``swaps``
+    (integers) of its elimination. For delayed signals: how long each is delayed (``taus``), between which
+    bounds (``bounds``: all shortest, all longest), the ``longest`` of all; the ``past`` comes behind
+    everything.
     """
 
     def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
@@ -180,14 +185,16 @@ class Workspace:
         self.new_z = self.new_x + n
         self.trial_w = self.new_z + nz
         self.guards = self.trial_w + nw
-        self.guards_before = self.guards + ng
+        self.contradictions = self.guards + ng
+        self.guards_before = self.contradictions + len(sizes.modes)
         self.guards_middle = self.guards_before + ng
         self.guard_slopes = self.guards_middle + ng
         self.signs = self.guard_slopes + ng
         self.fired = self.signs + ng
         self.last = self.fired + ng
         self.gap = self.last + ng
-        self.shrinking = self.gap + ng
+        self.repeats = self.gap + ng
+        self.shrinking = self.repeats + ng
         self.ticking = self.shrinking + ng
         self.residual = self.ticking + len(sizes.clocks)
         self.jacobian = self.residual + nw

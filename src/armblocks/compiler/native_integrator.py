@@ -409,6 +409,20 @@ class Integration:
         return float(self.reals[self.integrator.workspace.last + guard])
 
     @property
+    def repeating_guards(self) -> list[int]:
+        """The guards that fired in most of the latest events that follow one another closely."""
+        places, count = self.integrator.workspace, len(self.integrator.sizes.directions)
+        repeats = self.reals[places.repeats : places.repeats + count]
+        return [int(k) for k in np.flatnonzero((repeats > 0.0) & (repeats >= 0.5 * repeats.max(initial=0.0)))]
+
+    @property
+    def contradicting_modes(self) -> list[int]:
+        """The places in ``z`` of the modes that contradict their conditions."""
+        places, modes = self.integrator.workspace, self.integrator.sizes.modes
+        found = self.reals[places.contradictions : places.contradictions + len(modes)]
+        return [place for place, contradicts in zip(modes, found) if contradicts]
+
+    @property
     def last_guard(self) -> int:
         """The guard that fired last; -1 before any did."""
         return int(self.counts[Count.GUARD]) - 1

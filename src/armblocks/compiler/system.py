@@ -120,6 +120,7 @@ class CompiledSystem:
             directions=tuple(int(direction) for direction in description["guard_directions"]),
             stops=tuple(k for k, action in enumerate(description["guard_actions"]) if action in ENDING),
             captures=bool(description["captures"]),
+            modes=tuple(int(place) for place in description["modes"]),
         )
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = dict(description["digests"])
@@ -274,6 +275,9 @@ class CompiledSystem:
 def _functions(system: HybridSystem) -> dict[str, TracedFunction]:
     """All functions of a system by name."""
     functions: dict[str, TracedFunction] = {name: getattr(system, name) for name in _FUNCTIONS}
+    if system.contradictions is not None:
+        # One native function, because both need the same signals.
+        functions["guards"] = system.guards.joined(system.contradictions)
     if system.delays is not None:
         functions["delay_inputs"] = system.delays.inputs
         functions["delay_times"] = system.delays.times
@@ -293,6 +297,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "algebraic": slots_to_json(system.algebraic),
         "clocks": [[clock.period, clock.offset] for clock in system.clocks],
         "captures": system.captures,
+        "modes": list(system.modes),
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
         "guard_actions": list(system.guard_actions),

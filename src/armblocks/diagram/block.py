@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar, Self
 
-from casadi import SX
+from casadi import SX, logic_or
 
 from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formula_value
 from armblocks.diagram.parameter import Parameter, Value, shape_of
@@ -332,8 +332,22 @@ class Block(ABC):
         return {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """What every mode has to be at this moment, by the values alone (``x`` has the modes as they are)."""
+        """The consistent value of every mode at this moment.
+
+        It follows from the values of the moment. ``x`` has the modes as they are, for modes with a memory.
+        """
         return {}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """By mode, 1 where the mode is not consistent with the values of this moment, else 0.
+
+        A mode that contradicts its condition takes the value of :meth:`mode_values`: after every jump, and at
+        the first instant of a step at which it does. By default a mode contradicts wherever it differs from
+        that value. Blocks override this where a mode is allowed to differ (hysteresis, counted edges), or
+        where its value costs more than the question.
+        """
+        found = self.mode_values(t, x, u, p)
+        return {name: logic_or(value > x[name], value < x[name]) for name, value in found.items()}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         """New values of those states and modes that an event may change.

@@ -34,6 +34,7 @@ class SlotKind(Enum):
     UPDATE = "update"
     GUARD = "guard value"
     MODE = "mode value"
+    CONTRADICTION = "contradiction of a mode"
     RESET = "reset"
     DELAYED = "delayed signal"
     DELAYED_RATE = "slope of a delayed signal"
@@ -248,6 +249,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     quantities: Signals = block.condition_values(t, x, u, p) if located else {}
     sides = {entry.name: _sided(quantities[entry.name], entry.closed) for entry in located}
     answers = {entry.name: _positive(quantities[entry.name], entry.closed) for entry in located}
+    wrong = {name: SX(answer) != x[name] for name, answer in answers.items()}
 
     state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
     resets = dict(block.resets(t, x, u, p, e))
@@ -262,6 +264,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.UPDATE: {state.name: state.shape for state in discrete if structure.clocked},
         SlotKind.GUARD: {guard.name: guard.shape for guard in guards},
         SlotKind.MODE: {mode.name: mode.shape for mode in modes},
+        SlotKind.CONTRADICTION: {mode.name: mode.shape for mode in modes},
         SlotKind.RESET: {name: state_shapes[name] for name in resets if name in state_shapes},
         SlotKind.DELAYED: {line.name: line.shape for line in lines},
         SlotKind.DELAYED_RATE: {line.name: line.shape for line in lines},
@@ -275,6 +278,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.UPDATE: block.updates(t, x, u, p),
         SlotKind.GUARD: {**block.guard_values(t, x, u, p), **sides},
         SlotKind.MODE: {**block.mode_values(t, x, u, p), **answers},
+        SlotKind.CONTRADICTION: {**block.contradictions(t, x, u, p), **wrong},
         SlotKind.RESET: resets,
         SlotKind.DELAYED: {line.name: u[line.input] for line in lines},
         SlotKind.DELAYED_RATE: {line.name: u[f"{line.input}'"] for line in lines},

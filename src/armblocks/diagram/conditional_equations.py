@@ -136,6 +136,11 @@ class ConditionalBlock(Block):
         found = self.block.mode_values(*self._arguments(t, x, u, p))
         return {**found, _WORKS: u[ON] != 0.0} if _WORKS in x else found
 
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # The modes of a block that is off stand still; when it is switched on, `resets` gives all of them.
+        found = self._while_on(u, self.block.contradictions(*self._arguments(t, x, u, p)))
+        return {**found, _WORKS: (u[ON] != 0.0) != x[_WORKS]} if _WORKS in x else found
+
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         captured = self.block.captures(*self._arguments(t, x, u, p))
         return self._while_on(u, captured, x)

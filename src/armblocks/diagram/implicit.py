@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import casadi
 import numpy as np
-from casadi import SX, Function, densify, depends_on, jacobian, substitute, symvar
+from casadi import SX, Function, densify, depends_on, jacobian, substitute, symvar, vertcat
 from numpy.typing import NDArray
 
 from armblocks.diagram.components import strongly_connected
@@ -25,10 +26,10 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
     solution, remaining = SX(w), list[int]()
     circles: list[tuple[list[int], SX]] = []
     slopes = jacobian(residual, w)
-    needs = _needs(slopes)
+    needs = _needs(residual, w)
     for circle in strongly_connected(needs):
         unknowns, slope = w[circle], slopes[circle, circle]
-        if depends_on(slope, unknowns):
+        if depends_on(slope, unknowns) or _steps_with(residual[circle], unknowns):
             remaining.extend(circle)
             continue
         circles.append((circle, densify(slope)))
@@ -53,10 +54,45 @@ def _divided(right: SX, matrix: SX) -> SX:
     return linear_solution(densify(matrix), right)
 
 
-def _needs(slope: SX) -> list[list[int]]:
-    """The unknowns in each residual, by the sparsity of its derivative."""
-    needs: list[list[int]] = [[] for _ in range(slope.shape[0])]
-    sparsity = slope.sparsity()
+_STEPS = frozenset(
+    getattr(casadi, name)
+    for name in (
+        *("OP_LT", "OP_LE", "OP_EQ", "OP_NE", "OP_NOT", "OP_AND", "OP_OR"),
+        *("OP_FLOOR", "OP_CEIL", "OP_SIGN", "OP_FMOD", "OP_REMAINDER"),
+    )
+)
+"""Operations that jump: where an unknown goes through one, no derivative tells that an equation has it."""
+
+
+def _steps_with(expression: SX, unknowns: SX) -> bool:
+    """Whether some operation that jumps depends on the unknowns, as in ``if(u > 0, -1, 1)``."""
+    function = _function_of(expression, unknowns)
+    depends = [False] * function.sz_w()
+    for k in range(function.n_instructions()):
+        operation, inputs = function.instruction_id(k), function.instruction_input(k)
+        if operation == casadi.OP_OUTPUT:
+            continue
+        (place,) = function.instruction_output(k)
+        if operation == casadi.OP_INPUT:
+            depends[place] = inputs[0] == 0
+            continue
+        depends[place] = operation != casadi.OP_CONST and any(depends[i] for i in inputs)
+        if depends[place] and operation in _STEPS:
+            return True
+    return False
+
+
+def _function_of(expression: SX, unknowns: SX) -> Function:
+    """The expression over the unknowns, then over everything else in it."""
+    own = _symbols_in(unknowns)
+    others = [entry for entry in symvar(expression) if entry.element_hash() not in own]
+    return Function("f", [unknowns, vertcat(*others, SX(0, 1))], [expression])
+
+
+def _needs(residual: SX, w: SX) -> list[list[int]]:
+    """The unknowns in each residual, also those that only a comparison depends on."""
+    sparsity = _function_of(residual, w).jac_sparsity(0, 0)
+    needs: list[list[int]] = [[] for _ in range(residual.shape[0])]
     for row, column in zip(sparsity.row(), sparsity.get_col()):
         needs[row].append(column)
     return needs
@@ -72,7 +108,7 @@ def check_solvable(
     """
     slopes = jacobian(residual, w)
     parameters = _symbols_in(p)
-    for circle in strongly_connected(_needs(slopes)):
+    for circle in strongly_connected(_needs(residual, w)):
         unknowns, own, slope = w[circle], residual[circle], slopes[circle, circle]
         if not _symbols_in(slope) <= parameters:
             continue

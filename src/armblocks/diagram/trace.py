@@ -75,12 +75,8 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     values = parameters.pack(_parameter_values(diagram))
 
     loops = Implicit(model, symbols, flow, values)
-    derivatives = [
-        flow.value(model.flow.state_rate(name, state.name, 1))
-        for name, equations in model.flow.equations.items()
-        for state in equations.states
-    ]
     guards = _guards(model, flow)
+    modes, contradictions = _contradictions(model, symbols, flow)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
@@ -98,7 +94,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         signals_layout=layout,
         clocks=model.sampling.clocks,
         parameter_values=values,
-        derivative=function("derivative", ends, xd=derivatives),
+        derivative=function("derivative", ends, xd=_derivatives(model, flow)),
         signals=function("signals", ends, y=[_recorded(diagram, flow, value) for _, _, value in signals]),
         residual=residual,
         residual_jacobian=dataclasses.replace(
@@ -114,6 +110,8 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         guard_directions=tuple(guard.direction for _, guard, value in guards for _ in range(value.numel())),
         guard_names=tuple(name for name, _, value in guards for _ in range(value.numel())),
         guard_actions=tuple(guard.action for _, guard, value in guards for _ in range(value.numel())),
+        modes=modes,
+        contradictions=function("contradictions", ends, c=contradictions) if modes else None,
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
         initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),
@@ -217,12 +215,33 @@ def _same(network: Network, value: Value) -> Value:
     return value._replace(node=value.node._replace(group=group))
 
 
+def _derivatives(model: Model, flow: Tracing) -> list[SX]:
+    return [
+        flow.value(model.flow.state_rate(name, state.name, 1))
+        for name, equations in model.flow.equations.items()
+        for state in equations.states
+    ]
+
+
 def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
     return [
         (name, guard, flow.value(_value(model.flow, name, SlotKind.GUARD, guard.name)))
         for name, equations in model.flow.equations.items()
         for guard in equations.guards
     ]
+
+
+def _contradictions(model: Model, symbols: Symbols, flow: Tracing) -> tuple[tuple[int, ...], list[SX]]:
+    """The places of all modes in ``z``, and for each whether it contradicts its condition."""
+    ranges = signature(*symbols.discrete_slots).ranges
+    places: list[int] = []
+    found: list[SX] = []
+    for name, equations in model.flow.equations.items():
+        for mode in equations.modes:
+            place = ranges[f"{name}/{mode.name}"]
+            places += range(place.start, place.stop)
+            found.append(flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name)))
+    return tuple(places), found
 
 
 def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:

@@ -83,9 +83,12 @@ class HybridSystem:
     the clocks with ``m[k] = 1`` tick. Where ``captures`` is true, it is also asked for with no clock ticking,
     just before every instant, at a time one unit in the last place earlier: then z keeps left limits.
     ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs
-    ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it settles modes (a limiter that starts beyond its limit)
-    and changes nothing else: a run calls it so once, at the start after the ticks, and takes the signs of the
-    guards then. A breakpoint is an instant like a tick: guards are compared across it.
+    ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it gives the consistent modes (of a limiter that starts
+    beyond its limit), with what they entail for states. A run calls it so at the start after the ticks, and
+    whenever no guard fires and some mode contradicts its condition. A breakpoint is an instant like a tick:
+    guards are compared across it.
+    ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode ``z[modes[k]]`` is
+    not consistent with the values of the moment.
     ``initial_states``, ``initial_discrete``, ``initial_algebraic``: input ``p``; output ``x0``, ``z0``,
     ``w0``. At the start all clocks without an offset tick, before the first derivative.
     ``breakpoints``: input ``p``; output ``times (nb,)``: known instants at which signals jump (a step
@@ -126,6 +129,10 @@ class HybridSystem:
     guard_actions: tuple[str, ...] = ()
     """For each guard, if there are any: what it does to the run where it is positive. ``stop`` ends it,
     ``fail`` ends it as a failure, ``warn`` is told at its end, and empty nothing."""
+    modes: tuple[int, ...] = ()
+    """The places of the modes in ``z``."""
+    contradictions: TracedFunction | None = None
+    """Which modes contradict their conditions; ``None`` where there are no modes."""
     delays: Delays | None = None
     """Signals that are looked up in the past."""
     captures: bool = False

@@ -225,6 +225,9 @@ class _Augmented:
             ),
             update=c.function("update", {"m": m}, z=update),
             guards=c.function("guards", {}, g=guards),
+            contradictions=None
+            if old.contradictions is None
+            else c.function("contradictions", {}, c=c.value(old.contradictions)),
             guard_directions=(*old.guard_directions, *directions),
             guard_names=(*old.guard_names, *self._names(len(directions))),
             guard_actions=(*old.guard_actions, *[""] * len(directions)),

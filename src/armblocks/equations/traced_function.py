@@ -52,6 +52,19 @@ class TracedFunction:
         results = tuple(flatten(SX(value), slot.shape) for value, slot in zip(values, outputs))
         return cls(name=name, inputs=inputs, outputs=outputs, arguments=symbols, results=results)
 
+    def joined(self, other: TracedFunction) -> TracedFunction:
+        """This map with the results of another one of the same inputs behind its own."""
+        more = Function("f", list(other.arguments), list(other.results)).call(
+            list(self.arguments), True, False
+        )
+        return TracedFunction(
+            name=self.name,
+            inputs=self.inputs,
+            outputs=Signature((*self.outputs.slots, *other.outputs.slots)),
+            arguments=self.arguments,
+            results=(*self.results, *more),
+        )
+
     def casadi_function(self) -> Function:
         """The same map as a CasADi ``Function``: flat columns in, flat columns out."""
         return Function("f", list(self.arguments), list(self.results), {"cse": True})

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.compiler.hybrid_functions import MOST_AT_ONCE
 from armblocks.compiler.integrator_workspace import Status
 from armblocks.compiler.native_integrator import Integration
 from armblocks.compiler.system import CompiledSystem
@@ -94,6 +96,8 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
         return _step_too_small(system, run)
     if run.status is Status.ENDLESS_EVENTS:
         return _endless_events(system, run)
+    if run.status is Status.INCONSISTENT_MODES:
+        return _inconsistent_modes(system, run)
     if run.status is Status.CRAWLING:
         return _crawling(system, run)
     time, state = run.first_non_finite_stage()
@@ -129,16 +133,47 @@ def _unsolved(system: CompiledSystem, time: float) -> SimulationError:
 
 
 def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError:
-    guard = run.last_guard
-    block = system.guard_names[guard]
+    blocks = _unique(system.guard_names[guard] for guard in run.repeating_guards)
+    blocks = blocks or _contradicting(system, run)
+    verb = "causes" if len(blocks) == 1 else "cause"
     return SimulationError(
-        f"block '{block}' causes events without end at {run.time:.15g} s, after {run.events} events in all: "
-        "they follow one another at ever shorter distances, or at one instant (Zeno behaviour or chattering)",
+        f"{_listed(blocks)} {verb} events without end at {run.time:.15g} s, after {run.events} events in "
+        "all: they follow one another at ever shorter distances, or at one instant (Zeno behaviour or "
+        "chattering)",
         where=system.name,
-        allowed="at most 1000 events as good as at one instant",
-        fix=f"give '{block}' a hysteresis, a dead band or a state of rest (no bounce below some speed), or "
-        "stop the run before",
+        allowed=f"at most {MOST_AT_ONCE} events as good as at one instant",
+        fix=f"give '{blocks[0]}' a hysteresis, a dead band or a state of rest (no bounce below some speed), "
+        "or stop the run before",
     )
+
+
+def _inconsistent_modes(system: CompiledSystem, run: Integration) -> SimulationError:
+    blocks = _contradicting(system, run)
+    return SimulationError(
+        f"no choice of the modes of {_listed(blocks)} is consistent at {run.time:.15g} s: each one leads to "
+        "signals that ask for another",
+        where=system.name,
+        allowed="blocks that switch, in loops that have a solution",
+        fix=f"break the loop through '{blocks[0]}' with an integrator, a delay or a hysteresis",
+    )
+
+
+def _contradicting(system: CompiledSystem, run: Integration) -> list[str]:
+    """The blocks of the modes that contradict their conditions where the run stands."""
+    names = [name for slot in system.discrete for name in [slot.name] * slot.size]
+    return _unique(names[place].rpartition("/")[0] for place in run.contradicting_modes)
+
+
+def _listed(blocks: list[str]) -> str:
+    """Two or three of the blocks by name, for a sentence."""
+    shown = ", ".join(f"'{block}'" for block in blocks[:3])
+    more = f" and {len(blocks) - 3} more" if len(blocks) > 3 else ""
+    return f"{'block' if len(blocks) == 1 else 'the blocks'} {shown}{more}"
+
+
+def _unique(names: Iterable[str]) -> list[str]:
+    """Each name once, in their order."""
+    return list(dict.fromkeys(names))
 
 
 def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError:

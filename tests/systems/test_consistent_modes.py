@@ -1,0 +1,270 @@
+"""Modes are functions of the signals: after every jump, and wherever a border is touched or grazed.
+
+Formulas in NumPy are the second opinion. The laws hold at every recorded time, whatever the tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import armblocks as ab
+from armblocks import DiagramBuilder
+from armblocks.blocks import (
+    Abs,
+    CompareToZero,
+    Constant,
+    CoulombFriction,
+    DeadZone,
+    Expression,
+    Gain,
+    Integrator,
+    IntegratorLimited,
+    IntervalTest,
+    PulseGenerator,
+    Quantizer,
+    RateLimiterContinuous,
+    RateLimiterDynamic,
+    RepeatingSequence,
+    Rounding,
+    Saturation,
+    SecondOrderIntegratorLimited,
+    Sign,
+    SignalGenerator,
+    SineWave,
+    Step,
+    Sum,
+    Switch,
+)
+from armblocks.diagram import Block, Diagram
+from armblocks.errors import SimulationError
+
+Array = NDArray[np.float64]
+
+SWITCHING: Mapping[str, tuple[Callable[[], Block], Callable[[Array], Array]]] = {
+    "saturation": (lambda: Saturation(lower=-1.0, upper=1.0), lambda u: np.clip(u, -1.0, 1.0)),
+    "inner": (lambda: Saturation(lower=-0.5, upper=0.25), lambda u: np.clip(u, -0.5, 0.25)),
+    "dead zone": (lambda: DeadZone(start=-1.0, end=1.0), lambda u: u - np.clip(u, -1.0, 1.0)),
+    "sign": (Sign, np.sign),
+    "absolute": (Abs, np.abs),
+    "compared": (lambda: CompareToZero(relation=">"), lambda u: (u > 0.0).astype(float)),
+    "interval": (
+        lambda: IntervalTest(lower=-1.0, upper=1.0),
+        lambda u: ((u >= -1.0) & (u <= 1.0)).astype(float),
+    ),
+    "friction": (CoulombFriction, lambda u: np.sign(u) + u),
+    "quantizer": (lambda: Quantizer(interval=0.5), lambda u: 0.5 * np.floor(u / 0.5 + 0.5)),
+    "ceiling": (lambda: Rounding(function="ceil"), np.ceil),
+}
+
+
+def sources() -> dict[str, Block]:
+    """Jumping and touching signals that reach a border just as they leave it; frequencies are seeded."""
+    random = np.random.default_rng(9)
+    found: dict[str, Block] = {"as found": SignalGenerator(waveform="sawtooth", frequency=2.652)}
+    for number, frequency in enumerate((1.0, 2.5, *random.uniform(0.3, 4.0, 2))):
+        found[f"sawtooth {number}"] = SignalGenerator(waveform="sawtooth", frequency=frequency)
+        found[f"square {number}"] = SignalGenerator(waveform="square", frequency=frequency)
+        found[f"rise {number}"] = RepeatingSequence(times=(0.0, 1.0 / frequency), values=(-1.0, 1.0))
+        found[f"pulses {number}"] = PulseGenerator(period=1.0 / frequency, width=37.0)
+    found["step"] = Step(time=1.55, initial=1.0, final=-1.0)
+    found["crest"] = SineWave(frequency=2.0)
+    return found
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-8])
+def test_a_switching_block_gives_its_formula_of_its_input(rtol: float) -> None:
+    builder = DiagramBuilder("borders")
+    for name, source in sources().items():
+        signal = builder.add(name, source)
+        builder.add(f"{name}: integral", Integrator(), signal)
+        for kind, (block, _) in SWITCHING.items():
+            builder.add(f"{name}: {kind}", block(), signal)
+    result = ab.simulate(builder.build(), stop_time=10.0, sample_time=0.05, rtol=rtol)
+    wrong: list[str] = []
+    for name in sources():
+        u = result[f"{name}/y"]
+        for kind, (_, formula) in SWITCHING.items():
+            found = result[f"{name}: {kind}/y"]
+            # Where the input passes a border at a recorded time, rounding decides between its two sides.
+            sides = [formula(u + shift) for shift in (0.0, -1e-12, 1e-12)]
+            differs = np.min([np.abs(found - side) for side in sides], axis=0) > 1e-11
+            wrong += [
+                f"{name}: {kind} at {t} s: {y} of {value}"
+                for t, y, value in zip(result.time[differs], found[differs], u[differs])
+            ]
+    assert not wrong, "\n".join(wrong[:20])
+
+
+def limited(u: Array, dt: float, rising: float, falling: float, start: float) -> Array:
+    """The fastest course towards ``u (N, n)`` with bounded rates, by small steps."""
+    y = np.empty_like(u)
+    y[0] = start
+    for k in range(1, len(u)):
+        y[k] = y[k - 1] + np.clip(u[k] - y[k - 1], falling * dt, rising * dt)
+    return y
+
+
+def test_rates_of_many_sines_are_limited() -> None:
+    """Crests, touches of the limit and restarts from below and above, with few events each."""
+    random = np.random.default_rng(4)
+    count, dt = 60, 1e-3
+    amplitude, frequency = random.uniform(0.3, 3.0, count), random.uniform(0.3, 3.0, count)
+    phase = random.uniform(0.0, 6.0, count)
+    amplitude[0], frequency[0], phase[0] = 1.1166089529668757, 1.7826608001550557, 2.350048796723417
+    amplitude[1], frequency[1], phase[1] = 1.5, 1.0, 0.0
+    frequency[2] = 1.0 / amplitude[2]  # its rate touches the limit
+    builder = DiagramBuilder("sines")
+    sines = builder.add("u", SineWave(amplitude=amplitude, frequency=frequency, phase=phase))
+    builder.add("fixed", RateLimiterContinuous(), sines)
+    one, minus = builder.add("one", Constant(value=1.0)), builder.add("minus", Constant(value=-1.0))
+    builder.add("dynamic", RateLimiterDynamic(), one, sines, minus)
+    result = ab.simulate(builder.build(), stop_time=10.0, sample_time=dt)
+    u = result["u/y"]
+    for name in ("fixed/y", "dynamic/y"):
+        expected = limited(u, dt, 1.0, -1.0, 0.0)
+        # The reference is of first order in its step.
+        np.testing.assert_allclose(result[name], expected, rtol=0, atol=2e-3)
+    assert result.run.events < 60 * count
+
+
+def test_a_rate_limiter_makes_up_for_a_jump() -> None:
+    builder = DiagramBuilder("jump")
+    jump = builder.add("u", Step(time=1.0, initial=0.5, final=2.0))
+    builder.add("limited", RateLimiterContinuous(rising=0.5, falling=-0.5, initial=0.5), jump)
+    result = ab.simulate(builder.build(), stop_time=6.0, sample_time=0.25)
+    np.testing.assert_allclose(
+        result["limited/y"], np.clip(0.5 + 0.5 * (result.time - 1.0), 0.5, 2.0), atol=1e-9
+    )
+
+
+def ball(restitution: float, start: float, rest_speed: float = 1e-6) -> Diagram:
+    """A ball 1 m above the floor that is let go at a time."""
+    builder = DiagramBuilder("ball")
+    gravity = builder.add("gravity", Step(time=start, initial=0.0, final=-9.81))
+    block = SecondOrderIntegratorLimited(initial=1.0, lower=0.0, reinitialize=True, rest_speed=rest_speed)
+    body = builder.add("ball", block)
+    builder.connect(gravity, body["u"])
+    builder.connect(builder.add("bounce", Gain(gain=-restitution), body["dx"]), body["dx0"])
+    return builder.build()
+
+
+@pytest.mark.parametrize(
+    ("restitution", "start", "stop"),
+    [(0.7, 300.0, 310.0), (0.7, 3e5, 3e5 + 10.0), (0.999, 0.0, 1000.0), (0.99, 1e6, 1e6 + 100.0)],
+)
+def test_a_ball_comes_to_rest_at_any_time(restitution: float, start: float, stop: float) -> None:
+    """It bounces until its speed is 1e-6 m/s: so many times, and then lies on the floor."""
+    result = ab.simulate(ball(restitution, start), stop_time=stop, sample_time=(stop - start) / 10.0)
+    impact = np.sqrt(2 * 9.81)
+    bounces = int(np.ceil(np.log(1e-6 / impact) / np.log(restitution)))
+    assert result.run.complete
+    assert result["ball/x"].min() >= 0.0
+    assert result["ball/x"][-1] == 0.0
+    # Rounding of the time decides the last of the slow bounces.
+    assert result.run.events == pytest.approx(bounces, rel=0.1, abs=2)
+
+
+@pytest.mark.parametrize("restitution", [0.001, 0.5])
+def test_a_ball_that_never_rests_is_named(restitution: float) -> None:
+    with pytest.raises(SimulationError, match=r"block 'ball' causes events without end at 30[01]"):
+        ab.simulate(ball(restitution, 300.0, rest_speed=0.0), stop_time=310.0, sample_time=1.0)
+
+
+def test_the_chattering_block_is_named_and_not_one_that_switched_before() -> None:
+    builder = DiagramBuilder("chatter")
+    early = builder.add("early", SignalGenerator(waveform="square", frequency=3.0))
+    builder.add("bystander", Saturation(lower=-0.3, upper=0.3), early)
+    speed = builder.add("turned", Gain(gain=-1.0))
+    place = builder.add("place", Integrator(initial=1.0), speed)
+    builder.connect(builder.add("relay", Sign(), place), speed["u"])
+    with pytest.raises(SimulationError, match="block 'relay' causes events without end") as raised:
+        ab.simulate(builder.build(), stop_time=3.0)
+    assert "early" not in str(raised.value)
+
+
+def test_modes_without_a_consistent_choice_are_named() -> None:
+    """``y = sign(bias - y)`` has no solution for a bias of 0.5: 1 asks for -1, and -1 asks for 1."""
+    builder = DiagramBuilder("contradiction")
+    bias = builder.add("bias", Step(time=1.0, initial=2.0, final=0.5))
+    sum_ = builder.add("sum", Sum(signs="+-"))
+    sign = builder.add("sign", Sign(), sum_)
+    builder.connect(bias, sum_["u1"])
+    builder.connect(sign, sum_["u2"])
+    with pytest.raises(SimulationError, match="'sign'") as raised:
+        ab.simulate(builder.build(), stop_time=2.0)
+    assert "at 1 s" in str(raised.value)
+
+
+def test_coupled_modes_find_their_one_consistent_choice() -> None:
+    """``y = max(0, M y + q)`` by saturations in a loop: a complementarity problem with one solution."""
+    random = np.random.default_rng(7)
+    for _ in range(3):
+        n = 4
+        root = random.normal(size=(n, n))
+        matrix = np.eye(n) - (root @ root.T / n + 0.3 * np.eye(n))  # I - M is positive definite
+        q = random.normal(size=n)
+        builder = DiagramBuilder("complementarity")
+        drive = builder.add("q", Step(time=1.0, initial=np.zeros(n), final=q))
+        total = builder.add("sum", Sum(signs="++"))
+        positive = builder.add("positive", Saturation(lower=0.0, upper=np.inf), total)
+        builder.connect(drive, total["u1"])
+        builder.connect(builder.add("M", ab.blocks.MatrixGain(gain=matrix), positive), total["u2"])
+        result = ab.simulate(builder.build(), stop_time=2.0, sample_time=0.5)
+        found = result["positive/y"][-1]
+        np.testing.assert_allclose(found, np.maximum(matrix @ found + q, 0.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("formula", ["if(u > 0, -1, 1)", "1 - (u > 0)"])
+def test_a_formula_that_contradicts_itself_has_no_solution(formula: str) -> None:
+    builder = DiagramBuilder("loop")
+    block = builder.add("formula", Expression(formula=formula))
+    builder.connect(block, block["u"])
+    with pytest.raises(SimulationError, match="loop through 'formula' have no solution"):
+        ab.simulate(builder.build(), stop_time=1.0)
+
+
+@pytest.mark.parametrize(
+    ("formula", "expected"), [("0.5 * u + 1", 2.0), ("floor(u / 2) + 0.25", 0.25), ("max(u, 1) / 2 + 1", 2.0)]
+)
+def test_a_formula_with_jumps_is_solved_where_it_has_a_solution(formula: str, expected: float) -> None:
+    builder = DiagramBuilder("loop")
+    block = builder.add("formula", Expression(formula=formula))
+    builder.connect(block, block["u"])
+    result = ab.simulate(builder.build(), stop_time=1.0)
+    np.testing.assert_allclose(result["formula/y"], expected, rtol=1e-12)
+
+
+def test_a_state_at_its_limit_follows_a_rate_that_jumps_there() -> None:
+    """The state reaches its limit at the instant at which its rate jumps: away from it, or towards it."""
+    builder = DiagramBuilder("limit")
+    rate = builder.add("rate", RepeatingSequence(times=(0.0, 1.0, 1.5, 2.0), values=(1.0, 1.0, -1.0, -1.0)))
+    builder.add("limited", IntegratorLimited(lower=0.0, upper=1.0), rate)
+    result = ab.simulate(builder.build(), stop_time=20.0, sample_time=0.01)
+    y = result["limited/y"]
+    assert y.max() <= 1.0
+    assert y.min() >= 0.0
+    dt = 0.01
+    expected = np.zeros_like(y)
+    u = result["rate/y"]
+    for k in range(1, len(y)):
+        expected[k] = np.clip(expected[k - 1] + dt * (u[k] + u[k - 1]) / 2, 0.0, 1.0)
+    np.testing.assert_allclose(y, expected, atol=0.03)
+
+
+def test_a_switch_follows_its_control_through_a_touch() -> None:
+    """The control rests on the threshold exactly, and leaves it to either side."""
+    builder = DiagramBuilder("touch")
+    control = builder.add(
+        "control",
+        RepeatingSequence(times=(0.0, 1.0, 2.0, 3.0, 4.0, 5.0), values=(-1.0, 0.0, 0.0, 1.0, 0.0, -1.0)),
+    )
+    one, two = builder.add("one", Constant(value=1.0)), builder.add("two", Constant(value=2.0))
+    builder.add("switch", Switch(threshold=0.0, criterion=">"), one, control, two)
+    result = ab.simulate(builder.build(), stop_time=20.0, sample_time=0.05)
+    u = result["control/y"]
+    sure = np.abs(u) > 1e-12
+    np.testing.assert_array_equal(result["switch/y"][sure], np.where(u > 0.0, 1.0, 2.0)[sure])
