@@ -79,6 +79,11 @@ def expect_focus_inside(found: Locator) -> None:
     expect(found.locator(":focus")).to_have_count(1)
 
 
+def play_slowly(page: Page) -> None:
+    """Let a playback last ten times as long as the run: it must not end before a busy machine shows it."""
+    page.get_by_role("combobox", name="Playback rate").select_option("0.1 ×")
+
+
 def run(page: Page) -> None:
     """Run the model to its end."""
     page.keyboard.press("Control+Enter")

@@ -32,7 +32,7 @@ FLAGS = [
 ]
 TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
 """Nobody is shown around; pages that are no page of the studio (about:blank) have nothing to keep that in."""
-PATIENCE_MS = 60_000
+PATIENCE_MS = 180_000
 """A busy machine may take long; nothing here waits when it need not."""
 expect.set_options(timeout=PATIENCE_MS)
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

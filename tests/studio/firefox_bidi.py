@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 
 NAMES = ("firefox-esr", "firefox")
 KEYS = {"Control": "\ue009", "Enter": "\ue007", "Delete": "\ue017"}
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 180.0
 
 
 def firefox_path() -> str | None:

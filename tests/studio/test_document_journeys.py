@@ -278,7 +278,7 @@ def test_a_page_that_comes_after_the_crash_is_offered_what_was_drawn(
     server[-1].kill()
     file = folder / "lost.json"
     newer = edit_from_outside(file)
-    server.append(Studio(folder))
+    server.append(Studio(folder, "van_der_pol_pid"))
     fresh = context.new_page()
     fresh.goto(server[-1].address)
     offer = fresh.get_by_role("group", name="lost.json")

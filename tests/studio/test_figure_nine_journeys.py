@@ -68,8 +68,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(open_studio: Callable[..., Page], folder: Path) -> Page:
-    page = open_studio(folder)
+    page = open_studio(folder, "van_der_pol_pid")
     page.set_viewport_size({"width": 1920, "height": 1080})
+    page.locator(".dock .tab").get_by_text("Tune", exact=True).click()  # an arm drawn in software takes long
     return page
 
 

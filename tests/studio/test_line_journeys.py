@@ -25,7 +25,7 @@ class Session:
 
     def __init__(self, browser: Browser, folder: Path) -> None:
         self.folder = folder
-        self.studio = Studio(folder)
+        self.studio = Studio(folder, "van_der_pol_pid")  # an arm drawn in software takes long
         self.context = browser.new_context(
             viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
         )
@@ -63,7 +63,7 @@ class Session:
         expect(silence(self.page)).to_be_visible()
 
     def start_again(self) -> None:
-        self.studio = Studio(self.folder)
+        self.studio = Studio(self.folder, "van_der_pol_pid")
 
     def saved(self, name: str) -> dict[str, list[float]]:
         """Where the blocks are in the file, once the page has saved it."""

@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, ConsoleMessage, FrameLocator, Page, Rou
 
 import armblocks as ab
 from armblocks.errors import InputError
+from conftest import PATIENCE_MS
 
 ORIGIN = "http://notebook.test/"
 SHOW = """async ([esm, states]) => {
@@ -43,7 +44,7 @@ SYNCED = ("title", "height", "time", "_page", "_shown", "_frame")
 def notebook(browser: Browser) -> Iterator[Page]:
     """An empty page whose every request but the first fails, and that must say no error."""
     page = browser.new_page(viewport={"width": 1280, "height": 1100}, color_scheme="light")
-    page.set_default_timeout(60_000)
+    page.set_default_timeout(PATIENCE_MS)
     faults: list[str] = []
 
     def answer(route: Route) -> None:

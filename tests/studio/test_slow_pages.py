@@ -16,7 +16,7 @@ from armblocks.studio.outbox import Outbox
 from armblocks.studio.page import Page
 from armblocks.studio.project_folder import ProjectFolder
 
-PATIENCE_SECONDS = 60.0
+PATIENCE_SECONDS = 180.0
 
 
 class Listener:

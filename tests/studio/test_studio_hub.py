@@ -20,7 +20,7 @@ from armblocks.studio.project_folder import ProjectFolder
 from armblocks.studio.server import built_page
 
 Told = list[dict[str, Any]]
-PATIENCE_SECONDS = 60
+PATIENCE_SECONDS = 180
 
 
 async def until(true: Callable[[], bool]) -> None:

@@ -10,7 +10,7 @@ from typing import Literal
 
 import pytest
 from accessibility import axe
-from building import add, block, drag_from_library, new_diagram, run, wire
+from building import add, block, drag_from_library, new_diagram, play_slowly, run, wire
 from playwright.sync_api import Page, expect
 
 import armblocks as ab
@@ -57,6 +57,7 @@ def test_the_first_example_is_shown_run_and_scrubbed(shared: Page) -> None:
     slider.focus()
     slider.press("Home")
     expect(page.locator(".timeline .instant")).to_have_text("0.000 s")
+    play_slowly(page)
     page.get_by_role("button", name="Play the run").click()
     expect(page.get_by_role("button", name="Hold the playback")).to_be_visible()
     page.get_by_role("button", name="Hold the playback").click()
@@ -139,7 +140,7 @@ def test_blocks_are_grouped_entered_and_left(page: Page) -> None:
 
 def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
     speed = page.get_by_role("combobox", name="Speed")
-    speed.select_option("2 × real time")
+    speed.select_option("0.1 × real time")
     page.keyboard.press("Control+Enter")
     state = page.locator(".run-state")
     expect(state).to_contain_text("running")

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from building import wait_until
+from building import play_slowly, wait_until
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -213,6 +213,7 @@ def test_a_wire_is_logged_by_a_click_and_its_value_pinned(opened: Opened) -> Non
     run(page)
     expect(page.locator(".wire-value")).to_have_text("2.000")
     expect(page.locator(".chart figcaption b").get_by_text("gain/y", exact=True)).to_have_count(1)
+    play_slowly(page)
     page.get_by_role("slider", name="Time").focus()
     page.keyboard.press("Home")
     expect(page.locator(".wire-value")).to_have_text("0")
@@ -249,7 +250,8 @@ def test_sixteen_channels_at_ten_kilohertz_arrive_whole(opened: Opened) -> None:
         builder.add(f"scope {k}", ab.blocks.Scope(), wave["y"])
     diagram = builder.build()
     page = opened(diagram)
-    run_slowly(page, "1")
+    page.get_by_role("combobox", name="Speed").select_option("1 × real time")
+    page.keyboard.press("Control+Enter")
     expect(page.locator(".run-state")).to_contain_text("done", ignore_case=True)
     result = ab.simulate(diagram)
     for k in (0, 15):
