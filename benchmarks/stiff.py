@@ -24,8 +24,8 @@ import numpy as np
 import scipy.sparse
 from scipy.integrate import solve_ivp
 
-from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.equations import SimulationOptions, Slot, TracedFunction, continuous_system, signature
+from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import simulate
 
 RTOL = 1e-6

@@ -8,7 +8,7 @@ from pathlib import Path
 from block_pages import block_pages, style_sheet
 
 import armblocks as ab
-from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.integration.butcher_tableau import ButcherTableau
 from armblocks.simulation.tableaux import TABLEAUX
 
 

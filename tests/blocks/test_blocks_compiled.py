@@ -37,9 +37,9 @@ from armblocks.blocks import (
     Trapezoidal,
     Trigonometry,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.formats import read_diagram, write_diagram
+from armblocks.integration.system import compile_system
 
 
 @pytest.fixture(scope="module")

@@ -196,8 +196,8 @@ def test_what_has_no_equations_has_no_slopes() -> None:
         ab.linearize(diagram, inputs="half.gain", outputs="plant")
     with pytest.raises(InputError, match=r"block 'controller' calls Python, which has no derivatives"):
         ab.sensitivity(diagram, "half.gain", "plant")
-    from armblocks.compiler.system import compile_system
     from armblocks.equations import SimulationOptions
+    from armblocks.integration.system import compile_system
     from armblocks.simulation import simulate
 
     with pytest.raises(

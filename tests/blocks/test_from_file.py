@@ -9,10 +9,10 @@ import pytest
 
 import armblocks as ab
 from armblocks.blocks import FromFile, Integrator, Ramp
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram, DiagramBuilder, TimeTable, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, InputError, UnknownNameError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.01)])

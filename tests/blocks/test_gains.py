@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from armblocks.blocks import Clock, Integrator, SineWave, SineWaveFunction, SliderGain, WeightedSampleTime
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 

@@ -19,10 +19,10 @@ from armblocks.blocks import (
     SineWave,
     Step,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.002)])

@@ -10,10 +10,10 @@ import pytest
 
 import armblocks as ab
 from armblocks.blocks import Clock, Constant, Derivative, Expression, Integrator, PythonFunction, SineWave
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, FormatError, InputError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 CODE = """

@@ -18,9 +18,9 @@ from armblocks.blocks import (
     UniformRandomNumber,
 )
 from armblocks.blocks.random_streams import normal_quantile
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
+from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
 M1, M2 = 4294967087, 4294944443

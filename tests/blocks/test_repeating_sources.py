@@ -23,10 +23,10 @@ from armblocks.blocks import (
     TransferFunctionLeadOrLag,
     TransferFunctionRealZero,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.01)])

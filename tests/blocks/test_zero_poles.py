@@ -10,11 +10,11 @@ from scipy import signal
 
 from armblocks.blocks import BLOCKS, AnalogFilter, DigitalFilter, DiscreteZeroPole, SineWave, Step, ZeroPole
 from armblocks.blocks.linear_systems import ZeroPoleGain, realised
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
 from armblocks.formats import read_diagram, write_diagram
+from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.002)])

@@ -227,11 +227,11 @@ def test_the_fingerprint_sees_edits(tmp_path: Path) -> None:
     assert cache._fingerprint(tmp_path) != before
 
 
-@pytest.mark.parametrize("folder", ["compiler", "routines"])
+@pytest.mark.parametrize("folder", ["compiler", "routines", "integration"])
 def test_machine_code_is_made_anew_after_edits_of_all_that_writes_it(
     folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("compiler", "routines"):
+    for name in ("compiler", "routines", "integration"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "module.py").write_text("a = 1")
     monkeypatch.setattr(cache, "__file__", str(tmp_path / "compiler" / "cache.py"))

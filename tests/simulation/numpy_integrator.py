@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.rosenbrock_tableau import RosenbrockTableau, Tableau
+from armblocks.integration.butcher_tableau import ButcherTableau
+from armblocks.integration.rosenbrock_tableau import RosenbrockTableau, Tableau
 
 Field = Callable[[float, np.ndarray], np.ndarray]
 

@@ -8,9 +8,9 @@ import pytest
 from casadi import SX
 from small_systems import oscillator, scalar, states_of, system
 
-from armblocks.compiler.system import compile_system
 from armblocks.equations import SimulationOptions, signature
 from armblocks.errors import InputError, SimulationError, UnknownNameError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import Simulation, SimulationResult, simulate
 
 OSCILLATOR = compile_system(oscillator())

@@ -8,8 +8,8 @@ import pytest
 from hybrid_reference import Reference
 from hybrid_systems import bouncing_ball, column, hybrid, relay_oscillator, sampled_loop, stick_slip
 
-from armblocks.compiler.system import compile_system
 from armblocks.equations import HybridSystem, SimulationOptions
+from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
 

@@ -16,10 +16,10 @@ from hybrid_systems import (
     tick_recorder,
 )
 
-from armblocks.compiler.native_integrator import RunPoint
-from armblocks.compiler.system import compile_system, recall_system
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import SimulationError
+from armblocks.integration.native_integrator import RunPoint
+from armblocks.integration.system import compile_system, recall_system
 from armblocks.simulation import SimulationResult, find_tableau, simulate
 
 SOLVERS = [("rk45", None), ("dop853", None), ("tsit5", None), ("rk23", None), ("rk4", 0.01), ("heun", 0.004)]

@@ -19,9 +19,9 @@ import pytest
 from scipy.io import loadmat
 from small_systems import NOTHING, system
 
-from armblocks.compiler.system import compile_system
 from armblocks.equations import Signature, SimulationOptions, Slot, signature
 from armblocks.errors import FormatError, UnknownNameError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import RunReport, SimulationResult, simulate
 
 SIGNALS = signature(

@@ -10,8 +10,8 @@ import pytest
 from small_systems import states_of, system
 from stiff_systems import robertson, van_der_pol
 
-from armblocks.compiler.system import compile_system
 from armblocks.equations import HybridSystem, SimulationOptions, signature
+from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, SimulationResult, simulate
 
 

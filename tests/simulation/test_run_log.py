@@ -14,10 +14,10 @@ from hybrid_systems import bouncing_ball, relay_oscillator, sampled_loop
 from small_systems import oscillator, scalar, van_der_pol_pid
 from small_systems import system as small_system
 
-from armblocks.compiler.native_integrator import Integration
-from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.equations import SimulationOptions, signature
 from armblocks.errors import FormatError, InputError, SimulationError, UnknownNameError
+from armblocks.integration.native_integrator import Integration
+from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import LogRequest, Simulation, SimulationResult, run_log, simulate
 from armblocks.simulation.run_log import View
 

@@ -10,9 +10,9 @@ import pytest
 from hybrid_systems import bouncing_ball, loop_of_cosine, relay_oscillator, sampled_loop, stick_slip
 from small_systems import oscillator, van_der_pol_pid
 
-from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, InputError
+from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import RunState, simulate
 
 SYSTEMS = {

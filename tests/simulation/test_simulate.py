@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 from small_systems import oscillator, scalar, states_of, system, van_der_pol_pid
 
-from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.equations import SimulationOptions
 from armblocks.equations import signature as layout
+from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import SimulationResult, find_tableau, simulate
 
 OSCILLATOR = compile_system(oscillator())

@@ -11,9 +11,9 @@ from hybrid_systems import bouncing_ball, loop_of_cosine, relay_oscillator, samp
 from small_systems import oscillator, scalar, van_der_pol_pid
 from small_systems import system as small_system
 
-from armblocks.compiler.system import compile_system
 from armblocks.equations import HybridSystem, SimulationOptions, signature
 from armblocks.errors import InputError, SimulationError, UnknownNameError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import Simulation, SimulationResult, simulate
 
 

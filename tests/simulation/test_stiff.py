@@ -23,9 +23,9 @@ from stiff_systems import (
     van_der_pol,
 )
 
-from armblocks.compiler.system import compile_system
 from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, simulate
 from armblocks.simulation.rosenbrock import RODAS5P
 from armblocks.simulation.tableaux import RK45

@@ -10,11 +10,11 @@ import pytest
 from numpy_integrator import integrate
 from small_systems import states_of, system, van_der_pol_pid
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.rosenbrock_tableau import Tableau
-from armblocks.compiler.system import compile_system
 from armblocks.equations import signature
 from armblocks.errors import UnknownNameError
+from armblocks.integration.butcher_tableau import ButcherTableau
+from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.system import compile_system
 from armblocks.simulation.tableaux import DEFAULT, TABLEAUX, find_tableau
 
 every_tableau = pytest.mark.parametrize("tableau", TABLEAUX, ids=[t.name for t in TABLEAUX])

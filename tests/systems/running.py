@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram, trace_diagram
 from armblocks.equations import SimulationOptions
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 

@@ -32,11 +32,11 @@ from armblocks.blocks import (
     VariableTransportDelay,
     ZeroOrderHold,
 )
-from armblocks.compiler.native_integrator import FIRST_ROOM
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError
+from armblocks.integration.native_integrator import FIRST_ROOM
+from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, SimulationResult, simulate
 
 Run = Callable[..., SimulationResult]

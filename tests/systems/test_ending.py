@@ -18,10 +18,10 @@ from armblocks.blocks import (
     StopSimulation,
     ZeroOrderHold,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 SOLVERS = [("rk45", None), ("rk4", 0.01)]

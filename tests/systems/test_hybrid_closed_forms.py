@@ -31,9 +31,9 @@ from armblocks.blocks import (
     UnitDelay,
     ZeroOrderHold,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, BlockHandle, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
+from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]

@@ -28,10 +28,10 @@ from armblocks.blocks import (
     Step,
     Tachometer,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
+from armblocks.integration.system import compile_system
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult, simulate
 

@@ -35,10 +35,10 @@ from armblocks.blocks import (
     VariableIntegerDelay,
     WrapToZero,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError
+from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]

@@ -45,9 +45,9 @@ from armblocks.blocks import (
     UnitDelay,
     ZeroOrderHold,
 )
-from armblocks.compiler.system import compile_system
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
+from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]

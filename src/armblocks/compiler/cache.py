@@ -66,7 +66,7 @@ def _sha256(data: bytes) -> bytes:
 def compiler_fingerprint() -> str:
     """Changes whenever a source file changes that decides which machine code is made."""
     package = Path(__file__).parent.parent
-    return _fingerprint(*(package / name for name in ("compiler", "routines")))
+    return _fingerprint(*(package / name for name in ("compiler", "routines", "integration")))
 
 
 @cache

@@ -8,8 +8,9 @@ same bits at every number of lanes.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
+
+from armblocks.routines.llvm import number_text
 
 
 class Module:
@@ -36,11 +37,6 @@ class Module:
     def text(self) -> str:
         """The whole module, as LLVM reads it."""
         return "\n\n".join(self._parts.values()) + "\n"
-
-
-def number_text(value: float) -> str:
-    """A double, exact, as LLVM writes it."""
-    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
 
 class Body:

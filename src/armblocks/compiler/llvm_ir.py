@@ -19,10 +19,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armblocks.compiler.ir_text import Body, Module, number_text
+from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
+from armblocks.routines.llvm import number_text
 
 MANY_CONSTANTS = 32
 """From here on an output's constants are copied from a table."""

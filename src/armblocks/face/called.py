@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from armblocks.compiler.system import CompiledSystem
 from armblocks.diagram import Diagram, flat_diagram
 from armblocks.diagram.conditional_equations import FIRE
 from armblocks.diagram.model import diagram_model
 from armblocks.diagram.sampling import own_clock
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError
+from armblocks.integration.system import CompiledSystem
 from armblocks.simulation import CalledFunction
 
 

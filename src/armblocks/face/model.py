@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint
-from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
@@ -22,6 +21,7 @@ from armblocks.face.called import called_functions
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
+from armblocks.integration.system import CompiledSystem, compile_system, recall_system
 from armblocks.simulation import LogRequest, RunState, Simulation, SimulationResult
 from armblocks.simulation.plan import changed_parameters
 from armblocks.simulation.whole_run import Progress, run_to_the_end

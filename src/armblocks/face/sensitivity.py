@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.system import CompiledSystem, compile_system
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import mask_parameters, with_mask_parameters
 from armblocks.equations import Signature
@@ -19,6 +18,7 @@ from armblocks.equations.sensitivity import MIXED, sensitivity_name, sensitivity
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 from armblocks.face.linearizing import described_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
+from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
 

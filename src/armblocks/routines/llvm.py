@@ -8,7 +8,7 @@ ever set and ``fma`` stands only where it was asked for, so the same operations 
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from armblocks.routines.routine import Program
 from armblocks.routines.tree import (
@@ -205,11 +205,10 @@ class _FunctionText:
                 self._plain(statement)
 
     def _region(self, region: Region) -> None:
-        used = set(_jumps(region.body))
-        if region.start in used:
+        if region.start.used:
             self._place(self._label(region.start))
         self._part(region.body)
-        if region.end in used:
+        if region.end.used:
             self._place(self._label(region.end))
 
     def _when(self, when: When, following: Statement | None) -> None:
@@ -300,17 +299,3 @@ class _FunctionText:
 def _typed(operand: Operand) -> str:
     """The type of an operand; a variable or a table stands for its address."""
     return "ptr" if isinstance(operand, Local | Table) else _TYPES[operand.kind]
-
-
-def _jumps(statements: Sequence[Statement]) -> Iterator[Mark]:
-    for statement in statements:
-        match statement:
-            case Jump(mark):
-                yield mark
-            case When(_, yes, no):
-                yield from _jumps(yes)
-                yield from _jumps(no)
-            case Region(body):
-                yield from _jumps(body)
-            case _:
-                pass

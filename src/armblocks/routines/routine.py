@@ -13,8 +13,8 @@ into; the annotations of the others are its signature::
     length = program.define(norm)          # elsewhere: r.call(length, x, n)
 
 Python runs the function once, and what it does to values is written down: a Python ``if`` decides what is
-written, ``with r.when(condition):`` what happens when the routine runs. A value that is computed inside a
-``when`` or a loop is valid only there; one that outlives it is kept in a variable.
+written, ``with r.when(condition):`` what happens when the routine runs. A value is valid where the statement
+that computes it has been run on every path; one that differs between paths is kept in a variable.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ import inspect
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Concatenate, Generic, ParamSpec, TypeVar, cast, get_type_hints
+from typing import Concatenate, Generic, ParamSpec, TypeVar, cast
 
 from armblocks.routines import tree
 from armblocks.routines.tree import Constant, Jump, Kind, Local, Mark, Operand, Statement, Table, Temporary
 from armblocks.routines.values import (
+    Array,
     Boolean,
     BooleanVariable,
     Integer,
@@ -56,6 +57,7 @@ _KINDS: dict[type, Kind] = {
     Reals: Kind.ADDRESS,
     Integers: Kind.ADDRESS,
 }
+_BY_NAME: dict[str, type[Value]] = {kind.__name__: kind for kind in _KINDS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +69,9 @@ class Function(Generic[P, R]):
     result: type[Value] | None
 
 
-def external(write: Callable[Concatenate[Routine, P], R]) -> Function[P, R]:
-    """A function that stands elsewhere, by its name and annotations; ``write`` is never run."""
-    return Function(write.__name__, write, _result(write))
+def external(write: Callable[Concatenate[Routine, P], R], symbol: str = "") -> Function[P, R]:
+    """A function that stands elsewhere, by its name (or ``symbol``) and annotations; it is never run."""
+    return Function(symbol or write.__name__, write, _result(write))
 
 
 class Program:
@@ -158,6 +160,11 @@ class Part:
         with self._routine.when(condition):
             self.again()
 
+    def again_unless(self, condition: Boolean) -> None:
+        """Go back to the start of this part where the condition fails."""
+        with self._routine.unless(condition):
+            self.again()
+
 
 class Routine(Writer):
     """Writes the body of one function: variables, control flow, calls."""
@@ -191,7 +198,11 @@ class Routine(Writer):
         """A constant double, for where a Python number does not do."""
         return Real(self, real_operand(value))
 
-    def truth(self, value: bool) -> Boolean:
+    def constant_integer(self, value: int) -> Integer:
+        """A constant integer, for where a Python number does not do."""
+        return Integer(self, integer_operand(value))
+
+    def constant_boolean(self, value: bool) -> Boolean:
         """A condition that always holds, or never."""
         return Boolean(self, boolean_operand(value))
 
@@ -289,8 +300,11 @@ class Routine(Writer):
 
     def call(self, function: Function[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Call a function; gives its result."""
-        bound = inspect.signature(function.write).bind(self, *args, **kwargs)
-        operands = tuple(self._argument(value) for value in list(bound.arguments.values())[1:])
+        values = args
+        if kwargs:
+            bound = inspect.signature(function.write).bind(self, *args, **kwargs)
+            values = tuple(bound.arguments.values())[1:]
+        operands = tuple(self._argument(value) for value in values)
         if function.result is None:
             self.statements.append(tree.Call(None, function.symbol, operands))
             return cast("R", None)
@@ -306,10 +320,11 @@ class Routine(Writer):
     def jump(self, mark: Mark) -> None:
         """Go on at a mark of a part around this place."""
         assert mark.open, "a part is left or repeated from inside"
+        mark.used = True
         self.statements.append(Jump(mark))
 
     def _argument(self, value: object) -> Operand:
-        if isinstance(value, Reals | Integers):
+        if isinstance(value, Array):
             return value.address(0)
         if isinstance(value, Value):
             return value.operand
@@ -361,10 +376,16 @@ class Stages:
 
 
 def _parameters(write: Callable[..., object]) -> dict[str, type[Value]]:
-    hints = get_type_hints(write)
-    return {name: hints[name] for name in list(inspect.signature(write).parameters)[1:]}
+    # The routine comes first and the result last.
+    hints = list(write.__annotations__.items())[1:-1]
+    return {name: _value_type(hint) for name, hint in hints}
 
 
 def _result(write: Callable[..., object]) -> type[Value] | None:
-    found = get_type_hints(write)["return"]
-    return None if found is type(None) else found
+    found = write.__annotations__["return"]
+    return None if found in (None, "None") else _value_type(found)
+
+
+def _value_type(annotation: type[Value] | str) -> type[Value]:
+    """The type that an annotation names; ``typing.get_type_hints`` takes longer than the routine itself."""
+    return _BY_NAME[annotation] if isinstance(annotation, str) else annotation

@@ -164,6 +164,8 @@ class Mark:
     name: str
     open: bool = False
     """Whether statements that are written now may jump to it."""
+    used: bool = False
+    """Whether a statement jumps to it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import Integration
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Shape
 from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.integration.native_integrator import Integration
+from armblocks.integration.system import CompiledSystem
+from armblocks.integration.workspace import Status
 from armblocks.simulation.stretch import Consumer, Stretch
 
 Array = NDArray[np.float64]

@@ -8,13 +8,12 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.hybrid_functions import MOST_AT_ONCE
-from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import Integration
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
+from armblocks.integration.guard_functions import MOST_AT_ONCE
+from armblocks.integration.native_integrator import Integration
+from armblocks.integration.system import CompiledSystem
+from armblocks.integration.workspace import Status
 from armblocks.simulation.result import element_names
 from armblocks.simulation.rosenbrock import ROS5
 from armblocks.simulation.tableaux import STIFF
@@ -98,7 +97,7 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
         return _endless_events(system, run)
     if run.status is Status.INCONSISTENT_MODES:
         return _inconsistent_modes(system, run)
-    if run.status is Status.CRAWLING:
+    if run.status is Status.MINIMUM_STEP:
         return _crawling(system, run)
     time, state = run.first_non_finite_stage()
     point = run.point
@@ -196,8 +195,8 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
 def _crawling(system: CompiledSystem, run: Integration) -> SimulationError:
     name = element_name(system.states, int(np.argmax(run.weighted_changes())))
     left = (run.stop - run.time) / run.last_step
-    explicit = isinstance(run.integrator.tableau, ButcherTableau)
-    stiff = f"; if it is stiff, solver='{STIFF.name}'" if explicit else ""
+    needs_jacobian = run.integrator.tableau.needs_jacobian
+    stiff = "" if needs_jacobian else f"; if it is stiff, solver='{STIFF.name}'"
     return SimulationError(
         f"the run crawls at {run.time:.6g} s with steps of {run.last_step:.2g} s, {left:.0e} more to go, for "
         f"changes within the tolerance, of state '{name}' above all",
@@ -215,7 +214,7 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     derivative, times the mean step, against the method's stability interval.
     """
     tried, tableau = run.accepted + run.rejected, run.integrator.tableau
-    if tried < MANY_STEPS or run.time <= 0.0 or not isinstance(tableau, ButcherTableau):
+    if tried < MANY_STEPS or run.time <= 0.0 or tableau.needs_jacobian:
         return ""
     point = run.point
     x, t, rest = point.x, point.time, (point.z, point.w, p)

@@ -6,7 +6,7 @@ nested interpolation ``x_old + theta (F0 + (1 - theta) (F1 + theta (F2 + …)))`
 rational arithmetic, into powers of theta.
 """
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
+from armblocks.integration.butcher_tableau import ButcherTableau
 
 MATRIX = (
     (),

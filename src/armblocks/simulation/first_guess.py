@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.native_integrator import RunPoint
-from armblocks.compiler.system import CompiledSystem
+from armblocks.integration.native_integrator import RunPoint
+from armblocks.integration.system import CompiledSystem
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.system import CompiledSystem
+from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.stretch import Rows
 
 Array = NDArray[np.float64]

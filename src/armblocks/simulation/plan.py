@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.compiler.rosenbrock_tableau import Tableau
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.tableaux import DEFAULT, EULER, RK4, STIFF, TABLEAUX, find_tableau
 
 Array = NDArray[np.float64]

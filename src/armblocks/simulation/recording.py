@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.native_integrator import Integration
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
+from armblocks.integration.native_integrator import Integration
+from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.diagnosis import first_bad_signal
 from armblocks.simulation.plan import Instants, LogRequest
 from armblocks.simulation.result import LoggedFile, SimulationResult, signal_path

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from armblocks.compiler.rosenbrock_tableau import (
+from armblocks.integration.rosenbrock_tableau import (
     RosenbrockTableau,
     from_textbook,
     stiffly_accurate_dense,

@@ -8,11 +8,11 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.native_integrator import Checkpoint, Integration, NativeIntegrator, RunPoint
-from armblocks.compiler.rosenbrock_tableau import Tableau
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
+from armblocks.integration.native_integrator import Checkpoint, Integration, NativeIntegrator, RunPoint
+from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.first_guess import first_guess
 from armblocks.simulation.plan import Plan
 from armblocks.simulation.run_state import RunState, settings_text

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.native_integrator import Checkpoint
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import Signature
 from armblocks.errors import FormatError, InputError
 from armblocks.files import read_bounded, write_atomically
+from armblocks.integration.native_integrator import Checkpoint
+from armblocks.integration.system import CompiledSystem
 
 Array = NDArray[np.float64]
 

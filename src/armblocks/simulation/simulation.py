@@ -9,11 +9,11 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import RunPoint
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, SimulationError
+from armblocks.integration.native_integrator import RunPoint
+from armblocks.integration.system import CompiledSystem
+from armblocks.integration.workspace import Status
 from armblocks.simulation.calls import CalledFunction, Calls
 from armblocks.simulation.diagnosis import (
     ended_by_block,

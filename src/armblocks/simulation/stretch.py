@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.integrator_workspace import Status
-from armblocks.compiler.native_integrator import Checkpoint, Integration
-from armblocks.compiler.system import CompiledSystem
+from armblocks.integration.native_integrator import Checkpoint, Integration
+from armblocks.integration.system import CompiledSystem
+from armblocks.integration.workspace import Status
 from armblocks.simulation.plan import Instants
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ fixed-step method up to order 4 gets the cubic Hermite polynomial between its st
 
 from __future__ import annotations
 
-from armblocks.compiler.butcher_tableau import ButcherTableau, hermite_dense
-from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.errors import UnknownNameError
+from armblocks.integration.butcher_tableau import ButcherTableau, hermite_dense
+from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.simulation.dormand_prince_853 import DOP853
 from armblocks.simulation.rosenbrock import RODAS5P, ROSENBROCK_TABLEAUX
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 from numpy.typing import ArrayLike
 
-from armblocks.compiler.system import CompiledSystem
 from armblocks.equations import SimulationOptions
+from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.plan import LogRequest
 from armblocks.simulation.result import SimulationResult
 from armblocks.simulation.run_state import RunState

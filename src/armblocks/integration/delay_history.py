@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import sys
 
-from armblocks.compiler import system_functions
-from armblocks.compiler.integrator_workspace import Count, LoopSizes, Workspace
-from armblocks.compiler.integrator_workspace import Real as Number
+from armblocks.integration import system_functions
+from armblocks.integration.workspace import Count, LoopSizes, Scalar, Workspace
 from armblocks.routines.arithmetic import fma, select
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals, RealVariable
@@ -30,7 +29,7 @@ NO_SLOPE = sys.float_info.max
 """Stands in the table for a slope that is not finite."""
 
 
-class DelayLines:
+class DelayHistory:
     """The functions of a program for the delayed signals of a system, and the table that they share.
 
     All have ``reals`` and ``counts``, the arrays of the run; ``t``, ``x`` are a point whose unknowns are
@@ -42,19 +41,19 @@ class DelayLines:
         self.lines = sizes.delays
         self.count = len(sizes.delays)
         self.first = int(Count.END) + len(sizes.clocks)
-        self.look_back = program.define(self._look_back, "look_back")
-        self.keep = program.define(self._keep, "keep")
-        self.keep_change = program.define(self._keep_change, "keep_change")
+        self.read = program.define(self._read, "read_history")
+        self.write = program.define(self._write, "write_history")
+        self.write_change = program.define(self._write_change, "write_change")
         self.strays = program.define(self._strays, "strays")
-        self.arrive = program.define(self._arrive, "arrive")
-        self.next_arrival = program.define(self._next_arrival, "next_arrival")
+        self.pass_jumps = program.define(self._pass_jumps, "pass_jumps")
+        self.next_jump = program.define(self._next_jump, "next_jump")
         self.make_room = program.define(self._make_room, "make_room")
 
     # The table.
 
     def entry(self, row: Integer, column: Integer | int) -> Integer:
         """Where an entry of the table lies in ``reals``."""
-        return row * self.places.past_width + self.places.past + column
+        return row * self.places.history_width + self.places.history + column
 
     def time(self, reals: Reals, row: Integer) -> Real:
         """The time of a row."""
@@ -80,9 +79,9 @@ class DelayLines:
         """The last row that each line looks at: a place where its signal jumps; -1 for the newest row."""
         return counts.after(self.first + self.count)
 
-    # Looking back.
+    # Reading.
 
-    def _look_back(self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals) -> None:
+    def _read(self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals) -> None:
         """The delayed values at a point, into ``z``."""
         places = self.places
         z, unknowns, taus = (reals.after(place) for place in (places.z, places.trial_w, places.taus))
@@ -100,7 +99,7 @@ class DelayLines:
     ) -> tuple[Real, Real]:
         """Value and slope of a line's signal at an instant of the past."""
         first, last = self.first_rows(counts)[line], self.last_rows(counts)[line]
-        newest = counts[Count.PAST] - 1
+        newest = counts[Count.HISTORY_ROWS] - 1
         # A middle whose end is still to come is no place to look from.
         newest = newest - self.middle(reals, newest).to_integer()
         last = select(last < 0, newest, last)
@@ -162,13 +161,13 @@ class DelayLines:
         value.value = centre + total
         slope.value = rate / H
 
-    # Keeping.
+    # Writing.
 
     def fill(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real | float
     ) -> Integer:
         """Write the row after the last one, without counting it; its number."""
-        rows = counts[Count.PAST]
+        rows = counts[Count.HISTORY_ROWS]
         z, unknowns = (reals.after(place) for place in (self.places.z, self.places.trial_w))
         reals[self.entry(rows, 0)] = t[0]
         reals[self.entry(rows, 1)] = middle
@@ -179,14 +178,14 @@ class DelayLines:
             slopes[k] = select(is_slope(slope), slope, NO_SLOPE)
         return rows
 
-    def _keep(
+    def _write(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
     ) -> None:
         """Add a row for a point, which is the ``middle`` of a piece (1) or not (0)."""
         self.fill(r, t, x, reals, counts, p, middle)
-        counts[Count.PAST] = counts[Count.PAST] + 1
+        counts[Count.HISTORY_ROWS] = counts[Count.HISTORY_ROWS] + 1
 
-    def _keep_change(
+    def _write_change(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real
     ) -> None:
         """Add a row for a point only if it differs from the last one."""
@@ -200,7 +199,7 @@ class DelayLines:
         with r.when(same.value == 0.0):
             # What comes after stands at the very time of what was before.
             reals[self.entry(rows, 0)] = self.time(reals, before)
-            counts[Count.PAST] = counts[Count.PAST] + 1
+            counts[Count.HISTORY_ROWS] = counts[Count.HISTORY_ROWS] + 1
 
     def _strays(
         self,
@@ -218,7 +217,7 @@ class DelayLines:
         rows = self.fill(r, t, x, reals, counts, p, 0.0)
         start, centre, end = (rows - back for back in (3, 2, 1))
         H = 0.5 * (self.time(reals, end) - self.time(reals, start))
-        rtol, atol = (reals[place] for place in (Number.RTOL, Number.ATOL))
+        rtol, atol = (reals[place] for place in (Scalar.RTOL, Scalar.ATOL))
         value, slope = r.real(0.0), r.real(0.0)
         found = r.boolean(False)
         for line in r.each(self.count):
@@ -232,7 +231,7 @@ class DelayLines:
 
     # Places where a signal jumps.
 
-    def _arrive(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> None:
+    def _pass_jumps(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> None:
         """Move each line past the places that it has come to, and find the next one."""
         until = now * SAME_ABOVE
         first_rows, last_rows = self.first_rows(counts), self.last_rows(counts)
@@ -250,7 +249,7 @@ class DelayLines:
                 with r.part() as rows:
                     here = i.value
                     after = here + 1
-                    search.leave_unless(after < counts[Count.PAST])
+                    search.leave_unless(after < counts[Count.HISTORY_ROWS])
                     i.value = after
                     together = self.time(reals, here) == self.time(reals, after)
                     jumps = self.value(reals, here, k) != self.value(reals, after, k)
@@ -259,7 +258,7 @@ class DelayLines:
                         rows.again()
                 last_rows[k] = here
 
-    def _next_arrival(self, r: Routine, reals: Reals, counts: Integers) -> Real:
+    def _next_jump(self, r: Routine, reals: Reals, counts: Integers) -> Real:
         """When a line comes to such a place; infinite if none is known."""
         soonest = r.constant(float("inf"))
         for k, line in enumerate(self.lines):
@@ -277,16 +276,16 @@ class DelayLines:
     def _make_room(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
         """Forget what no line can reach any more; whether there is room for another step."""
         places = self.places
-        capacity = counts[Count.PAST_ROOM]
-        needed = counts[Count.PAST] + ROWS_OF_A_STEP
+        capacity = counts[Count.HISTORY_ROOM]
+        needed = counts[Count.HISTORY_ROWS] + ROWS_OF_A_STEP
         with r.when(needed <= capacity):
-            r.return_(r.truth(True))
+            r.return_(r.constant_boolean(True))
         oldest = now - reals[places.longest]
         # The first row that must stay: an end of a step, the last one before all that can be looked at.
         keep, i = r.integer(0), r.integer(0)
         with r.loop() as search:
             here = i.value
-            inside = here < counts[Count.PAST]
+            inside = here < counts[Count.HISTORY_ROWS]
             safe = select(inside, here, 0)
             old = self.time(reals, safe) < oldest
             search.leave_unless(inside & old)
@@ -294,11 +293,11 @@ class DelayLines:
             keep.value = select(at_end, here, keep.value)
             i.value = i.value + 1
         gone = keep.value
-        left = counts[Count.PAST] - gone
-        counts[Count.PAST] = left
-        total, shift = left * places.past_width, gone * places.past_width
+        left = counts[Count.HISTORY_ROWS] - gone
+        counts[Count.HISTORY_ROWS] = left
+        total, shift = left * places.history_width, gone * places.history_width
         for n in r.range(0, total):
-            target = n + places.past
+            target = n + places.history
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)

@@ -10,9 +10,9 @@ shorter, and if nothing helps the run ends there like at any other NaN, and the 
 
 from __future__ import annotations
 
-from armblocks.compiler.integrator_workspace import Workspace
-from armblocks.compiler.pivoted_elimination import PivotedElimination
-from armblocks.compiler.system_functions import residual, residual_jacobian
+from armblocks.integration.pivoted_elimination import PivotedElimination
+from armblocks.integration.system_functions import residual, residual_jacobian
+from armblocks.integration.workspace import Workspace
 from armblocks.routines.arithmetic import fma, select
 from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Real, Reals

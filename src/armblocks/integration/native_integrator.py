@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.delay_lines import ROWS_OF_A_STEP
-from armblocks.compiler.elimination import JacobianPattern
-from armblocks.compiler.hybrid_loop import HybridLoop
-from armblocks.compiler.integrator_workspace import Count, LoopSizes, Real, Stage, Status, Workspace
 from armblocks.compiler.ir_text import Module
-from armblocks.compiler.linear_equations import LinearSpace
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
-from armblocks.compiler.rosenbrock_tableau import Tableau
-from armblocks.compiler.runge_kutta import POINTERS, STABLE_LOOKS, STIFF_LOOKS, Loop, define_loop
+from armblocks.compiler.program_text import add_program
+from armblocks.integration.delay_history import ROWS_OF_A_STEP
+from armblocks.integration.elimination_plan import JacobianPattern
+from armblocks.integration.explicit_method import STIFF_CHECKS
+from armblocks.integration.linear_equations import LinearSpace
+from armblocks.integration.loop import POINTERS, define_loop
+from armblocks.integration.rosenbrock_method import STABLE_CHECKS
+from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.workspace import Count, LoopSizes, Scalar, Stage, Status, Workspace
+from armblocks.routines.routine import Program
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
@@ -40,7 +42,7 @@ NO_NUMBERS: Vector = np.empty(0)
 @dataclass(frozen=True, kw_only=True)
 class RunPoint:
     """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations, and the
-    past of what is delayed (rows of :mod:`armblocks.compiler.delay_lines`; none at the start of a run).
+    past of what is delayed (rows of :mod:`armblocks.integration.delay_history`; none at the start of a run).
 
     ``begun``: the ticks at this time have happened already.
     """
@@ -80,11 +82,9 @@ class NativeIntegrator:
             module = Module()
             for name in names:
                 emit_function(module, tape(name), name)
-            if sizes.hybrid:
-                loop = HybridLoop(module, tableau, self.workspace, sizes, self.space)
-            else:
-                loop = Loop(module, tableau, self.workspace, self.space)
-            define_loop("advance", loop)
+            program = Program()
+            define_loop(program, "advance", tableau, self.workspace, sizes, self.space)
+            add_program(module, program)
             return module.text
 
         # The code object must outlive every call into it.
@@ -123,7 +123,7 @@ class NativeIntegrator:
             start = RunPoint(time=float(samples[0]), x=start)
         begins, stop = start.time, float(samples[-1]) if stop is None else stop
         if checkpoint is not None:
-            begins = float(checkpoint.reals[Real.TIME])
+            begins = float(checkpoint.reals[Scalar.TIME])
         # A set and not np.unique, which would load all of numpy.ma for these few numbers.
         inside = np.array(sorted({float(time) for time in breakpoints if begins < time <= stop}))
         ends = inside if inside.size and inside[-1] == stop else np.append(inside, stop)
@@ -136,12 +136,12 @@ class NativeIntegrator:
             run.counts[[Count.ACCEPTED, Count.REJECTED, Count.EVALUATIONS, Count.INSTANTS, Count.EVENTS]] = 0
         else:
             run.place(start, step=step, first=not start.begun)
-        run.reals[Real.RTOL] = rtol
-        run.reals[Real.ATOL] = atol
-        run.reals[Real.MAX_STEP] = max_step
-        run.reals[Real.SPAN] = stop
-        run.reals[Real.PAUSE] = np.inf
-        run.reals[Real.HALT] = np.inf
+        run.reals[Scalar.RTOL] = rtol
+        run.reals[Scalar.ATOL] = atol
+        run.reals[Scalar.MAX_STEP] = max_step
+        run.reals[Scalar.SPAN] = stop
+        run.reals[Scalar.PAUSE] = np.inf
+        run.reals[Scalar.HALT] = np.inf
         run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)
         if stop <= begins and not self.sizes.hybrid:
             run.states[0] = start.x
@@ -163,7 +163,7 @@ class NativeIntegrator:
         new.reals[:head] = run.reals[:head]
         new.reals[here.z :] = run.reals[old.z :]
         new.counts[:] = run.counts
-        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.CRAWL]] = 0
+        new.counts[[Count.WATCHED, Count.STIFF, Count.CALM, Count.SHORT]] = 0
         new.watch(1 + int(run.counts[Count.WATCHING]))
         return new
 
@@ -209,7 +209,7 @@ class Integration:
     ) -> None:
         workspace = integrator.workspace
         self.integrator = integrator
-        self._room = FIRST_ROOM * workspace.past_width if integrator.sizes.delays else 0
+        self._room = FIRST_ROOM * workspace.history_width if integrator.sizes.delays else 0
         self.reals = np.zeros(workspace.size + self._room)
         self.counts = np.zeros(workspace.counts, dtype=np.int64)
         self.counts[Count.SEGMENTS] = ends.size
@@ -243,7 +243,7 @@ class Integration:
         saved = np.concatenate([self._saved.reals, more])
         self._saved = _checkpoint(self, saved, self._saved.counts)
         self._room = numbers
-        self.counts[Count.PAST_ROOM] = numbers // self.integrator.workspace.past_width
+        self.counts[Count.HISTORY_ROOM] = numbers // self.integrator.workspace.history_width
         self._take_addresses()
 
     def _take_addresses(self) -> None:
@@ -254,11 +254,11 @@ class Integration:
     def place(self, start: RunPoint, *, step: float, first: bool) -> None:
         """Put the run at a point; at the ``first`` the ticks there are still to happen."""
         places, sizes = self.integrator.workspace, self.integrator.sizes
-        self.reals[Real.TIME] = start.time
-        self.reals[Real.STEP] = step
-        self.reals[Real.BOUND] = np.inf
-        self.reals[Real.SCAN] = np.inf
-        self.reals[Real.LAST_EVENT] = -np.inf
+        self.reals[Scalar.TIME] = start.time
+        self.reals[Scalar.STEP] = step
+        self.reals[Scalar.BOUND] = np.inf
+        self.reals[Scalar.SCAN] = np.inf
+        self.reals[Scalar.LAST_EVENT] = -np.inf
         self.reals[places.last : places.last + len(sizes.directions)] = -np.inf
         self.reals[places.gap : places.gap + len(sizes.directions)] = np.inf
         self.state[:] = start.x
@@ -266,7 +266,7 @@ class Integration:
         self._vector(places.w, sizes.algebraic)[:] = start.w
         self.counts[Count.STARTED] = Stage.INSTANT if sizes.hybrid else Stage.START
         self.counts[Count.FRESH] = 1
-        self.counts[Count.SETTLE] = 1
+        self.counts[Count.AT_START] = 1
         if sizes.delays:
             self._place_past(start)
         for clock, (period, offset) in enumerate(sizes.clocks):
@@ -283,9 +283,9 @@ class Integration:
             before = [start.z[line.value] for line in lines]
             past = np.array([start.time, 0.0, *before, *(0.0 for _ in lines)])
         self.make_room(2 * past.size)
-        self.reals[places.past : places.past + past.size] = past
-        self.counts[Count.PAST] = past.size // places.past_width
-        self.counts[Count.PAST_ROOM] = self._room // places.past_width
+        self.reals[places.history : places.history + past.size] = past
+        self.counts[Count.HISTORY_ROWS] = past.size // places.history_width
+        self.counts[Count.HISTORY_ROOM] = self._room // places.history_width
         first = int(Count.END) + len(self.integrator.sizes.clocks)
         self.counts[first : first + len(lines)] = 0
         self.counts[first + len(lines) :] = -1
@@ -304,7 +304,7 @@ class Integration:
 
     def halt_at(self, time: float) -> None:
         """Return from :meth:`advance` before the ticks of the first instant at a time (s) or later."""
-        self.reals[Real.HALT] = time
+        self.reals[Scalar.HALT] = time
 
     @property
     def waiting(self) -> bool:
@@ -322,10 +322,10 @@ class Integration:
 
     def advance(self, max_steps: int, pause: float = np.inf) -> Status:
         """Take at most ``max_steps`` accepted steps, and none that begins at ``pause`` (s) or later."""
-        self.reals[Real.PAUSE] = pause
+        self.reals[Scalar.PAUSE] = pause
         if self.status is Status.PAUSED:
             self.status = self.integrator.advance(self._addresses, max_steps)
-            while self.status is Status.PAST_FULL:
+            while self.status is Status.HISTORY_FULL:
                 self.make_room(2 * self._room)
                 self.status = self.integrator.advance(self._addresses, max_steps)
         return self.status
@@ -333,7 +333,7 @@ class Integration:
     @property
     def checkpoint(self) -> Checkpoint | None:
         """From where a longer run would go on; ``None`` if there is no such place yet."""
-        if np.isnan(self._saved.reals[Real.TIME]):
+        if np.isnan(self._saved.reals[Scalar.TIME]):
             return None
         return _checkpoint(self, self._saved.reals.copy(), self._saved.counts.copy())
 
@@ -343,7 +343,7 @@ class Integration:
         self.reals[: checkpoint.reals.size] = checkpoint.reals
         self.counts[:] = checkpoint.counts
         if self.integrator.sizes.delays:
-            self.counts[Count.PAST_ROOM] = self._room // self.integrator.workspace.past_width
+            self.counts[Count.HISTORY_ROOM] = self._room // self.integrator.workspace.history_width
         self.status = Status.PAUSED
 
     def now(self) -> Checkpoint:
@@ -357,8 +357,8 @@ class Integration:
         z, w = self._vector(places.z, sizes.discrete), self._vector(places.w, sizes.algebraic)
         past = np.empty(0)
         if sizes.delays:
-            rows = int(self.counts[Count.PAST]) * places.past_width
-            past = self._vector(places.past, rows).copy()
+            rows = int(self.counts[Count.HISTORY_ROWS]) * places.history_width
+            past = self._vector(places.history, rows).copy()
         return RunPoint(time=self.time, x=self.state.copy(), z=z.copy(), w=w.copy(), past=past)
 
     @property
@@ -373,7 +373,7 @@ class Integration:
         """
         self.counts[Count.WATCHING] = changes
         if not self._explicit:
-            self.counts[Count.STIFF] = STABLE_LOOKS * 4 ** min(10, max(0, changes - 2) // 2)
+            self.counts[Count.STIFF] = STABLE_CHECKS * 4 ** min(10, max(0, changes - 2) // 2)
 
     @property
     def wants_other(self) -> bool:
@@ -382,12 +382,12 @@ class Integration:
         if self.status is not Status.PAUSED or not self.counts[Count.WATCHING]:
             return False
         if self._explicit:
-            return bool(self.counts[Count.STIFF] >= STIFF_LOOKS)
+            return bool(self.counts[Count.STIFF] >= STIFF_CHECKS)
         return bool(self.counts[Count.CALM] >= self.counts[Count.STIFF])
 
     @property
     def _explicit(self) -> bool:
-        return isinstance(self.integrator.tableau, ButcherTableau)
+        return not self.integrator.tableau.needs_jacobian
 
     @property
     def instants(self) -> int:
@@ -430,7 +430,7 @@ class Integration:
     @property
     def time(self) -> float:
         """Time that the last accepted step reached, s."""
-        return float(self.reals[Real.TIME])
+        return float(self.reals[Scalar.TIME])
 
     @property
     def stop(self) -> float:
@@ -448,7 +448,7 @@ class Integration:
     @property
     def last_step(self) -> float:
         """Length of the step tried last, s."""
-        return float(self.reals[Real.TRIED])
+        return float(self.reals[Scalar.TRIED])
 
     @property
     def recorded(self) -> int:
@@ -486,15 +486,14 @@ class Integration:
 
     def _weighted(self, slope: Vector) -> Vector:
         after = self._vector(self.integrator.workspace.y, self.integrator.states)
-        rtol, atol = self.reals[Real.RTOL], self.reals[Real.ATOL]
+        rtol, atol = self.reals[Scalar.RTOL], self.reals[Scalar.ATOL]
         return np.abs(self.last_step * slope) / (atol + rtol * np.maximum(np.abs(self.state), np.abs(after)))
 
     def first_non_finite_stage(self) -> tuple[float, Vector]:
         """Time and state at which the derivative of the step tried last became NaN or infinite first."""
         tableau = self.integrator.tableau
         K, h, clamp = self._stage_derivatives(), self.last_step, self.course[3][self.counts[Count.SEGMENT]]
-        # Before the stages a Rosenbrock method keeps the derivative at the start.
-        first = 0 if isinstance(tableau, ButcherTableau) else 1
+        first = tableau.first_stage
         bad = [stage for stage in range(tableau.stages) if not np.isfinite(K[first + stage]).all()]
         stage = bad[0] if bad and np.isfinite(K[0]).all() else 0 if bad else tableau.stages
         row = [*tableau.matrix, tableau.weights][stage]

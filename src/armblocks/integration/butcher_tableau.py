@@ -116,6 +116,16 @@ class ButcherTableau:
         return self.dense
 
     @property
+    def needs_jacobian(self) -> bool:
+        """Whether a step needs the Jacobian of the flow, as methods for stiff systems do."""
+        return False
+
+    @property
+    def first_stage(self) -> int:
+        """The row of ``K`` with the first stage."""
+        return 0
+
+    @property
     def measures_stiffness(self) -> bool:
         """Whether its last two evaluations, both at a step's end, show the fastest rate (Hairer, Wanner II,
         IV.2, equation (2.20))."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armblocks.compiler.rosenbrock_tableau import RosenbrockTableau, from_textbook
 from armblocks.errors import InputError
+from armblocks.integration.rosenbrock_tableau import RosenbrockTableau, from_textbook
 from armblocks.simulation.rosenbrock import IMPLICIT_EULER, RODAS5P, ROS23, ROSENBROCK_TABLEAUX
 
 every_method = pytest.mark.parametrize(

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-from fractions import Fraction
 
 import casadi as ca
 import numpy as np
 import pytest
 from casadi import SX
 
-from armblocks.compiler.butcher_tableau import ButcherTableau, hermite_dense
 from armblocks.compiler.from_casadi import tape_from
-from armblocks.compiler.integrator_workspace import LoopSizes, Status
-from armblocks.compiler.ir_routine import Routine
-from armblocks.compiler.ir_text import Module
-from armblocks.compiler.native import load_code
-from armblocks.compiler.native_integrator import NativeIntegrator
 from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
+from armblocks.integration.butcher_tableau import ButcherTableau, hermite_dense
+from armblocks.integration.native_integrator import NativeIntegrator
+from armblocks.integration.workspace import LoopSizes, Status
 
 RK4 = ButcherTableau(
     name="rk4",
@@ -61,24 +56,6 @@ def integrator(
 
 
 NONE = np.empty(0)
-
-
-@pytest.mark.parametrize("k", [2, 3, 5, 8])
-def test_inverse_root_is_right_to_the_last_place_over_all_magnitudes(k: int) -> None:
-    module = Module()
-
-    def write() -> str:
-        w = Routine(module)
-        w.do(f"ret double {w.inverse_root('%a', k)}")
-        return w.text("define double @root(double %a)")
-
-    module.define("root", write)
-    code = load_code(("inverse root test", str(k)), lambda: module.text)
-    root = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(code.address("root"))
-    numbers = np.concatenate([np.logspace(-300, 300, 601), np.random.default_rng(1).uniform(0.5, 20.0, 400)])
-    # In exact arithmetic, so that only the root itself is judged: one unit in its last place, k times.
-    worst = max(abs(Fraction(a) * Fraction(root(a)) ** k - 1) for a in numbers.tolist())
-    assert worst < 1.5 * k * 2.0**-52
 
 
 def test_loops_and_written_out_states_give_the_same_bits() -> None:

@@ -8,8 +8,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from armblocks.compiler.butcher_tableau import CONSISTENCY, ButcherTableau, Row
 from armblocks.errors import InputError
+from armblocks.integration.butcher_tableau import CONSISTENCY, ButcherTableau, Row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +120,21 @@ class RosenbrockTableau:
         """``dense`` over the rows of ``K``."""
         nothing = (0.0,) * len(self.dense[0])
         return (nothing, *self.dense, nothing)
+
+    @property
+    def needs_jacobian(self) -> bool:
+        """Whether a step needs the Jacobian of the flow, as methods for stiff systems do."""
+        return True
+
+    @property
+    def first_stage(self) -> int:
+        """The row of ``K`` with the first stage: the derivative at the step's start is before it."""
+        return 1
+
+    @property
+    def real_stability(self) -> float:
+        """Length of the interval of absolute stability on the negative real axis: all of it."""
+        return float("inf")
 
     @property
     def middle_row(self) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from armblocks.compiler.rosenbrock_tableau import Tableau
+from armblocks.integration.rosenbrock_tableau import Tableau
 
 
 class Status(IntEnum):
@@ -22,17 +22,17 @@ class Status(IntEnum):
     """The derivative at the start of a segment is NaN or infinite."""
     ENDLESS_EVENTS = 5
     """Events follow one another without end: at one instant, or at ever shorter distances."""
-    PAST_FULL = 6
-    """The table of the past of delayed signals needs more room: give it, and call again."""
+    HISTORY_FULL = 6
+    """The history of delayed signals needs more room: give it, and call again."""
     STOPPED = 7
     """A guard that ends the run is positive; what holds then is recorded."""
-    CRAWLING = 8
+    MINIMUM_STEP = 8
     """Steps so short that what changes in one is within the tolerance, and far more to come."""
     INCONSISTENT_MODES = 9
     """No choice of the modes is consistent with the signals that follow from it."""
 
 
-class Real(IntEnum):
+class Scalar(IntEnum):
     """Places in the array of doubles; the vectors of :class:`Workspace` come after them."""
 
     TIME = 0
@@ -50,7 +50,7 @@ class Real(IntEnum):
     SPAN = 8
     """Events are told apart beside ``max(time, 1e-6 SPAN)``: the time at which the run ends."""
     SCAN = 9
-    """How far apart the guards are looked at next, at most; as far as they have proved to be smooth."""
+    """How far apart the guards are evaluated next, at most; as far as they have proved to be smooth."""
     PAUSE = 10
     """The loop returns before the first step that would begin at this time or later."""
     HALT = 11
@@ -61,8 +61,8 @@ class Real(IntEnum):
 class Count(IntEnum):
     """Places in the array of integers.
 
-    After them comes the number of the next tick of every clock, then the first and the last row of the past
-    that each delayed signal looks at; -1 where the last is the newest.
+    After them comes the number of the next tick of every clock, then the first and the last row of the
+    history that each delayed signal reads; -1 where the last is the newest.
     """
 
     SAMPLE = 0
@@ -90,23 +90,23 @@ class Count(IntEnum):
     SAVED = 14
     """Whether the checkpoint is written."""
     WATCHED = 15
-    """Steps so far that were looked at for stiffness."""
+    """Steps so far that were checked for stiffness."""
     STIFF = 16
-    """Explicit methods: looks that found a step bound by stability. Methods for stiff systems: so many looks
-    in a row at a step that an explicit method could take as well make one take over."""
+    """Explicit methods: checks that found a step bound by stability. Methods for stiff systems: so many
+    checks in a row at a step that an explicit method could take as well make one take over."""
     CALM = 17
-    """Looks in a row that found no stiffness."""
+    """Checks in a row that found no stiffness."""
     WATCHING = 18
     """0: the run keeps its method. Else it wants to be told where another one does better, and pauses
     there; 1 and the number of changes so far."""
-    SETTLE = 19
-    """Whether the modes are still to take the values that the signals ask for: at the start."""
-    PAST = 20
-    """Rows of the table of the past of delayed signals."""
-    PAST_ROOM = 21
+    AT_START = 19
+    """Whether the run is at its start: its modes are still to be made consistent."""
+    HISTORY_ROWS = 20
+    """Rows of the history of delayed signals."""
+    HISTORY_ROOM = 21
     """Rows that there is room for."""
-    CRAWL = 22
-    """Looks that found a step short without need, less some for every look that did not."""
+    SHORT = 22
+    """Checks that found a step short without need, less some for every check that did not."""
     END = 23
 
 
@@ -162,21 +162,21 @@ class Workspace:
     at each stage), ``slope(row)`` the stage derivatives; then what only hybrid systems have: ``z`` and ``w``
     as accepted, ``new_x`` and ``new_z`` what a reset or update makes of them, ``trial_w`` the unknowns of the
     implicit equations at the point evaluated last, ``guards``, those at the beginning and in the middle of
-    the stretch that is looked at (``guards_before``, ``guards_middle``), how fast they changed at the end of
-    the stretch before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet),
+    the window that is searched (``guards_before``, ``guards_middle``), how fast they changed at the end of
+    the window before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet),
     ``fired``, when each fired last (``last``), how long after the time before (``gap``), how often in a row
     this became shorter (``shrinking``), and how often it fired among the latest events that follow one
     another closely (``repeats``); ``contradictions``, not 0 for the modes that contradict their conditions;
     ``ticking``; and for Newton's method ``residual``, ``jacobian``, ``before``, and ``pivots`` and ``swaps``
     (integers) of its elimination. For delayed signals: how long each is delayed (``taus``), between which
-    bounds (``bounds``: all shortest, all longest), the ``longest`` of all; the ``past`` comes behind
+    bounds (``bounds``: all shortest, all longest), the ``longest`` of all; the ``history`` comes behind
     everything.
     """
 
     def __init__(self, tableau: Tableau, sizes: LoopSizes) -> None:
         n, nz, nw, ng = sizes.states, sizes.discrete, sizes.algebraic, len(sizes.directions)
         self.states = n
-        self.x = int(Real.END)
+        self.x = int(Scalar.END)
         self.y = self.x + n
         self._slopes = self.y + n
         self.z = self._slopes + tableau.rows * n
@@ -207,8 +207,8 @@ class Workspace:
         self.bounds = self.taus + lines
         self.size = self.bounds + 2 * lines + (1 if lines else 0)
         self.longest = self.size - 1
-        self.past = self.size
-        self.past_width = 2 + 2 * lines
+        self.history = self.size
+        self.history_width = 2 + 2 * lines
         self.counts = int(Count.END) + len(sizes.clocks) + 2 * lines
 
     def slope(self, row: int) -> int:

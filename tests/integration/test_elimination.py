@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from armblocks.compiler.elimination import Elimination, JacobianPattern, plan_elimination
+from armblocks.integration.elimination_plan import Elimination, JacobianPattern, plan_elimination
 
 
 def pattern_of(matrix: np.ndarray, states: int) -> JacobianPattern:

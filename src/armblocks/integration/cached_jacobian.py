@@ -1,4 +1,4 @@
-"""The Jacobian of a system's flow: differentiated when a stiff solver first asks, then kept on disk."""
+"""The Jacobian of a system's flow: differentiated when a stiff solver first asks, then cached on disk."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from armblocks.compiler import cache
-from armblocks.compiler.elimination import JacobianPattern
 from armblocks.compiler.kept import keep_tape, kept_tape, tape_of
 from armblocks.compiler.tape import Tape
+from armblocks.integration.elimination_plan import JacobianPattern
 
 if TYPE_CHECKING:
     from armblocks.equations import FlowJacobian, HybridSystem
 
 
 @dataclass(frozen=True, kw_only=True)
-class KeptJacobian:
+class CachedJacobian:
     """Where its entries are, and the digest of the tape that works them out."""
 
     pattern: JacobianPattern
@@ -25,7 +25,7 @@ class KeptJacobian:
     tape: Callable[[], Tape]
 
 
-def kept_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSystem]) -> KeptJacobian:
+def cached_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSystem]) -> CachedJacobian:
     """The Jacobian of the flow whose tapes have these digests.
 
     The system is traced, and CasADi loaded, only where the disk cache lacks the result.
@@ -43,7 +43,7 @@ def kept_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSyst
             )
             digest = str(kept["digest"])
             tape = lambda: kept_tape(digest, lambda: _traced(trace).function)  # noqa: E731
-            return KeptJacobian(pattern=pattern, digest=digest, tape=tape)
+            return CachedJacobian(pattern=pattern, digest=digest, tape=tape)
         except (ValueError, KeyError, TypeError):
             pass  # a record of another make is made anew
     traced = _traced(trace)
@@ -59,7 +59,7 @@ def kept_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSyst
         "digest": made.digest,
     }
     cache.store(name, json.dumps(record).encode())
-    return KeptJacobian(pattern=pattern, digest=made.digest, tape=lambda: made)
+    return CachedJacobian(pattern=pattern, digest=made.digest, tape=lambda: made)
 
 
 def _traced(trace: Callable[[], HybridSystem]) -> FlowJacobian:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from armblocks.compiler import cache, pieces
-from armblocks.compiler.system import CompiledSystem, compile_system, recall_system
 from armblocks.equations import HybridSystem, TracedFunction, continuous_system, signature
 from armblocks.errors import CompileError
+from armblocks.integration.system import CompiledSystem, compile_system, recall_system
 
 
 def pendulum(length: float = 2.0) -> HybridSystem:

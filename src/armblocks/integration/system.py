@@ -13,18 +13,17 @@ from numpy.typing import NDArray
 
 from armblocks.compiler import cache
 from armblocks.compiler.batch import BatchLayout, Layout, emit_batch
-from armblocks.compiler.butcher_tableau import ButcherTableau
-from armblocks.compiler.integrator_workspace import DelaySlots, LoopSizes
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.kept import keep_tape, kept_tape, slots_from_json, slots_to_json, tape_of
-from armblocks.compiler.kept_jacobian import KeptJacobian, kept_jacobian
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import Effort, NativeCode, load_code
-from armblocks.compiler.native_integrator import NativeIntegrator
 from armblocks.compiler.pieces import is_long
-from armblocks.compiler.rosenbrock_tableau import Tableau
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.target import host_target
+from armblocks.integration.cached_jacobian import CachedJacobian, cached_jacobian
+from armblocks.integration.native_integrator import NativeIntegrator
+from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.workspace import DelaySlots, LoopSizes
 
 if TYPE_CHECKING:
     from armblocks.equations import HybridSystem, TracedFunction
@@ -250,15 +249,15 @@ class CompiledSystem:
         return [part.reshape(t.size, size, size) for part, size in zip(parts, sizes)]
 
     @cached_property
-    def _flow_jacobian(self) -> KeptJacobian:
-        return kept_jacobian(self._digests["derivative"], self._digests["residual"], self._trace)
+    def _flow_jacobian(self) -> CachedJacobian:
+        return cached_jacobian(self._digests["derivative"], self._digests["residual"], self._trace)
 
     def integrator(self, tableau: Tableau) -> NativeIntegrator:
         """The native loop that steps this system by a method; made once."""
         found = self._integrators.get(id(tableau))
         if found is None:
             # The integrator keeps its tableau alive, so the identity stays its own.
-            if isinstance(tableau, ButcherTableau):
+            if not tableau.needs_jacobian:
                 found = NativeIntegrator(self.sizes, self._digests, self.tape, tableau)
             else:
                 kept = self._flow_jacobian

@@ -40,7 +40,16 @@ def update(
 
 @external
 def guards(r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, g: Reals) -> None:
-    """The values whose sign changes are events."""
+    """The values whose sign changes are events, for a system without modes."""
+
+
+def _guards_and_modes(
+    r: Routine, t: Reals, x: Reals, z: Reals, w: Reals, p: Reals, g: Reals, contradictions: Reals
+) -> None:
+    """The same, and what is not 0 for the modes that contradict their conditions."""
+
+
+guards_and_modes = external(_guards_and_modes, "guards")
 
 
 @external

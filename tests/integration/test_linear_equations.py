@@ -7,9 +7,9 @@ import ctypes
 import numpy as np
 import pytest
 
-from armblocks.compiler.elimination import JacobianPattern
-from armblocks.compiler.linear_equations import LinearEquations, LinearSpace
 from armblocks.compiler.native import load_code
+from armblocks.integration.elimination_plan import JacobianPattern
+from armblocks.integration.linear_equations import LinearEquations, LinearSpace
 from armblocks.routines.llvm import definitions
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer, Real, Reals

@@ -1,8 +1,8 @@
 """The linear equations of a Rosenbrock step, as routines: ``(E / gamma - h J) k = right``.
 
 ``E`` is one for the rows of the flow and zero for those of implicit equations. A large sparse matrix is
-eliminated in the order that :mod:`armblocks.compiler.elimination` planned, with its pivots on the diagonal
-and work in proportion to its entries. Its first solution is judged by what it leaves over, each row beside
+eliminated in the order of :mod:`armblocks.integration.elimination_plan`, with its pivots on the diagonal and
+work in proportion to its entries. Its first solution is judged by what it leaves over, each row beside
 the sizes of its own terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409: no scaling of states or equations
 changes that). Where this is too much, and for small or full matrices always, the whole matrix is eliminated
 with row pivoting instead.
@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 
-from armblocks.compiler.elimination import Elimination, JacobianPattern, plan_elimination
-from armblocks.compiler.pivoted_elimination import PivotedElimination
+from armblocks.integration.elimination_plan import Elimination, JacobianPattern, plan_elimination
+from armblocks.integration.pivoted_elimination import PivotedElimination
 from armblocks.routines.arithmetic import fma, maximum, select, square_root
 from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals

@@ -1,0 +1,1 @@
+"""Methods that integrate a system, and the native loop around them."""

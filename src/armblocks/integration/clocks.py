@@ -1,0 +1,82 @@
+"""Clocks of a loop: when they tick, and what an update does then.
+
+Tick ``k`` of a clock is at ``offset + k period``, one product and one sum, never accumulated.
+"""
+
+from __future__ import annotations
+
+from armblocks.integration import system_functions
+from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.frame import SAME_ABOVE, Frame
+from armblocks.integration.workspace import Count, Scalar, Status
+from armblocks.routines.arithmetic import select
+from armblocks.routines.values import Boolean, Real, RealVariable
+
+
+class Clocks:
+    """Writes ticks. ``point`` is the variable that holds the time of an evaluation."""
+
+    def __init__(self, frame: Frame, evaluation: Evaluation, point: RealVariable) -> None:
+        self.frame = frame
+        self.evaluation = evaluation
+        self.point = point
+        self.count = len(frame.sizes.clocks)
+        self.numbers = frame.counts.after(Count.END)
+        """The number of the next tick of every clock."""
+        self.ticking = frame.vector(frame.places.ticking)
+
+    def next_tick(self, clock: int) -> Real:
+        """When a clock ticks next."""
+        period, offset = self.frame.sizes.clocks[clock]
+        product = self.numbers[clock].to_real() * period
+        return product if offset == 0.0 else product + offset
+
+    def capture(self, time: Real) -> None:
+        """Update with no clock marked, with the flow just before an instant and the old ``z``.
+
+        Nothing was before the start: there ``z`` keeps its start values.
+        """
+        if not self.frame.sizes.captures:
+            return
+        with self.frame.r.unless(self.frame.counts[Count.AT_START] != 0):
+            for clock in range(self.count):
+                self.ticking[clock] = 0.0
+            before = (time.bits() - 1).from_bits()
+            self.point.value = select(time > 0.0, before, time)
+            self.update()
+
+    def tick(self, time: Real, until: Real) -> None:
+        """Mark the clocks that tick up to ``until`` and update ``z``."""
+        any_ticks: Boolean | None = None
+        for clock in range(self.count):
+            ticks = self.next_tick(clock) <= until
+            self.numbers[clock] = self.numbers[clock] + ticks.count()
+            self.ticking[clock] = select(ticks, 1.0, 0.0)
+            any_ticks = ticks if any_ticks is None else any_ticks | ticks
+        if any_ticks is not None:
+            with self.frame.r.when(any_ticks):
+                self.frame.increase(Count.INSTANTS)
+                self.point.value = time
+                self.update()
+
+    def update(self) -> None:
+        """``z`` becomes what ``update`` gives for the clocks that are marked."""
+        f, places = self.frame, self.frame.places
+        x, z, unknowns, new_z = (
+            f.vector(place) for place in (places.x, places.z, places.trial_w, places.new_z)
+        )
+        t = self.point.memory
+        self.evaluation.solve(t, x)
+        f.r.call(system_functions.update, t, x, z, unknowns, f.p, self.ticking, new_z)
+        f.copy(places.new_z, places.z, f.sizes.discrete)
+
+    def halt(self, time: Real) -> None:
+        """Return before the ticks of an instant that a caller waits for, all values as they are there."""
+        if not self.count:
+            return
+        f = self.frame
+        with f.r.when(time * SAME_ABOVE >= f.reals[Scalar.HALT]):
+            self.point.value = time
+            self.evaluation.solve(self.point.memory, f.vector(f.places.x))
+            self.evaluation.accept_unknowns()
+            f.leave(Status.PAUSED)

@@ -1,0 +1,56 @@
+"""The course of a run: into which pieces it is divided, and what happens between them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from armblocks.integration.workspace import Stage
+from armblocks.routines.routine import Part, Stages
+from armblocks.routines.values import Boolean, Real
+
+INSTANT, START, STEP = "instant", "start", "step"
+"""Stages of the loop: ticks and events at the time reached, the first derivative, a step."""
+STAGE = {Stage.INSTANT: INSTANT, Stage.START: START, Stage.RUNNING: STEP}
+
+Trial = Callable[[Real, Real], Real]
+"""Writes the stages of a step between two times; gives its length."""
+
+
+class Course(ABC):
+    """Writes what bounds steps beside their error, and what follows an accepted step."""
+
+    @abstractmethod
+    def enter(self, stages: Stages) -> None:
+        """Go on where the last call stopped."""
+
+    def before_step(self) -> None:  # noqa: B027  # a flow leaves nothing
+        """Make sure that what a step leaves behind has room."""
+
+    @abstractmethod
+    def first_step(self, time: Real) -> None:
+        """Choose the length of the step after a start."""
+
+    @abstractmethod
+    def accept(self, stages: Stages) -> None:
+        """Record an accepted step and make its end the new point; go on at a stage."""
+
+    @abstractmethod
+    def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
+        """Try a fixed step whose end must be finite."""
+
+    @abstractmethod
+    def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
+        """Steps are as short as they can be: where they are not finite, return, or leave ``accepted``."""
+
+    def passed(self, time: Real, spacing: Real) -> Real:
+        """Grid instants of fixed steps up to this time are behind."""
+        return time
+
+    def bounded(self, time: Real, new_time: Real) -> Real:
+        """The end of a fixed step, where something else than the grid may bound it."""
+        return new_time
+
+    def next_length(self, proposed: Real) -> Real:
+        """The length of the step after an accepted one."""
+        return proposed

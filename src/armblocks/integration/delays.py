@@ -1,0 +1,130 @@
+"""Delayed signals in a loop: bounds of the steps, and the history that each step leaves."""
+
+from __future__ import annotations
+
+from armblocks.integration import system_functions
+from armblocks.integration.delay_history import MOST_PIECES, DelayHistory
+from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.frame import Frame
+from armblocks.integration.method import Method
+from armblocks.integration.records import Records
+from armblocks.integration.workspace import Count, Status
+from armblocks.routines.arithmetic import fma, maximum, minimum, select
+from armblocks.routines.values import Boolean, Real, RealVariable
+
+HIGH_ORDER = 7
+"""From this order on, steps are too long for one quintic of the history."""
+
+
+class Delays:
+    """Writes what a loop does for delayed signals. ``point`` holds the time of an evaluation."""
+
+    def __init__(
+        self,
+        frame: Frame,
+        method: Method,
+        records: Records,
+        evaluation: Evaluation,
+        history: DelayHistory,
+        point: RealVariable,
+    ) -> None:
+        self.frame = frame
+        self.method = method
+        self.records = records
+        self.evaluation = evaluation
+        self.history = history
+        self.point = point
+
+    def bound_steps(self) -> None:
+        """No step is longer than a delay: the values that a step needs are then always in the history."""
+        f, places, n = self.frame, self.frame.places, len(self.frame.sizes.delays)
+        bounds, taus = f.vector(places.bounds), f.vector(places.taus)
+        f.r.call(system_functions.delay_bounds, f.p, bounds)
+        shortest, longest = f.max_step, f.r.constant(0.0)
+        for k in range(n):
+            shortest = minimum(shortest, bounds[k])
+            longest = maximum(longest, bounds[n + k])
+            taus[k] = bounds[k]
+        f.max_step = shortest
+        f.reals[places.longest] = longest
+
+    def make_room(self) -> None:
+        """Return where the history has no room for another step."""
+        f = self.frame
+        room = f.r.call(self.history.make_room, f.time.value, f.reals, f.counts)
+        f.leave_unless(room, Status.HISTORY_FULL)
+
+    def next_jump(self) -> Real:
+        """When a delayed signal comes to a place where it jumps."""
+        return self.frame.r.call(self.history.next_jump, self.frame.reals, self.frame.counts)
+
+    def pass_jumps(self, time: Real) -> None:
+        """Move each delayed signal past the jumps that it has come to."""
+        self.frame.r.call(self.history.pass_jumps, time, self.frame.reals, self.frame.counts)
+
+    def write_change(self, time: Real) -> None:
+        """Write the signals after an instant into the history, where it has changed them."""
+        f = self.frame
+        t, x = self.point.memory, f.vector(f.places.x)
+        self.point.value = time
+        self.evaluation.solve(t, x)
+        f.r.call(self.history.write_change, t, x, f.reals, f.counts, f.p, f.r.constant(0.0))
+        self.pass_jumps(time)
+
+    def write_step(self, time: Real, new_time: Real, h: Real) -> None:
+        """Write an accepted step into the history, by pieces with a middle and an end.
+
+        A piece is the whole step, a half of the long steps of a method of high order, or shorter where the
+        quintic of a piece strays from a signal.
+
+        From half of the most pieces on, the tolerance grows, so that the rest fits into the other half.
+        """
+        f, r, history = self.frame, self.frame.r, self.history
+        self.records.extra_stages_once(time, h)
+        before = f.counts[Count.HISTORY_ROWS]
+        most, many = (before + 2 * count for count in (MOST_PIECES - 1, MOST_PIECES // 2))
+        factor = r.real(1.0)
+        begin, end = r.real(time), r.real(new_time)
+        half = fma(0.5, new_time - time, time)
+        end.value = half if self.method.tableau.order >= HIGH_ORDER else new_time
+        t, x = self.point.memory, f.vector(f.places.new_x)
+        with r.loop() as pieces:
+            a, b = begin.value, end.value
+            length, known = b - a, f.counts[Count.HISTORY_ROWS]
+            # Past the most pieces, all that is left is one.
+            last = known >= most
+            b = select(last, new_time, b)
+            for part, mark in ((0.5, 1.0), (1.0, 0.0)):
+                self._point(part, a, b, time, new_time, h)
+                r.call(history.write, t, x, f.reals, f.counts, f.p, r.constant(mark))
+            pieces.leave_when(last)
+            strays: Boolean | None = None
+            for part in (0.25, 0.75):
+                self._point(part, a, b, time, new_time, h)
+                place = r.constant(2.0 * part - 1.0)
+                found = r.call(history.strays, t, x, f.reals, f.counts, f.p, place, factor.value)
+                strays = found if strays is None else strays | found
+            assert strays is not None
+            divisible = length > b * 2.0**-48
+            with r.when(strays & divisible):
+                f.counts[Count.HISTORY_ROWS] = known
+                end.value = fma(0.5, length, a)
+                pieces.again()
+            factor.value = factor.value * select(known >= many, 1.1, 1.0)
+            begin.value = b
+            reached = fma(2.0, length, b)
+            end.value = minimum(reached, new_time)
+            pieces.leave_when(b >= new_time)
+
+    def _point(self, part: float, a: Real, b: Real, time: Real, new_time: Real, h: Real) -> None:
+        """The state at a part of the piece from ``a`` to ``b`` into ``new_x``, and what follows from it."""
+        f, places = self.frame, self.frame.places
+        x, y = f.vector(places.new_x), f.vector(places.y)
+        instant = b if part == 1.0 else fma(part, b - a, a)
+        self.method.interpolate(instant, time, h, x)
+        if part == 1.0:
+            at_end = b >= new_time
+            for i in f.r.each(f.n):
+                x[i] = select(at_end, y[i], x[i])
+        self.point.value = minimum(instant, f.clamp.value)
+        self.evaluation.solve(self.point.memory, x)

@@ -1,0 +1,49 @@
+"""Evaluation of a system at a point: delayed values, unknowns of implicit equations, derivative, Jacobian."""
+
+from __future__ import annotations
+
+from armblocks.integration import system_functions
+from armblocks.integration.delay_history import DelayHistory
+from armblocks.integration.frame import Frame
+from armblocks.integration.implicit_equations import define_solve
+from armblocks.integration.linear_equations import LinearSpace
+from armblocks.routines.values import Reals
+
+
+class Evaluation:
+    """Writes evaluations; arrays of one element hold the time."""
+
+    def __init__(self, frame: Frame, history: DelayHistory | None) -> None:
+        self.frame = frame
+        self.history = history
+        sizes, places = frame.sizes, frame.places
+        self.implicit = define_solve(frame.r.program, places, sizes.algebraic) if sizes.algebraic else None
+        nowhere = frame.r.nowhere
+        self.z = frame.vector(places.z) if sizes.hybrid else nowhere
+        self.unknowns = frame.vector(places.trial_w) if sizes.hybrid else nowhere
+
+    def solve(self, t: Reals, x: Reals) -> None:
+        """The delayed values at a point into ``z``, the unknowns of implicit equations into ``trial_w``."""
+        f = self.frame
+        if self.history:
+            f.r.call(self.history.read, t, x, f.reals, f.counts, f.p)
+        if self.implicit:
+            f.r.call(self.implicit, t, x, f.reals, f.p)
+
+    def flow(self, t: Reals, x: Reals, xd: Reals) -> None:
+        """The derivative at a point."""
+        self.solve(t, x)
+        f = self.frame
+        f.r.call(system_functions.derivative, t, x, self.z, self.unknowns, f.p, xd)
+
+    def jacobian(self, t: Reals, x: Reals, space: LinearSpace) -> None:
+        """The derivatives of the flow and of the implicit equations at a point, into the scratch."""
+        self.solve(t, x)
+        f, scratch = self.frame, self.frame.arrays.scratch
+        J, T = scratch.after(space.J), scratch.after(space.T)
+        f.r.call(system_functions.flow_jacobian, t, x, self.z, self.unknowns, f.p, J, T)
+
+    def accept_unknowns(self) -> None:
+        """``w`` becomes what was found last."""
+        places = self.frame.places
+        self.frame.copy(places.trial_w, places.w, self.frame.sizes.algebraic)

@@ -1,0 +1,108 @@
+"""Explicit Runge-Kutta methods: stages, and how stiff a step felt."""
+
+from __future__ import annotations
+
+from armblocks.integration.butcher_tableau import ButcherTableau, Row
+from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.frame import Frame
+from armblocks.integration.method import Method, change_to
+from armblocks.integration.workspace import Count
+from armblocks.routines.arithmetic import fma, maximum, select, square_root
+from armblocks.routines.values import Real
+
+CHECK_EVERY = 16
+"""Steps between two checks of what bounds them: a power of two."""
+NEAR_BORDER = 0.97
+"""Of the stability interval: a step beyond it is bound by stability (3.2 of 3.3, as in Hairer's DOPRI5)."""
+STIFF_CHECKS, CALM_CHECKS = 250, 6
+"""So many checks that find a step bound by stability, 4000 steps, make the system stiff; so many in a row
+that do not make it calm again."""
+
+
+class ExplicitMethod(Method):
+    """Writes the steps of an explicit tableau."""
+
+    short_checks = 2048
+
+    def __init__(self, frame: Frame, tableau: ButcherTableau, evaluation: Evaluation) -> None:
+        super().__init__(frame, tableau, evaluation)
+        self.butcher = tableau
+
+    def stages(self, time: Real, h: Real, new_time: Real) -> None:
+        """All stages, the new state into y and the derivative there into row ``s`` of K."""
+        tableau = self.butcher
+        for stage in range(1, tableau.stages):
+            self.move(tableau.matrix[stage], h)
+            self.evaluate(fma(tableau.nodes[stage], h, time), self.y, stage)
+        self.move(tableau.weights, h)
+        self.evaluate(new_time, self.y, tableau.stages)
+
+    @property
+    def has_extra_stages(self) -> bool:
+        """Whether the dense output needs stages of its own."""
+        return bool(self.butcher.extra_nodes)
+
+    def extra_stages(self, time: Real, h: Real) -> None:
+        """The stages that only the dense output needs; y keeps its value."""
+        tableau = self.butcher
+        for k, node in enumerate(tableau.extra_nodes):
+            self.move(tableau.extra_matrix[k], h)
+            self.evaluate(fma(node, h, time), self.y, tableau.stages + 1 + k)
+        # The extra stages went through y: give it the new state again, by the same operations.
+        self.move(tableau.weights, h)
+
+    def error_norm(self, h: Real, error: Row) -> Real:
+        """Norm of the error estimate; of both joined as in DOP853 where the tableau has two."""
+        stretched = self.butcher.stretched_error
+        if stretched is None:
+            return self.norm(h, error)
+        e5, e3 = self.square(self.weighted(error)), self.square(self.weighted(stretched))
+        denominator = square_root(fma(0.01, e3, e5) * float(self.n))
+        norm = h * e5 / denominator
+        return select(denominator == 0.0, 0.0, norm)
+
+    def change(self, h: Real) -> Real:
+        """Norm of ``h`` times the change of the derivative: to the end, and to a stage in the middle.
+
+        A long step may span a whole period, at whose end all is as at its start.
+        """
+        nodes = self.butcher.nodes
+        middle = min(range(1, self.butcher.stages), key=lambda stage: abs(nodes[stage] - 0.5))
+        return maximum(super().change(h), self.norm(h, change_to(middle)))
+
+    def watch(self, h: Real) -> None:
+        """Check whether stability bounds the step; if it has for long, pause at the next one.
+
+        A step counts as bound where ``h`` times the fastest rate is at the border of the stability region;
+        six calm checks in a row clear the count (Hairer, Wanner II, IV.2).
+        """
+        if not self.butcher.measures_stiffness:
+            return
+        f, r = self.frame, self.r
+        watched, stiff, calm = (f.count[place] for place in (Count.WATCHED, Count.STIFF, Count.CALM))
+        watched.value = watched.value + 1
+        with r.when(watched.value & (CHECK_EVERY - 1) == 0):
+            border = (NEAR_BORDER * self.butcher.real_stability) ** 2
+            with r.when(self.stiffness() > border):
+                stiff.value = stiff.value + 1
+                calm.value = 0
+                wanted = f.counts[Count.WATCHING] != 0
+                long = stiff.value >= STIFF_CHECKS
+                f.taken.value = select(wanted & long, f.arrays.max_steps, f.taken.value)
+            with r.otherwise():
+                calm.value = calm.value + 1
+                with r.when(calm.value >= CALM_CHECKS):
+                    stiff.value = 0
+
+    def stiffness(self) -> Real:
+        """The square of ``h`` times the fastest rate, as the last two evaluations show it (Hairer, Wanner II,
+        IV.2, equation (2.20)): both are at the step's end, so they differ by the Jacobian times the
+        difference of their states."""
+        tableau = self.butcher
+        last = (*tableau.matrix[-1], 0.0)
+        difference = tuple(b - a for a, b in zip(last, tableau.weights))
+        end, before = self.K(tableau.stages), self.K(tableau.stages - 1)
+        slopes = self.square(lambda i: end[i] - before[i])
+        states = self.square(lambda i: self.combination(difference, i))
+        # Both sums lack h^2: y_new - y_last = h sum_j (b_j - a_j) K[j].
+        return slopes / maximum(states, 1e-300)

@@ -1,0 +1,140 @@
+"""What all parts of a native loop share: the arrays of the run, variables in registers, ways to return."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from armblocks.integration.workspace import Count, LoopSizes, Scalar, Status, Workspace
+from armblocks.routines.routine import Part, Routine
+from armblocks.routines.values import Boolean, Integer, Integers, Reals, RealVariable
+
+SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
+"""Two times within these factors of one another are the same instant."""
+
+REALS = (Scalar.TIME, Scalar.STEP, Scalar.TRIED)
+COUNTS = (
+    Count.SAMPLE,
+    Count.SEGMENT,
+    Count.STARTED,
+    Count.GRID,
+    Count.ACCEPTED,
+    Count.REJECTED,
+    Count.EVALUATIONS,
+    Count.FRESH,
+    Count.SAVED,
+    Count.WATCHED,
+    Count.STIFF,
+    Count.CALM,
+    Count.SHORT,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arrays:
+    """The arguments of the native loop.
+
+    ``reals`` and ``counts`` hold the state of the run, ``p`` the parameters. ``samples`` are the instants to
+    record and ``out`` their states, ``(N, n)``; ``out_z``, ``out_w`` are likewise the discrete variables and
+    the unknowns. ``ends`` are the ends of the segments between breakpoints and ``clamps`` the latest time at
+    which each segment may evaluate its derivative. Into ``saved_reals`` and ``saved_counts`` goes the state
+    from which a run that ends later would go on; ``scratch`` has room for the linear equations of a step. The
+    loop returns after ``max_steps`` accepted steps at the latest.
+    """
+
+    reals: Reals
+    counts: Integers
+    p: Reals
+    samples: Reals
+    ends: Reals
+    clamps: Reals
+    out: Reals
+    out_z: Reals
+    out_w: Reals
+    saved_reals: Reals
+    saved_counts: Integers
+    scratch: Reals
+    max_steps: Integer
+
+
+class Frame:
+    """The routine of a loop with its arrays and its variables.
+
+    Scalars that change in every step are variables between the calls of the loop; :meth:`keep` writes them
+    back into the arrays.
+    """
+
+    def __init__(self, r: Routine, arrays: Arrays, places: Workspace, sizes: LoopSizes) -> None:
+        self.r = r
+        self.arrays = arrays
+        self.places = places
+        self.sizes = sizes
+        self.n = sizes.states
+        reals, counts = arrays.reals, arrays.counts
+        self.reals = reals
+        self.counts = counts
+        self.p = arrays.p
+        scalars = (*REALS, Scalar.BOUND) if sizes.hybrid else REALS
+        counters = (*COUNTS, Count.INSTANTS) if sizes.hybrid else COUNTS
+        self.scalar = {place: r.real(reals[place]) for place in scalars}
+        self.count = {place: r.integer(counts[place]) for place in counters}
+        self.max_step = reals[Scalar.MAX_STEP]
+        self.pause = reals[Scalar.PAUSE]
+        self.samples = counts[Count.SAMPLES]
+        self.segments = counts[Count.SEGMENTS]
+        segment = self.count[Count.SEGMENT].value
+        self.end = r.real(arrays.ends[segment])
+        """Where the steps that are taken now end: the next instant at which something happens."""
+        self.clamp = r.real(arrays.clamps[segment])
+        """The latest time at which the derivative may be evaluated on the way there."""
+        self.last_end = arrays.ends[self.segments - 1]
+        self.taken = r.integer(0)
+        """Steps accepted in this call."""
+        self.status = r.integer(Status.DONE)
+        self.h = r.real(0.0)
+        """Length of the step being tried."""
+        self.new_time = r.real(0.0)
+        """Time at its end."""
+        self.whole: Part | None = None
+        """All of the loop: leaving it returns the status."""
+
+    @property
+    def time(self) -> RealVariable:
+        """Time that the last accepted step reached."""
+        return self.scalar[Scalar.TIME]
+
+    def vector(self, place: int) -> Reals:
+        """A vector of the workspace."""
+        return self.reals.after(place)
+
+    def copy(self, source: int, target: int, count: int) -> None:
+        """One vector of the workspace to another place."""
+        copy(self.r, self.vector(source), self.vector(target), count)
+
+    def increase(self, place: Count) -> None:
+        """One more of what is counted."""
+        counter = self.count[place]
+        counter.value = counter.value + 1
+
+    def leave(self, status: Status) -> None:
+        """Return from the loop."""
+        assert self.whole is not None
+        self.status.value = status
+        self.whole.leave()
+
+    def leave_unless(self, condition: Boolean, status: Status) -> None:
+        """Return from the loop where the condition fails."""
+        with self.r.unless(condition):
+            self.leave(status)
+
+    def keep(self) -> None:
+        """Write the variables back into the arrays."""
+        for place, variable in self.scalar.items():
+            self.reals[place] = variable.value
+        for place, counter in self.count.items():
+            self.counts[place] = counter.value
+
+
+def copy(r: Routine, source: Reals, target: Reals, count: int) -> None:
+    """So many numbers from one place to another."""
+    for i in r.each(count):
+        target[i] = source[i]

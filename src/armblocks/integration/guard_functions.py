@@ -1,0 +1,205 @@
+"""Functions of a loop for guards: which ones fire, their signs, and whether events ever end."""
+
+from __future__ import annotations
+
+from armblocks.integration import system_functions
+from armblocks.integration.workspace import Count, LoopSizes, Scalar, Workspace
+from armblocks.routines.arithmetic import fma, maximum, minimum, select, sign
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
+
+MOST_AT_ONCE = 1000
+"""Events that may follow one another closely, at distances that do not shrink."""
+CLOSE = 1e-12
+"""Events nearer than this, beside the time, follow one another closely."""
+SHRINKING, SHRUNK = 10, 2.0**-46
+"""So many events of a guard in a row, each sooner than the one before, down to this distance beside the
+time, some 100 units in its last place, are taken for the first of infinitely many."""
+SHORT = 0.01
+"""The first step after an event, beside the time since the guard's event before it."""
+
+
+class GuardFunctions:
+    """The functions of a program for the guards of a system.
+
+    All have ``reals``, the array of the run with the guards' vectors; a guard's direction is 1 where it
+    fires upwards, -1 downwards, 0 both ways.
+    """
+
+    def __init__(self, program: Program, workspace: Workspace, sizes: LoopSizes) -> None:
+        self.places = workspace
+        self.count = len(sizes.directions)
+        self.modes = sizes.modes
+        self.directions = tuple(float(direction) for direction in sizes.directions)
+        self.watch = program.define(self._watch, "watch")
+        self.take_signs = program.define(self._take_signs, "take_signs")
+        self.note_events = program.define(self._note_events, "note_events")
+        self.dips = program.define(self._dips, "dips")
+        self.note_slopes = program.define(self._note_slopes, "note_slopes")
+        self.any_fired = program.define(self._any_fired, "any_fired")
+        self.hold_modes = program.define(self._hold_modes, "hold_modes")
+
+    def evaluate(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> None:
+        """Evaluate the guards and the contradictions of modes at a point whose unknowns are solved."""
+        places = self.places
+        z, unknowns, values = (reals.after(place) for place in (places.z, places.trial_w, places.guards))
+        if self.modes:
+            contradictions = reals.after(places.contradictions)
+            r.call(system_functions.guards_and_modes, t, x, z, unknowns, p, values, contradictions)
+        else:
+            r.call(system_functions.guards, t, x, z, unknowns, p, values)
+
+    def _watch(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> Integer:
+        """Evaluate the guards with ``trial_w`` and mark in ``fired`` which ones fire and whether upwards;
+        gives their count and that of the modes that contradict their conditions."""
+        places = self.places
+        self.evaluate(r, t, x, reals, p)
+        values, signs, fired, contradictions = (
+            reals.after(place) for place in (places.guards, places.signs, places.fired, places.contradictions)
+        )
+        directions = r.reals("guard.directions", self.directions)
+        total = r.integer(0)
+        for i in r.each(self.count):
+            now, known, wanted = sign(values[i]), signs[i], directions[i]
+            crossed = (now * known < 0.0) & (now * wanted >= 0.0)
+            fired[i] = select(crossed, now, 0.0)
+            total.value = total.value + crossed.count()
+        for i in r.each(len(self.modes)):
+            found = contradictions[i] != 0.0
+            total.value = total.value + found.count()
+        return total.value
+
+    def _any_fired(self, r: Routine, reals: Reals) -> Boolean:
+        """Whether a guard is marked in ``fired``."""
+        found, fired = r.boolean(False), reals.after(self.places.fired)
+        for i in r.each(self.count):
+            found.value = found.value | (fired[i] != 0.0)
+        return found.value
+
+    def _hold_modes(self, r: Routine, reals: Reals, only_first: Boolean) -> None:
+        """Modes that do not contradict their conditions keep their values; of the others, all or the first
+        take those of the reset."""
+        z, new_z, contradictions = (
+            reals.after(place) for place in (self.places.z, self.places.new_z, self.places.contradictions)
+        )
+        places = r.integers("mode.places", self.modes)
+        held = r.boolean(False)
+        for i in r.each(len(self.modes)):
+            place = places[i]
+            contradicts, kept = contradictions[i] != 0.0, held.value
+            new_z[place] = select(contradicts & ~kept, new_z[place], z[place])
+            held.value = kept | (contradicts & only_first)
+
+    def _dips(self, r: Routine, reals: Reals, half: Real) -> Integer:
+        """Count the guards that may have gone to zero and come back between three values of one sign, which
+        are ``half`` apart.
+
+        With A, M, B the values at the beginning, in the middle and at the end, as distances from zero, the
+        parabola through them is M + (B - A) s / 2 + C s^2 / 2, C = A - 2 M + B, for s from -1 to 1. It is
+        doubtful where its extremum lies between them, near zero; and where it begins at another slope than
+        that at which the window before this one ended: a cubic that turns such a difference D, times half
+        the window, is D / 5 away from the parabola, so half of D has to be less than the distances.
+        """
+        total = r.integer(0)
+        for i in r.each(self.count):
+            side = reals.after(self.places.signs)[i]
+            A, M, B = (side * value for value in self._window(reals, i))
+            rise = B - A
+            bend = A - M + (B - M)
+            inside = abs(rise) < 1.98 * bend
+            # least = M - rise^2 / (8 bend), doubtful by a quarter of the bend
+            eight = 8.0 * bend
+            least = fma(eight, M, -1.0 * (rise * rise))
+            near = least < 0.25 * bend * eight
+            dips = (inside & near) | self._turns(reals, half, i, side, (A, M, B))
+            total.value = total.value + dips.count()
+        return total.value
+
+    def _window(self, reals: Reals, i: Integer | int) -> tuple[Real, Real, Real]:
+        """The values of a guard at the beginning, in the middle and at the end of a window."""
+        places = self.places
+        before, middle, end = (
+            reals.after(place)[i] for place in (places.guards_before, places.guards_middle, places.guards)
+        )
+        return before, middle, end
+
+    def _turns(
+        self, reals: Reals, half: Real, i: Integer | int, side: Real, distances: tuple[Real, Real, Real]
+    ) -> Boolean:
+        """Whether a guard does not go on as the window before this one ended; false where that is NaN."""
+        A, M, B = distances
+        known = side * reals.after(self.places.guard_slopes)[i]
+        now = fma(-1.5, A, fma(2.0, M, -0.5 * B))
+        turn = abs(now - known * half)
+        least = minimum(A, minimum(M, B))
+        doubtful = 0.5 * turn > least
+        return (least > 0.0) & doubtful
+
+    def _note_slopes(self, r: Routine, reals: Reals, half: Real) -> None:
+        """Keep the slope at the end of the parabola through the last three values of each guard."""
+        for i in r.each(self.count):
+            A, M, B = self._window(reals, i)
+            rise = fma(1.5, B, fma(-2.0, M, 0.5 * A))
+            reals.after(self.places.guard_slopes)[i] = rise / half
+
+    def _take_signs(self, r: Routine, reals: Reals, only_fired: Boolean) -> None:
+        """Note the sides on which the guards are, or only those that fired."""
+        places = self.places
+        values, signs, fired = (reals.after(place) for place in (places.guards, places.signs, places.fired))
+        directions = r.reals("guard.directions", self.directions)
+        for i in r.each(self.count):
+            now, known, mark = sign(values[i]), signs[i], fired[i]
+            has_fired, nonzero = mark != 0.0, now != 0.0
+            side = select(nonzero, now, known)
+            # A guard of one direction that is put onto its zero comes from the other side: a ball on the
+            # floor that falls on bounces again.
+            directed = directions[i] != 0.0
+            back = select(directed & has_fired, -1.0 * mark, now)
+            after = select(has_fired, select(nonzero, now, back), known)
+            signs[i] = select(only_fired, after, side)
+
+    def _note_events(self, r: Routine, t: Real, reals: Reals, counts: Integers) -> Real:
+        """Count the events of an instant, and those in a row that follow one another without an end; gives a
+        bound for the next step, negative where there is no end.
+
+        Events follow closely where less than ``CLOSE`` of the time lies between them. A series whose
+        distances shrink, as those of a bouncing ball, may come to an end by itself: it has none only where
+        the distances become as short as the rounding of the time.
+        """
+        places = self.places
+        bound = r.real(float("inf"))
+        scale = maximum(t, 1e-6 * reals[Scalar.SPAN])
+        shrunk = SHRUNK * scale
+        close = t - reals[Scalar.LAST_EVENT] <= CLOSE * scale
+        reals[Scalar.LAST_EVENT] = t
+        fired_one, ending, endless = r.boolean(False), r.boolean(True), r.boolean(False)
+        fired, repeats, last, gap, shrinking = (
+            reals.after(place)
+            for place in (places.fired, places.repeats, places.last, places.gap, places.shrinking)
+        )
+        for i in r.each(self.count):
+            repeats[i] = select(close, repeats[i], 0.0)
+            with r.when(fired[i] != 0.0):
+                fired_one.value = True
+                counts[Count.GUARD] = i + 1
+                counts[Count.EVENTS] = counts[Count.EVENTS] + 1
+                repeats[i] = repeats[i] + 1.0
+                passed, known = t - last[i], gap[i]
+                later = passed > 0.0
+                shorter = later & (passed < known)
+                ending.value = ending.value & shorter
+                row = select(shorter, shrinking[i] + 1.0, 0.0)
+                row = select(later, row, shrinking[i])
+                shrinking[i] = row
+                ends = shorter & (passed < shrunk) & (row >= float(SHRINKING))
+                endless.value = endless.value | ends
+                distance = select(later, passed, known)
+                gap[i] = distance
+                last[i] = t
+                bound.value = minimum(SHORT * distance, bound.value)
+        shrinks = fired_one.value & ending.value
+        further = counts[Count.CLOSE] + select(shrinks, r.constant_integer(0), 1)
+        in_a_row = select(close, further, 0)
+        counts[Count.CLOSE] = in_a_row
+        without_end = endless.value | (in_a_row > MOST_AT_ONCE)
+        return select(without_end, -1.0, bound.value)

@@ -1,0 +1,221 @@
+"""The course of a system with clocks, events, delays or implicit equations: pieces between instants.
+
+At an instant (a tick, an event, a breakpoint, the start) things happen in this order, all in native code:
+
+1. the flow is integrated up to it with the old values; the step ends exactly there, and where something
+   keeps left limits, ``update`` is called for that with no clock marked;
+2. all clocks that tick now are marked and ``update`` gives ``z``;
+3. guards whose sign the jump has changed fire, and so do those whose zero was located here; ``reset`` gives
+   ``x`` and ``z``; this is repeated until none fires; then modes that contradict their conditions take their
+   consistent values, and all this is repeated until nothing changes;
+4. the instant is recorded: signals are right-continuous;
+5. the integration starts anew. The first step after an event is at most a hundredth of the time since the
+   event before it, and later ones grow tenfold at most: no step leaps over a bounce that is getting shorter.
+
+Instants that are not more than four units in the last place apart are one instant: so 3 times 0.1 s and 0.3 s
+coincide although their doubles differ, and a breakpoint or a recorded instant coincides with a tick likewise.
+"""
+
+from __future__ import annotations
+
+from armblocks.integration.clocks import Clocks
+from armblocks.integration.course import INSTANT, START, STEP, Course, Trial
+from armblocks.integration.delays import Delays
+from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.events import Events
+from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW, Frame
+from armblocks.integration.method import Method
+from armblocks.integration.records import Records
+from armblocks.integration.segments import choose_first_step
+from armblocks.integration.workspace import Count, Scalar, Stage, Status
+from armblocks.routines.arithmetic import fma, maximum, minimum, select
+from armblocks.routines.routine import Part, Stages
+from armblocks.routines.values import Boolean, Real, RealVariable
+
+
+class Instants(Course):
+    """Pieces end at ticks, events, breakpoints, and where a delayed signal jumps.
+
+    ``point`` holds the time of an evaluation.
+    """
+
+    def __init__(
+        self, frame: Frame, method: Method, records: Records, evaluation: Evaluation, point: RealVariable
+    ) -> None:
+        self.frame = frame
+        self.method = method
+        self.records = records
+        self.evaluation = evaluation
+        self.point = point
+        self.clocks = Clocks(frame, evaluation, point)
+        self.events = Events(frame, method, records, evaluation, point) if frame.sizes.directions else None
+        history = evaluation.history
+        self.delays = Delays(frame, method, records, evaluation, history, point) if history else None
+        self.segment_end = frame.r.real(0.0)
+        self.x = frame.vector(frame.places.x)
+
+    def enter(self, stages: Stages) -> None:
+        """Go on where the last call stopped; the ends of the current piece are worked out again."""
+        f, r = self.frame, self.frame.r
+        if self.delays:
+            self.delays.bound_steps()
+        self.begin_piece()
+        started = f.count[Count.STARTED].value
+        with r.when(started == Stage.RUNNING):
+            stages.go(STEP)
+        with r.when(started == Stage.START):
+            stages.go(START)
+        stages.begin(INSTANT)
+        self.instant()
+
+    def begin_piece(self) -> None:
+        """How far the steps may go: to the next tick or the segment's end, whichever is earlier."""
+        f = self.frame
+        last = f.segments - 1
+        segment = f.count[Count.SEGMENT].value
+        segment = select(segment < last, segment, last)
+        end = f.arrays.ends[segment]
+        self.segment_end.value = end
+        f.clamp.value = f.arrays.clamps[segment]
+        # A tick a few rounding errors before the end is at the end.
+        shortest = end * SAME_BELOW
+        earliest = end
+        for clock in range(self.clocks.count):
+            time = self.clocks.next_tick(clock)
+            earliest = select((time < shortest) & (time < earliest), time, earliest)
+        if self.delays:
+            time = self.delays.next_jump()
+            earliest = select((time < shortest) & (time < earliest), time, earliest)
+        f.end.value = earliest
+
+    def instant(self) -> None:
+        """Ticks, events and records at the time reached; goes on at the start of the next piece."""
+        f = self.frame
+        time = f.time.value
+        until = time * SAME_ABOVE
+        # A record that is one instant with a tick or breakpoint is of that instant. An event is located to
+        # the last place: what is recorded later comes later.
+        known = time >= f.end.value * SAME_BELOW
+        recorded = select(known, until, time)
+        self.clocks.capture(time)
+        if self.delays:
+            self.delays.pass_jumps(time)
+        self.clocks.tick(time, until)
+        if self.events:
+            self.events.make_modes_consistent(time)
+            self.events.fire(time)
+        else:
+            f.counts[Count.AT_START] = 0
+            self.point.value = time
+            self.evaluation.solve(self.point.memory, self.x)
+        if self.delays:
+            self.delays.write_change(time)
+        self.evaluation.accept_unknowns()
+        self.records.samples(time, recorded, None)
+        if self.events:
+            self.events.stop(time)
+        f.leave_unless(f.count[Count.SEGMENT].value < f.segments, Status.DONE)
+        self.begin_piece()
+        f.count[Count.STARTED].value = Stage.START
+
+    def before_step(self) -> None:
+        """Make sure that the history of delayed signals has room for another step."""
+        if self.delays:
+            self.delays.make_room()
+
+    def first_step(self, time: Real) -> None:
+        """The length of the step after a start; after a tick, the length that was to come next."""
+        f = self.frame
+        with f.r.when(f.count[Count.FRESH].value != 0):
+            choose_first_step(f, self.method, self.records, time)
+            length = f.scalar[Scalar.STEP]
+            length.value = minimum(length.value, f.scalar[Scalar.BOUND].value)
+
+    def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
+        """Try a fixed step, shorter where its end is not finite; at last one across the border of a mode."""
+        f, r, method = self.frame, self.frame.r, self.method
+        end_row = method.K(method.tableau.end_row)
+        if not self.events:
+            trial(time, new_time)
+            f.leave_unless(method.all_finite(method.y, end_row), Status.NON_FINITE)
+            return
+        end = r.real(new_time)
+        with r.part() as finite:
+            with r.part() as attempt:
+                trial(time, end.value)
+                finite.leave_when(method.all_finite(method.y, end_row))
+                h = 0.25 * (end.value - time)
+                end.value = time + h
+                attempt.again_when(h > self.events.shortest(time))
+            self.events.cross(time)
+
+    def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
+        """Steps have become as short as they can be: cross the border of a mode, if that is the cause."""
+        if self.events:
+            with self.frame.r.unless(finite):
+                self.events.cross(time)
+                accepted.leave()
+        else:
+            self.frame.leave_unless(finite, Status.NON_FINITE)
+
+    def passed(self, time: Real, spacing: Real) -> Real:
+        """Grid instants up to this time are behind: one a rounding error after a tick is the tick."""
+        return fma(spacing, 1e-9, time)
+
+    def bounded(self, time: Real, new_time: Real) -> Real:
+        """The end of a fixed step, sooner right after an event."""
+        f = self.frame
+        following = (time.bits() + 10).from_bits()
+        soon = maximum(time + f.scalar[Scalar.BOUND].value, following)
+        if self.delays:
+            soon = minimum(soon, time + f.max_step)
+        return minimum(soon, new_time)
+
+    def next_length(self, proposed: Real) -> Real:
+        """A step that was cut short by a tick says nothing against the length that was to be tried."""
+        f = self.frame
+        length = f.scalar[Scalar.STEP].value
+        cut = f.new_time.value >= f.end.value
+        return select(cut, maximum(proposed, length), proposed)
+
+    def accept(self, stages: Stages) -> None:
+        """Events within the step, its samples, then the new point becomes the old one."""
+        f, r, places, records = self.frame, self.frame.r, self.frame.places, self.records
+        if self.events:
+            self.events.happened.value = 0
+        time, h = f.time.value, f.h.value
+        if self.events:
+            self.events.search(time, h)
+        new_time = f.new_time.value
+        before = new_time * SAME_BELOW
+        if self.events:
+            # An event is located to the last place: a record before it shows what was before it, unless a
+            # tick or breakpoint is at this instant as well.
+            apart = (self.events.happened.value != 0) & (new_time < f.end.value * SAME_BELOW)
+            before = select(apart, (new_time.bits() - 1).from_bits(), before)
+        records.samples(time, before, h)
+        if self.delays:
+            self.delays.write_step(time, new_time, h)
+        f.copy(places.y, places.x, f.n)
+        f.time.value = new_time
+        f.increase(Count.ACCEPTED)
+        f.count[Count.FRESH].value = 0
+        bound = f.scalar[Scalar.BOUND]
+        bound.value = bound.value * 10.0
+        f.taken.value = f.taken.value + 1
+        ends = new_time >= f.end.value
+        with r.unless((self.events.happened.value != 0) | ends if self.events else ends):
+            f.copy(places.slope(self.method.tableau.end_row), places.slope(0), f.n)
+            if f.sizes.algebraic or self.delays:
+                # The samples may have changed it; a zero of the same equations is found again at once.
+                self.point.value = minimum(new_time, f.clamp.value)
+                self.evaluation.solve(self.point.memory, self.x)
+                self.evaluation.accept_unknowns()
+            records.samples(new_time, new_time * SAME_ABOVE, None)
+            stages.go(STEP)
+        with r.when(new_time >= self.segment_end.value):
+            f.increase(Count.SEGMENT)
+            f.count[Count.FRESH].value = 1
+        f.count[Count.STARTED].value = Stage.INSTANT
+        self.clocks.halt(new_time)
+        stages.go(INSTANT)

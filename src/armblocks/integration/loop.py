@@ -1,0 +1,141 @@
+"""The whole loop of a one-step method as one native function around the functions of a system.
+
+One call takes many steps: stages, error estimate, step control, values at the sample instants, ticks, events
+and restarts at breakpoints, without returning to Python. All of its state lies in two flat arrays
+(:mod:`armblocks.integration.workspace`), so a run can stop after any number of steps and go on with the same
+bits.
+
+The loop is composed: a :class:`~armblocks.integration.method.Method` takes a step,
+:class:`~armblocks.integration.step_control.Steps` chooses its length, a
+:class:`~armblocks.integration.course.Course` says where steps end and what happens there. A system that only
+flows has :class:`~armblocks.integration.segments.Segments`, any other
+:class:`~armblocks.integration.instants.Instants` with its clocks, events and delayed signals.
+"""
+
+from __future__ import annotations
+
+from armblocks.integration.butcher_tableau import ButcherTableau
+from armblocks.integration.course import INSTANT, START, STEP, Course
+from armblocks.integration.delay_history import DelayHistory
+from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.explicit_method import ExplicitMethod
+from armblocks.integration.frame import Arrays, Frame
+from armblocks.integration.instants import Instants
+from armblocks.integration.linear_equations import LinearSpace
+from armblocks.integration.method import Method
+from armblocks.integration.records import Records
+from armblocks.integration.rosenbrock_method import RosenbrockMethod
+from armblocks.integration.rosenbrock_tableau import Tableau
+from armblocks.integration.segments import Segments
+from armblocks.integration.step_control import Steps
+from armblocks.integration.workspace import Count, LoopSizes, Stage, Status, Workspace
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Integer, Integers, Reals
+
+POINTERS = 12
+"""Arrays among the arguments of the loop; the number of steps comes after them."""
+
+
+def define_loop(
+    program: Program,
+    symbol: str,
+    tableau: Tableau,
+    workspace: Workspace,
+    sizes: LoopSizes,
+    space: LinearSpace | None = None,
+) -> None:
+    """Define the loop of a method for a system; its result is a ``Status``.
+
+    The system's functions (:mod:`armblocks.integration.system_functions`) stand elsewhere. The linear
+    equations of a Rosenbrock method lie in ``space``.
+    """
+
+    def loop(
+        r: Routine,
+        reals: Reals,
+        counts: Integers,
+        p: Reals,
+        samples: Reals,
+        ends: Reals,
+        clamps: Reals,
+        out: Reals,
+        out_z: Reals,
+        out_w: Reals,
+        saved_reals: Reals,
+        saved_counts: Integers,
+        scratch: Reals,
+        max_steps: Integer,
+    ) -> Integer:
+        arrays = Arrays(
+            reals=reals,
+            counts=counts,
+            p=p,
+            samples=samples,
+            ends=ends,
+            clamps=clamps,
+            out=out,
+            out_z=out_z,
+            out_w=out_w,
+            saved_reals=saved_reals,
+            saved_counts=saved_counts,
+            scratch=scratch,
+            max_steps=max_steps,
+        )
+        frame = Frame(r, arrays, workspace, sizes)
+        _Loop(frame, tableau, space).write()
+        return frame.status.value
+
+    program.define(loop, symbol, public=True, distinct=True)
+
+
+class _Loop:
+    """Puts the parts together and writes them in the order in which they run."""
+
+    def __init__(self, frame: Frame, tableau: Tableau, space: LinearSpace | None) -> None:
+        self.frame = frame
+        r, sizes, places = frame.r, frame.sizes, frame.places
+        history = DelayHistory(r.program, places, sizes) if sizes.delays else None
+        evaluation = Evaluation(frame, history)
+        self.method = _method(frame, tableau, evaluation, space)
+        point = r.real(0.0)
+        records = Records(frame, self.method, evaluation, point.memory)
+        self.records = records
+        self.course: Course
+        if sizes.hybrid:
+            self.course = Instants(frame, self.method, records, evaluation, point)
+        else:
+            self.course = Segments(frame, self.method, records)
+        self.steps = Steps(frame, self.method, records, self.course)
+
+    def write(self) -> None:
+        """The whole body, up to the variables back in the arrays."""
+        f, r = self.frame, self.frame.r
+        with r.part() as f.whole, r.stages(INSTANT, START, STEP) as stages:
+            self.course.enter(stages)
+            stages.begin(START)
+            self.start()
+            stages.begin(STEP)
+            on = (f.taken.value < f.arrays.max_steps) & (f.time.value < f.pause)
+            f.leave_unless(on, Status.PAUSED)
+            self.course.before_step()
+            self.steps.write()
+            self.course.accept(stages)
+        f.keep()
+
+    def start(self) -> None:
+        """First derivative of a segment, the samples at its very start, the first step's length."""
+        f, method = self.frame, self.method
+        time = f.time.value
+        method.evaluate(time, method.x, 0)
+        self.records.samples(time, time, None)
+        f.leave_unless(method.all_finite(method.K(0)), Status.NON_FINITE_START)
+        if method.tableau.adaptive:
+            self.course.first_step(time)
+        f.count[Count.STARTED].value = Stage.RUNNING
+
+
+def _method(frame: Frame, tableau: Tableau, evaluation: Evaluation, space: LinearSpace | None) -> Method:
+    if isinstance(tableau, ButcherTableau):
+        return ExplicitMethod(frame, tableau, evaluation)
+    assert space is not None
+    return RosenbrockMethod(frame, tableau, evaluation, space)

@@ -1,0 +1,134 @@
+"""Rosenbrock methods: Jacobian, linear equations, stages.
+
+Rows of K are the derivative at the step's start, the stages, and the derivative at its end, so that all else
+(error norm, first step, values between the steps) is that of the explicit methods. The Jacobian is evaluated
+once a step, also where the step is tried again shorter. Its entries that are infinite or NaN (the derivative
+of a root at zero) count as zero: the derivative itself is finite there, and the error estimate sees what they
+lack.
+"""
+
+from __future__ import annotations
+
+from armblocks.integration.butcher_tableau import Row
+from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.explicit_method import CHECK_EVERY
+from armblocks.integration.frame import Frame, copy
+from armblocks.integration.linear_equations import LinearEquations, LinearSpace
+from armblocks.integration.method import Index, Method
+from armblocks.integration.rosenbrock_tableau import RosenbrockTableau
+from armblocks.integration.workspace import Count
+from armblocks.routines.arithmetic import fma, maximum, select
+from armblocks.routines.values import Real, Reals
+
+STABLE_BELOW, STABLE_CHECKS = 2.0, 16
+"""A step that times the fastest rate is less than this is one that an explicit method could take as well; so
+many checks in a row, four times as many after each return, and one does."""
+
+
+class RosenbrockMethod(Method):
+    """Writes the steps of a Rosenbrock tableau, whose linear equations lie in ``space``."""
+
+    short_checks = 512
+
+    def __init__(
+        self, frame: Frame, tableau: RosenbrockTableau, evaluation: Evaluation, space: LinearSpace
+    ) -> None:
+        super().__init__(frame, tableau, evaluation)
+        self.rosenbrock = tableau
+        self.space = space
+        self.scratch = frame.arrays.scratch
+        self.right = self.scratch.after(space.right)
+        self.solution = self.scratch.after(space.solution)
+        self.equations = LinearEquations(frame.r.program, space, tableau.gamma)
+        self._time: Real | None = None
+
+    def prepare(self, time: Real) -> None:
+        """The Jacobian at the step's start."""
+        self.evaluation.jacobian(self.set_point(time), self.x, self.space)
+        for k in self.r.each(self.space.T + self.space.size):
+            value = self.scratch[k]
+            self.scratch[k] = select(value.finite, value, 0.0)
+
+    def stages(self, time: Real, h: Real, new_time: Real) -> None:
+        """All stages, the new state into y and the derivatives into their rows of K."""
+        r, tableau = self.r, self.rosenbrock
+        self._time = time
+        r.call(self.equations.factor, self.scratch, h)
+        for stage in range(tableau.stages):
+            row = 1 + stage
+            source = self.K(0)
+            if stage:
+                self.move((0.0, *tableau.matrix[stage]), h)
+                self.evaluate(fma(tableau.nodes[stage], h, time), self.y, row)
+                source = self.K(row)
+            self._right(source, stage, h)
+            r.call(self.equations.solve, self.scratch)
+            if stage == 0 and self.equations.solved_well:
+                # If the elimination without pivoting went wrong, another one with it.
+                with r.unless(r.call(self.equations.solved_well, self.scratch, h)):
+                    r.call(self.equations.factor_whole, self.scratch, h)
+                    r.call(self.equations.solve, self.scratch)
+            copy(r, self.solution, self.K(row), self.n)
+        self.move((0.0, *tableau.weights), h)
+        self.evaluate(new_time, self.y, tableau.end_row)
+
+    def error_norm(self, h: Real, error: Row) -> Real:
+        """That of the embedded method, or of the values in the middle of the step, whichever is larger."""
+        assert self._time is not None
+        r, tableau = self.r, self.rosenbrock
+        ends = self.norm(h, error)
+        state, derivative = self.K(tableau.middle_row), self.K(tableau.middle_row + 1)
+        middle = fma(0.5, h, self._time)
+        self.interpolate(middle, self._time, h, state)
+        self.evaluate(middle, state, tableau.middle_row + 1)
+        weights = tableau.slope_weights(0.5)
+
+        def weighted(i: Index) -> Real:
+            value = self.solution[i]
+            before, after = abs(self.x[i]), abs(self.y[i])
+            return value / self.scale(maximum(before, after))
+
+        for i in r.each(self.n):
+            self.right[i] = derivative[i] - self.combination(weights, i)
+        for i in r.each(self.space.size - self.n):
+            self.right.after(self.n)[i] = 0.0
+        r.call(self.equations.solve, self.scratch)
+        between = h * self.mean_square(weighted)
+        # A NaN of either is the result: it makes the step be tried shorter.
+        return select(between < ends, ends, between + ends * 0.0)
+
+    def watch(self, h: Real) -> None:
+        """Check whether an explicit method could take as long steps; pause where it long could.
+
+        With implicit equations the rates are not those of the flow's Jacobian, and nothing returns.
+        """
+        if self.space.size != self.n:
+            return
+        f, r = self.frame, self.r
+        watched, wanted, calm = (f.count[place] for place in (Count.WATCHED, Count.STIFF, Count.CALM))
+        watched.value = watched.value + 1
+        checked = watched.value & (CHECK_EVERY - 1)
+        due = (f.counts[Count.WATCHING] != 0) & (checked == 0)
+        with r.when(due):
+            stable = h * r.call(self.equations.rate_bound, self.scratch) < STABLE_BELOW
+            more = calm.value + 1
+            calm.value = select(stable, more, 0)
+            long = calm.value >= wanted.value
+            f.taken.value = select(long, f.arrays.max_steps, f.taken.value)
+
+    def _right(self, source: Reals, stage: int, h: Real) -> None:
+        """``right = f + sum_j couplings[j] k[j] + h time_weight T``."""
+        tableau, T = self.rosenbrock, self.scratch.after(self.space.T)
+        weight = tableau.time_weights[stage]
+        factor = weight * h if weight else None
+
+        def over_time(i: Index, total: Real) -> Real:
+            return total if factor is None else fma(factor, T[i], total)
+
+        for i in self.r.each(self.n):
+            total = source[i]
+            for j, coupling in enumerate(tableau.couplings[stage]):
+                total = fma(coupling, self.K(1 + j)[i], total)
+            self.right[i] = over_time(i, total)
+        for i in self.r.each(self.space.size - self.n):
+            self.right[i + self.n] = over_time(i + self.n, self.r.constant(0.0))

@@ -1,0 +1,71 @@
+"""The course of a system that only flows: segments between breakpoints."""
+
+from __future__ import annotations
+
+from armblocks.integration.course import START, STEP, Course, Trial
+from armblocks.integration.frame import Frame
+from armblocks.integration.method import Method
+from armblocks.integration.records import Records
+from armblocks.integration.workspace import Count, Scalar, Stage, Status
+from armblocks.routines.routine import Part, Stages
+from armblocks.routines.values import Boolean, Real
+
+
+class Segments(Course):
+    """Each segment starts anew where the one before it ends."""
+
+    def __init__(self, frame: Frame, method: Method, records: Records) -> None:
+        self.frame = frame
+        self.method = method
+        self.records = records
+
+    def enter(self, stages: Stages) -> None:
+        """Go on with a step, or at the start of a segment."""
+        with self.frame.r.when(self.frame.count[Count.STARTED].value == Stage.RUNNING):
+            stages.go(STEP)
+
+    def first_step(self, time: Real) -> None:
+        """Choose the length of the step after a start."""
+        choose_first_step(self.frame, self.method, self.records, time)
+
+    def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
+        """Try a fixed step; return where its end is not finite."""
+        trial(time, new_time)
+        method = self.method
+        finite = method.all_finite(method.y, method.K(method.tableau.end_row))
+        self.frame.leave_unless(finite, Status.NON_FINITE)
+
+    def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
+        """Return where steps as short as they can be are not finite."""
+        self.frame.leave_unless(finite, Status.NON_FINITE)
+
+    def accept(self, stages: Stages) -> None:
+        """Samples of the step, then the new point becomes the old one; at a segment's end, start anew."""
+        f, records = self.frame, self.records
+        new_time = f.new_time.value
+        records.extra_done.value = 0
+        records.samples(f.time.value, new_time, f.h.value)
+        f.copy(f.places.y, f.places.x, f.n)
+        f.copy(f.places.slope(self.method.tableau.end_row), f.places.slope(0), f.n)
+        f.time.value = new_time
+        f.increase(Count.ACCEPTED)
+        f.count[Count.FRESH].value = 0
+        f.taken.value = f.taken.value + 1
+        with f.r.unless(new_time >= f.end.value):
+            stages.go(STEP)
+        f.increase(Count.SEGMENT)
+        f.count[Count.STARTED].value = Stage.START
+        f.count[Count.FRESH].value = 1
+        segment = f.count[Count.SEGMENT].value
+        f.leave_unless(segment < f.segments, Status.DONE)
+        f.end.value = f.arrays.ends[segment]
+        f.clamp.value = f.arrays.clamps[segment]
+        stages.go(START)
+
+
+def choose_first_step(frame: Frame, method: Method, records: Records, time: Real) -> None:
+    """The length of the first step, from the derivative; the run's end may bound it."""
+    interval = frame.end.value - time
+    length, bounded = method.first_step(time, interval, frame.max_step)
+    records.checkpoint(bounded & (frame.end.value >= frame.last_end))
+    frame.scalar[Scalar.STEP].value = length
