@@ -1,0 +1,60 @@
+"""Random diagrams obey the laws: a small, seeded part of what ``scripts/fuzz.py`` does for hours."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from fuzz_laws import LAWS, InconclusiveError, findings
+from fuzzing import reduced
+from random_diagrams import Node, Recipe, random_recipe
+
+SEEDS = range(8)
+ALWAYS = ("reference", "formulas", "equations")
+IN_TURN = tuple(name for name in LAWS if name not in ALWAYS)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_random_diagram_obeys_the_laws(seed: int) -> None:
+    """All laws that cost one run, and two of the others."""
+    turn = (IN_TURN[seed % len(IN_TURN)], IN_TURN[(3 * seed + 1) % len(IN_TURN)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            found = findings(random_recipe(seed), (*ALWAYS, *dict.fromkeys(turn)))
+        except InconclusiveError:
+            return
+    found.pop("inconclusive", None)
+    assert found == {}
+
+
+def test_a_seed_always_gives_the_same_diagram() -> None:
+    assert random_recipe(5) == random_recipe(5)
+    assert random_recipe(5).diagram() == random_recipe(5).diagram()
+    assert random_recipe(5) != random_recipe(6)
+
+
+def test_a_finding_is_reduced_to_the_block_that_it_needs() -> None:
+    """A judge that minds sines only, in a diagram of many blocks."""
+    recipe = next(recipe for recipe in map(random_recipe, range(100)) if has(recipe.nodes, "SineWave"))
+    judge = lambda smaller, laws: {"law": ["a sine"]} if has(smaller.nodes, "SineWave") else {}  # noqa: E731
+    smallest, text = reduced(judge, recipe, "law", until=np.inf)
+    assert [node.kind for node in smallest.nodes] == ["SineWave"]
+    assert text == "a sine"
+
+
+def has(nodes: tuple[Node, ...], kind: str) -> bool:
+    return any(node.kind == kind or has(node.inside, kind) for node in nodes)
+
+
+def test_a_loop_without_a_solution_is_found() -> None:
+    """What a wrong simulator would give for u = if(u > 0, -1, 1) contradicts the equations of the block."""
+    recipe = Recipe((Node("e", "Expression", {"formula": "if(u>0,-1,1)"}, {"u": "e/y"}),))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            found = findings(recipe, ("equations",))
+        except (InconclusiveError, ValueError):
+            return  # refused, as it should be
+    assert "equations" in found
