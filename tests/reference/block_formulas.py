@@ -79,6 +79,8 @@ def _multiport(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
 
 def _table(block: Any, u: Inputs, t: np.ndarray) -> np.ndarray:
     x, y, v = _array(block.positions), _array(block.table), u["u"]
+    if block.method == "cubic":
+        return np.full(v.shape, np.nan)  # no formula here: a spline does not switch
     if block.method == "flat":
         return y[np.clip(np.searchsorted(x, v, side="right") - 1, 0, len(x) - 1)]
     if block.method == "nearest":

@@ -78,8 +78,6 @@ class ReferenceRun:
     def run(self) -> dict[str, np.ndarray]:
         """Signals ``(N, *shape)`` by ``block/port``; fewer rows where a block ended the run."""
         network = self.network
-        network.evaluate(0.0)
-        self.begin()
         for t, clocks, recorded, jumps in self.instants():
             if t > 0.0:
                 while not self.stopped and self.t < t:
@@ -187,13 +185,6 @@ class ReferenceRun:
 
     # -- instants ------------------------------------------------------------------------------------------
 
-    def begin(self) -> None:
-        """At t = 0 no guard has a sign yet: resets without events give the states that signals ask for."""
-        for _ in range(MOST_TURNS):
-            if not self.network.turn(0.0, first=True):
-                break
-        self.network.take_signs()
-
     def instant(self, t: float, clocks: list[int]) -> None:
         """Left limits, ticks, turns."""
         network = self.network
@@ -202,6 +193,12 @@ class ReferenceRun:
         self.t = t
         if clocks:
             network.tick(t, clocks)
+        if t == 0.0:
+            # No guard has a sign yet: resets without events give the states that the signals ask for.
+            for _ in range(MOST_TURNS):
+                if not network.turn(0.0, first=True):
+                    break
+            network.take_signs()
         for _ in range(MOST_TURNS):
             if not network.turn(t):
                 break
