@@ -15,12 +15,14 @@ import armblocks as ab
 from armblocks import DiagramBuilder
 from armblocks.blocks import (
     Abs,
+    Clock,
     CompareToZero,
     Constant,
     CoulombFriction,
     DeadZone,
     Expression,
     Gain,
+    HitCrossing,
     Integrator,
     IntegratorLimited,
     IntervalTest,
@@ -28,7 +30,9 @@ from armblocks.blocks import (
     Quantizer,
     RateLimiterContinuous,
     RateLimiterDynamic,
+    Relay,
     RepeatingSequence,
+    ResettableIntegrator,
     Rounding,
     Saturation,
     SecondOrderIntegratorLimited,
@@ -38,6 +42,7 @@ from armblocks.blocks import (
     Step,
     Sum,
     Switch,
+    TriggeredSubsystem,
 )
 from armblocks.diagram import Block, Diagram
 from armblocks.errors import SimulationError
@@ -268,3 +273,24 @@ def test_a_switch_follows_its_control_through_a_touch() -> None:
     u = result["control/y"]
     sure = np.abs(u) > 1e-12
     np.testing.assert_array_equal(result["switch/y"][sure], np.where(u > 0.0, 1.0, 2.0)[sure])
+
+
+def test_nothing_with_a_memory_acts_on_a_signal_that_is_not_consistent_yet() -> None:
+    """A square wave behind a limiter is never positive: no relay, edge, count, reset or trigger sees more."""
+    builder = DiagramBuilder("memory")
+    square = builder.add("square", SignalGenerator(waveform="square", amplitude=0.5, frequency=0.5))
+    cut = builder.add("cut", Saturation(lower=-0.5, upper=0.0), square)
+    builder.add("relay", Relay(on_point=0.1, off_point=-2.0), cut)
+    builder.add(
+        "integral", ResettableIntegrator(external_reset="rising"), builder.add("one", Constant()), cut
+    )
+    builder.add("hits", HitCrossing(offset=0.1), cut)
+    inside = DiagramBuilder("inside")
+    inside.output("y", inside.add("gain", Gain(), inside.input("u")), initial=-1.0)
+    triggered = TriggeredSubsystem(diagram=inside.build(), edge="rising")
+    builder.add("triggered", triggered, builder.add("time", Clock()), trigger=cut)
+    result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.25)
+    np.testing.assert_array_equal(result["relay/y"], 0.0)
+    np.testing.assert_allclose(result["integral/y"], result.time, atol=1e-12)
+    np.testing.assert_array_equal(result["hits/count"], 0.0)
+    np.testing.assert_array_equal(result["triggered/y"], -1.0)

@@ -144,6 +144,7 @@ class AngleDifference(Block):
     """The difference of two angles the short way round: y = mod(a - b + pi, 2 pi) - pi, from -pi up to pi."""
 
     family: ClassVar[str] = "maths"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "angdiff"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="How far an angle that grows evenly is from 1 rad, the shorter way around.",

@@ -27,6 +27,7 @@ class If(Block):
     """
 
     family: ClassVar[str] = "structure"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "If"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine chooses the first output above one half, the second between zero and that.",
@@ -109,6 +110,7 @@ class SwitchCase(Block):
     """
 
     family: ClassVar[str] = "structure"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Switch Case"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="As the ramp passes 1, 2 and 3, the cases are chosen one after the other.",

@@ -13,6 +13,7 @@ from armblocks.blocks.switching import (
     JUST,
     beyond,
     cell_of,
+    counted,
     limits_in_order,
     since,
     zone,
@@ -39,6 +40,7 @@ class Saturation(Block):
     """The input held between two limits: y = min(max(u, lower), upper)."""
 
     family: ClassVar[str] = "discontinuities"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Saturation"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The crests of the sine are cut off at 1.5, its troughs at -0.5.",
@@ -90,6 +92,7 @@ class DeadZone(Block):
     """Nothing within the zone, what exceeds it outside: y = u - end above, u - start below, 0 between."""
 
     family: ClassVar[str] = "discontinuities"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Dead Zone"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Between -0.5 and 0.5 nothing comes through, outside what exceeds the zone.",
@@ -197,6 +200,7 @@ class Quantizer(Block):
     """
 
     family: ClassVar[str] = "discontinuities"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Quantizer"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine in steps of 0.5.",
@@ -247,6 +251,7 @@ class Switch(Block):
     """One of two signals: y = u1 where the control meets the criterion, u3 elsewhere."""
 
     family: ClassVar[str] = "routing"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Switch"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A fast sine while the control is at least 0.5, a constant else.",
@@ -301,6 +306,7 @@ class PulseGenerator(Block):
     """Square pulses: y = amplitude during the first width % of each period after the delay, 0 elsewhere."""
 
     family: ClassVar[str] = "sources"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Pulse Generator"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="High for the first 30 % of every two seconds.",
@@ -338,7 +344,7 @@ class PulseGenerator(Block):
         pulses = floor(periods)
         over = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)
         passed = if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + over)
-        return {"edges": fmax(passed, x["edges"] + self.contradictions(t, x, u, p)["edges"])}
+        return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"edges": self.guard_values(t, x, u, p)["edge"] > 0.0}

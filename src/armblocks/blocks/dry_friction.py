@@ -31,6 +31,7 @@ class CoulombFriction(Block):
     """Coulomb and viscous friction: y = sign(u) (offset + gain |u|), and 0 at rest."""
 
     family: ClassVar[str] = "discontinuities"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Coulomb and Viscous Friction"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Friction of a speed that swings: it jumps where the speed changes its sign.",

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from casadi import SX, fmax, fmin, if_else, logic_and, vertcat
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_or, vertcat
 
-from armblocks.blocks.switching import since
+from armblocks.blocks.switching import counted, since
 from armblocks.diagram import (
     Block,
     Guard,
@@ -35,6 +35,7 @@ class FromFile(Block):
     """
 
     family: ClassVar[str] = "sources"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "From File"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Five rows, with straight lines between them.",
@@ -84,11 +85,16 @@ class FromFile(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count, width = self._size
         now = last_at_or_below(p["data"].T, t, count=count, stride=width)
-        passed = self.contradictions(t, x, u, p)["row"]
-        return {"row": if_else(passed, fmax(now, x["row"] + 1.0), now)}
+        due = self.guard_values(t, x, u, p)["next"] > 0.0
+        return {"row": counted(now, if_else(self._early(t, x, p), -1.0, x["row"]), due)}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"row": self.guard_values(t, x, u, p)["next"] > 0.0}
+        due = self.guard_values(t, x, u, p)["next"] > 0.0
+        return {"row": logic_or(due, self._early(t, x, p))}
+
+    def _early(self, t: SX, x: Signals, p: Signals) -> SX:
+        """Whether row 0 is still to come: at the start, where it is the first to hold."""
+        return logic_and(x["row"] == 0.0, since(t, self._entry(p, SX(0.0), 0)) < 0.0)
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         return {"row": x["row"] + (e["next"] > 0.0)}

@@ -53,6 +53,7 @@ class JointPID(Block):
     """
 
     family: ClassVar[str] = "robots"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "PID Joint Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An inertia of 1 goes to 1 rad under a torque of at most 0.5.",

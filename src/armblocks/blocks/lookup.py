@@ -196,6 +196,7 @@ class LookupTableDynamic(Block):
     """
 
     family: ClassVar[str] = "lookup"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Lookup Table Dynamic"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A curve whose values grow while it is read.",

@@ -78,8 +78,8 @@ class ContinuousPid:
 
     def modes(self, shape: Shape) -> tuple[State, ...]:
         """Which limit holds, and where the integral drives the output."""
-        limit = (State("limit", shape, "1 at the upper limit, -1 at the lower, else 0"),)
-        drive = (State("drive", shape, "1 where the integral rises, else -1"),)
+        limit = (State("limit", shape, "1 at the upper limit, -1 at the lower, else 0", follows=True),)
+        drive = (State("drive", shape, "1 where the integral rises, else -1", follows=True),)
         return (*(limit if self.limited else ()), *(drive if self.clamps else ()))
 
     def guards(self, shape: Shape) -> tuple[Guard, ...]:
@@ -87,11 +87,11 @@ class ContinuousPid:
         found = list[Guard]()
         if self.limited:
             found += [
-                Guard("upper", shape, "the output - upper"),
-                Guard("lower", shape, "the output - lower"),
+                Guard("upper", shape, "the output - upper", locates=True),
+                Guard("lower", shape, "the output - lower", locates=True),
             ]
         if self.clamps:
-            found.append(Guard("drive", shape, "the rate of the integral"))
+            found.append(Guard("drive", shape, "the rate of the integral", locates=True))
         if self.external_reset != "none":
             found.append(Guard("reset", (), "the trigger", RESETS[self.external_reset]))
         return tuple(found)

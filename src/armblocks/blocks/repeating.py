@@ -16,7 +16,7 @@ from casadi import SX, dot, floor, fmax, if_else, sin, vertcat
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.interpolation import cells, weights
-from armblocks.blocks.switching import since
+from armblocks.blocks.switching import counted, since
 from armblocks.blocks.table_axes import rising
 from armblocks.diagram import (
     Block,
@@ -46,6 +46,7 @@ class SignalGenerator(Block):
     """
 
     family: ClassVar[str] = "sources"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Signal Generator"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A square wave of 0.5 Hz: 1 in the first half of every period, -1 in the second.",
@@ -84,7 +85,7 @@ class SignalGenerator(Block):
         if self.waveform == "sine":
             return {}
         passed = floor(t / self._spacing(p) * _ROUNDED)
-        return {"edges": fmax(passed, x["edges"] + self.contradictions(t, x, u, p)["edges"])}
+        return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self.waveform == "sine":
@@ -108,6 +109,7 @@ class RepeatingSequence(Block):
     """
 
     family: ClassVar[str] = "sources"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Repeating Sequence"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A course of four points that begins again every three seconds.",
@@ -150,7 +152,7 @@ class RepeatingSequence(Block):
         into = (t - periods * times[-1]) + 1e-14 * t
         passed = sum((into >= corner for corner in times[1:-1]), SX(0.0))
         passed = periods * (len(times) - 1) + passed
-        return {"pieces": fmax(passed, x["pieces"] + self.contradictions(t, x, u, p)["pieces"])}
+        return {"pieces": counted(passed, x["pieces"], self.contradictions(t, x, u, p)["pieces"])}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"pieces": self.guard_values(t, x, u, p)["corner"] > 0.0}

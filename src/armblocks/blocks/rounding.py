@@ -64,6 +64,7 @@ class Rounding(Block):
     """Every element to an integer: down, up, to the nearest (halves away from zero) or towards zero."""
 
     family: ClassVar[str] = "maths"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Rounding Function"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The greatest integer that is not above the signal.",
@@ -128,6 +129,7 @@ class Modulo(Block):
     """
 
     family: ClassVar[str] = "maths"
+    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Modulo"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A straight rise modulo 3: it starts again from 0 each time it reaches 3.",

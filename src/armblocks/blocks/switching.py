@@ -76,10 +76,18 @@ def beyond(guards: Signals, up: str = "up", down: str = "down") -> SX:
 
 
 def cell_of(now: SX, before: SX, guards: Signals, up: str = "up", down: str = "down") -> SX:
-    """The consistent cell: ``now`` by the values of the moment, another one than ``before`` where the signal
-    is beyond the cell, also where rounding does not tell that by ``now``."""
-    left = if_else(guards[down] < 0.0, fmin(now, before - 1.0), now)
+    """The consistent cell: the one before while the guards at its ends allow it, else ``now``.
+
+    ``now`` follows from the values of the moment; where rounding does not tell it from ``before``, it is the
+    next cell.
+    """
+    left = if_else(guards[down] < 0.0, fmin(now, before - 1.0), before)
     return if_else(guards[up] > 0.0, fmax(now, before + 1.0), left)
+
+
+def counted(now: SX, before: SX, due: SX) -> SX:
+    """How many edges have passed: one more than ``before``, or ``now`` by the time, once the next is due."""
+    return if_else(due, fmax(now, before + 1.0), before)
 
 
 def zone_after(mode: SX, e: Signals) -> SX:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol, cast
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from casadi import SX, fmax, fmin, if_else, reshape, vertcat
@@ -315,6 +315,8 @@ def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) 
 @dataclass(frozen=True, kw_only=True)
 class BlockWithAxes(Block):
     """A block that looks its inputs up along axes: their borders are its events, their cells its modes."""
+
+    memoryless: ClassVar[bool] = True
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return self._axes().modes(inputs)

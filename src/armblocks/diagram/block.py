@@ -83,6 +83,8 @@ class Block(ABC):
     """Whether the block stands for wires only: it has no equations and is gone before a diagram is traced."""
     spreads: ClassVar[tuple[str, ...]] = ()
     """Array parameters whose shape the outputs share with the inputs, scalars spreading over it."""
+    memoryless: ClassVar[bool] = False
+    """Whether all modes are functions of the signals alone, and all guards only locate their changes."""
     rated_inputs: ClassVar[tuple[str, ...]] = ()
     """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
     example: ClassVar[WorkedExample] = WorkedExample()
@@ -231,6 +233,19 @@ class Block(ABC):
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         """Quantities at whose zeros an event happens."""
         return ()
+
+    def all_modes(self, inputs: Shapes) -> tuple[State, ...]:
+        """The modes, each with whether it follows the signals."""
+        return tuple(
+            dataclasses.replace(mode, follows=mode.follows or self.memoryless) for mode in self.modes(inputs)
+        )
+
+    def all_guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        """The guards, each with whether it only locates a change of modes."""
+        return tuple(
+            dataclasses.replace(guard, locates=guard.locates or self.memoryless)
+            for guard in self.guards(inputs)
+        )
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         """What the equations ask of the values, in an order in which each may depend on those before it."""

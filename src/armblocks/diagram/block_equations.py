@@ -227,8 +227,14 @@ def _trace(structure: _Structure) -> BlockEquations:
     # Those whose change is an event are modes; all others are asked where they are needed.
     located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
     asked = tuple(entry for entry in conditions if entry not in located)
-    modes = (*block.modes(shapes), *(State(entry.name, entry.shape, entry.doc) for entry in located))
-    guards = (*block.guards(shapes), *(Guard(entry.name, entry.shape, entry.doc) for entry in located))
+    modes = (
+        *block.all_modes(shapes),
+        *(State(entry.name, entry.shape, entry.doc, follows=True) for entry in located),
+    )
+    guards = (
+        *block.all_guards(shapes),
+        *(Guard(entry.name, entry.shape, entry.doc, locates=True) for entry in located),
+    )
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
         "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],

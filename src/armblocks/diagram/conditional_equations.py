@@ -90,11 +90,11 @@ class ConditionalBlock(Block):
         return (*own, *noted) if self._notes_restarts else own
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        own = self.block.modes(self._shapes(inputs))
+        own = self.block.all_modes(self._shapes(inputs))
         return (*own, State(_WORKS, (), "whether the modes follow")) if own and ON in self.hidden else own
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        own = self.block.guards(self._shapes(inputs))
+        own = self.block.all_guards(self._shapes(inputs))
         settles = self.block.modes(self._shapes(inputs)) and ON in self.hidden
         return (*own, Guard(_TURNED, (), "the control")) if settles else own
 

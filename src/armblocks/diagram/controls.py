@@ -62,10 +62,10 @@ class EnableControl(Block):
         return (State("seen", (), "what on was when it was last acted on; -1 before that"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("side", (), "1 where u is positive, else 0"),)
+        return (State("side", (), "1 where u is positive, else 0", follows=True),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return (Guard("side", (), "u passes zero"), Guard("acts", (), "on has changed", 1))
+        return (Guard("side", (), "u passes zero", locates=True), Guard("acts", (), "on has changed", 1))
 
     def initial_states(self, p: Signals) -> Signals:
         return {"seen": SX(-1.0)}
@@ -117,10 +117,13 @@ class TriggerControl(Block):
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("side", (), "1 where u is positive, else 0"),)
+        return (State("side", (), "1 where u is positive, else 0", follows=True),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return (Guard("side", (), "u passes zero"), Guard("acts", (), "the side has changed", 1))
+        return (
+            Guard("side", (), "u passes zero", locates=True),
+            Guard("acts", (), "the side has changed", 1),
+        )
 
     def initial_states(self, p: Signals) -> Signals:
         return {"seen": SX(-1.0), "last": SX(0.0)}

@@ -24,12 +24,17 @@ class Port:
 
 @dataclass(frozen=True)
 class State:
-    """One state or mode of a block; the numerics hold its value, the block never does."""
+    """One state or mode of a block; the numerics hold its value, the block never does.
+
+    ``follows``: whether a mode is a function of the signals of the moment alone. Such modes are made
+    consistent before anything with a memory (an edge, a relay, a reset) acts on the signals.
+    """
 
     name: str
     shape: Shape
     doc: str
     unit: str = ""
+    follows: bool = False
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,8 @@ class Guard:
     """A quantity of a block at whose zero something happens; each entry of a vector is a guard by itself.
 
     ``direction``: +1 where it fires on its way upwards, -1 downwards, 0 both. ``action``: what it does to the
-    run where it is positive: ``stop`` ends it, ``fail`` fails it, ``warn`` is told at its end.
+    run where it is positive: ``stop`` ends it, ``fail`` fails it, ``warn`` is told at its end. ``locates``:
+    whether its zero only tells when a mode that follows the signals changes.
     """
 
     name: str
@@ -45,6 +51,7 @@ class Guard:
     doc: str
     direction: int = 0
     action: str = ""
+    locates: bool = False
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
 
     loops = Implicit(model, symbols, flow, values)
     guards = _guards(model, flow)
-    modes, contradictions = _contradictions(model, symbols, flow)
+    modes, followers, contradictions = _contradictions(model, symbols, flow)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
@@ -111,6 +111,8 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         guard_names=tuple(name for name, _, value in guards for _ in range(value.numel())),
         guard_actions=tuple(guard.action for _, guard, value in guards for _ in range(value.numel())),
         modes=modes,
+        followers=followers,
+        locating=_locating(guards),
         contradictions=function("contradictions", ends, c=contradictions) if modes else None,
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
@@ -231,17 +233,27 @@ def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
     ]
 
 
-def _contradictions(model: Model, symbols: Symbols, flow: Tracing) -> tuple[tuple[int, ...], list[SX]]:
-    """The places of all modes in ``z``, and for each whether it contradicts its condition."""
+def _locating(guards: Sequence[tuple[str, Guard, SX]]) -> tuple[int, ...]:
+    """The guards that only locate changes of modes, one number for each entry."""
+    flags = [guard.locates for _, guard, value in guards for _ in range(value.numel())]
+    return tuple(number for number, locates in enumerate(flags) if locates)
+
+
+def _contradictions(
+    model: Model, symbols: Symbols, flow: Tracing
+) -> tuple[tuple[int, ...], tuple[bool, ...], list[SX]]:
+    """The places of all modes in ``z``; which follow the signals; which contradict their conditions."""
     ranges = signature(*symbols.discrete_slots).ranges
     places: list[int] = []
+    follows: list[bool] = []
     found: list[SX] = []
     for name, equations in model.flow.equations.items():
         for mode in equations.modes:
             place = ranges[f"{name}/{mode.name}"]
             places += range(place.start, place.stop)
+            follows += [mode.follows] * (place.stop - place.start)
             found.append(flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name)))
-    return tuple(places), found
+    return tuple(places), tuple(follows), found
 
 
 def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
@@ -314,7 +326,11 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
         for mode in equations.modes:
             path = f"{name}/{mode.name}"
             settled = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
-            discrete[path] = if_else(quiet, settled, discrete[path])
+            asked = quiet
+            if mode.follows:  # it needs no event to tell what it is
+                wrong = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
+                asked = logic_or(quiet, wrong)
+            discrete[path] = if_else(asked, settled, discrete[path])
     return {"x": list(states.values()), "z": list(discrete.values())}
 
 

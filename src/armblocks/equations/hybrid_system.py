@@ -131,6 +131,12 @@ class HybridSystem:
     ``fail`` ends it as a failure, ``warn`` is told at its end, and empty nothing."""
     modes: tuple[int, ...] = ()
     """The places of the modes in ``z``."""
+    followers: tuple[bool, ...] = ()
+    """For each mode, whether it is a function of the signals alone."""
+    locating: tuple[int, ...] = ()
+    """The guards whose zeros only tell when such modes change."""
+    tangents: tuple[int, int, int] | None = None
+    """From which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any."""
     contradictions: TracedFunction | None = None
     """Which modes contradict their conditions; ``None`` where there are no modes."""
     delays: Delays | None = None

@@ -225,6 +225,7 @@ class _Augmented:
             ),
             update=c.function("update", {"m": m}, z=update),
             guards=c.function("guards", {}, g=guards),
+            tangents=(old.states.size, old.discrete.size, len(old.guard_directions)),
             contradictions=None
             if old.contradictions is None
             else c.function("contradictions", {}, c=c.value(old.contradictions)),

@@ -16,7 +16,7 @@ from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
-from armblocks.routines.values import Boolean, Integer, Real, Reals, RealVariable
+from armblocks.routines.values import Boolean, Integer, IntegerVariable, Real, Reals, RealVariable
 
 TURNS_TOGETHER, MOST_TURNS = 8, 32
 """Modes are changed together in so many turns, and one for each mode; in all, so many turns for each mode."""
@@ -70,6 +70,8 @@ class Events:
             self.point.value = time
             for i in r.each(self.guards):
                 fired[i] = 0.0
+            if self.modes:
+                self._follow_at_start()
             f.counts[left] = self.guards
             with r.part() as iteration:
                 self.evaluation.solve(self.point.memory, self.x)
@@ -88,6 +90,20 @@ class Events:
                 iteration.again_when((same.value == 0.0) & (remaining > 0))
             f.counts[left] = 0
 
+    def _follow_at_start(self) -> None:
+        """Modes that follow the signals, before anything with a memory is asked."""
+        f, r, functions, t = self.frame, self.frame.r, self.functions, self.point.memory
+        turns = r.integer(0)
+        with r.loop() as loop:
+            self.evaluation.solve(t, self.x)
+            functions.evaluate(r, t, self.x, f.reals, f.p)
+            turns.value = turns.value + 1
+            loop.leave_unless(turns.value < TURNS_TOGETHER + self.modes)
+            loop.leave_unless(r.call(functions.any_contradicts, f.reals, r.constant_boolean(True)))
+            self.reset()
+            self._hold(turns, follows=True)
+            r.call(functions.take_followers, f.reals)
+
     def reset(self) -> None:
         """``new_x`` and ``new_z`` after the events that are marked in ``fired``."""
         f, places = self.frame, self.frame.places
@@ -104,53 +120,91 @@ class Events:
         f.copy(places.new_z, places.z, f.sizes.discrete)
 
     def fire(self, time: Real) -> None:
-        """Fire guards and make modes consistent, in turns, until nothing is left to change.
+        """Make modes consistent and fire guards, in turns, until nothing is left to change.
 
-        In a turn in which guards fire, ``reset`` is told which. Where none fires and modes contradict their
-        conditions, they take their consistent values: all of them at once in the first turns, then the first
-        of them alone, which ends for every complementarity problem with a P-matrix (Murty 1974, the least
-        index rule). Where that does not end either, no choice of the modes is consistent.
+        First the modes that follow the signals: those whose guards have passed zero here, and those that
+        contradict their conditions. Until they are consistent, signals are not those of this instant, and
+        nothing with a memory may act on them. Then all other guards that fire cause one reset. Where none
+        fires, modes with a memory that contradict their conditions take their consistent values.
+
+        Contradicting modes change together in the first turns, then the first of them alone, which ends for
+        every complementarity problem with a P-matrix (Murty 1974, the least index rule). Where that does not
+        end either, no choice of the modes is consistent.
         """
-        f, r, places, functions = self.frame, self.frame.r, self.frame.places, self.functions
-        slopes = f.vector(places.guard_slopes)
+        f, r, functions = self.frame, self.frame.r, self.functions
+        yes, no = r.constant_boolean(True), r.constant_boolean(False)
         quiet_turns = r.integer(0)
         with r.loop() as turns:
-            changes = self.watch(time, self.x)
-            r.call(functions.take_signs, f.reals, r.constant_boolean(False))
-            f.copy(places.guards, places.guards_before, self.guards)
-            for i in r.each(self.guards):
-                slopes[i] = float("nan")
-            turns.leave_when(changes == 0)
+            turns.leave_when(self.watch(time, self.x) == 0)
             f.count[Count.FRESH].value = 1
             # A turn counts as a step, so that a call of few steps ends soon also where there are many events.
             f.taken.value = f.taken.value + 1
             if self.modes:
-                with r.when(r.call(functions.any_fired, f.reals)):
-                    self._count_events(time, bounds=True)
-                with r.otherwise():
-                    before = quiet_turns.value
-                    quiet_turns.value = before + 1
-                    with r.when(before == 0):
-                        self._count_events(time, bounds=False)
-                    f.leave_unless(quiet_turns.value < MOST_TURNS * self.modes, Status.INCONSISTENT_MODES)
-            else:
-                self._count_events(time, bounds=True)
+                with r.when(r.call(functions.any_contradicts, f.reals, yes)):
+                    self._follow(time, quiet_turns)
+                    turns.again()
+                with r.unless(r.call(functions.any_fired, f.reals, no)):
+                    turns.leave_unless(r.call(functions.any_contradicts, f.reals, no))
+                    self._remember(time, quiet_turns)
+                    turns.again()
+            r.call(functions.take_signs, f.reals, no)
+            self._count_events(time, yes, bounds=True)
             self.reset()
-            if self.modes:
-                with r.unless(r.call(functions.any_fired, f.reals)):
-                    one_by_one = quiet_turns.value > TURNS_TOGETHER + self.modes
-                    r.call(functions.hold_modes, f.reals, one_by_one)
             self.take_reset()
-            # Guards that fired take the sign that the reset gives them; the others keep theirs.
-            t = self.point.memory
-            self.evaluation.solve(t, self.x)
-            functions.evaluate(r, t, self.x, f.reals, f.p)
-            r.call(functions.take_signs, f.reals, r.constant_boolean(True))
+            self._take_fired_signs()
+        r.call(functions.take_signs, f.reals, no)
+        places, slopes = f.places, f.vector(f.places.guard_slopes)
+        f.copy(places.guards, places.guards_before, self.guards)
+        for i in r.each(self.guards):
+            slopes[i] = float("nan")
 
-    def _count_events(self, time: Real, *, bounds: bool) -> None:
+    def _follow(self, time: Real, quiet_turns: IntegerVariable) -> None:
+        """One turn of the modes that follow the signals."""
+        f, r, functions = self.frame, self.frame.r, self.functions
+        r.call(functions.any_fired, f.reals, r.constant_boolean(True))
+        self._count_quiet_turn(time, quiet_turns)
+        self.reset()
+        self._hold(quiet_turns, follows=True)
+        r.call(functions.take_followers, f.reals)
+        self.evaluation.solve(self.point.memory, self.x)
+        if f.sizes.tangents is not None:
+            functions.evaluate(r, self.point.memory, self.x, f.reals, f.p)
+            r.call(functions.take_tangent_signs, f.reals)
+
+    def _remember(self, time: Real, quiet_turns: IntegerVariable) -> None:
+        """One turn of the modes with a memory, without an event."""
+        f, r = self.frame, self.frame.r
+        r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
+        self._count_quiet_turn(time, quiet_turns)
+        self.reset()
+        self._hold(quiet_turns, follows=False)
+        self.take_reset()
+        self._take_fired_signs()
+
+    def _count_quiet_turn(self, time: Real, quiet_turns: IntegerVariable) -> None:
+        """Return after too many turns without an event."""
+        self._count_events(time, quiet_turns.value == 0, bounds=False)
+        quiet_turns.value = quiet_turns.value + 1
+        few = quiet_turns.value < MOST_TURNS * self.modes
+        self.frame.leave_unless(few, Status.INCONSISTENT_MODES)
+
+    def _hold(self, quiet_turns: IntegerVariable, *, follows: bool) -> None:
+        """Modes that are consistent keep their values; late, only the first of the others changes."""
+        f, r = self.frame, self.frame.r
+        one_by_one = quiet_turns.value > TURNS_TOGETHER + self.modes
+        r.call(self.functions.hold_modes, f.reals, r.constant_boolean(follows), one_by_one)
+
+    def _take_fired_signs(self) -> None:
+        """Guards that fired take the sign that the reset gives them; the others keep theirs."""
+        f, r, t = self.frame, self.frame.r, self.point.memory
+        self.evaluation.solve(t, self.x)
+        self.functions.evaluate(r, t, self.x, f.reals, f.p)
+        r.call(self.functions.take_signs, f.reals, r.constant_boolean(True))
+
+    def _count_events(self, time: Real, first: Boolean, *, bounds: bool) -> None:
         """Return where events follow one another without end; the first step after an event is short."""
         f = self.frame
-        bound = f.r.call(self.functions.note_events, time, f.reals, f.counts)
+        bound = f.r.call(self.functions.note_events, time, f.reals, f.counts, first)
         if bounds:
             f.scalar[Scalar.BOUND].value = bound
         # A negative bound is how the count of events says that there is no end to them.

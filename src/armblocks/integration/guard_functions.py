@@ -30,6 +30,10 @@ class GuardFunctions:
         self.places = workspace
         self.count = len(sizes.directions)
         self.modes = sizes.modes
+        self.followers = tuple(int(follows) for follows in sizes.followers)
+        self.locating = tuple(int(number in sizes.locating) for number in range(self.count))
+        self.tangents = sizes.tangents
+        self.states, self.discrete = sizes.states, sizes.discrete
         self.directions = tuple(float(direction) for direction in sizes.directions)
         self.watch = program.define(self._watch, "watch")
         self.take_signs = program.define(self._take_signs, "take_signs")
@@ -37,6 +41,9 @@ class GuardFunctions:
         self.dips = program.define(self._dips, "dips")
         self.note_slopes = program.define(self._note_slopes, "note_slopes")
         self.any_fired = program.define(self._any_fired, "any_fired")
+        self.any_contradicts = program.define(self._any_contradicts, "any_contradicts")
+        self.take_followers = program.define(self._take_followers, "take_followers")
+        self.take_tangent_signs = program.define(self._take_tangent_signs, "take_tangent_signs")
         self.hold_modes = program.define(self._hold_modes, "hold_modes")
 
     def evaluate(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> None:
@@ -69,26 +76,69 @@ class GuardFunctions:
             total.value = total.value + found.count()
         return total.value
 
-    def _any_fired(self, r: Routine, reals: Reals) -> Boolean:
-        """Whether a guard is marked in ``fired``."""
+    def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
+        """Whether a guard is marked that only locates changes of modes, or another one; the marks of the
+        other kind are taken away. Guards of derivatives go along with both kinds."""
         found, fired = r.boolean(False), reals.after(self.places.fired)
+        locates = r.integers("guard.locates", self.locating)
         for i in r.each(self.count):
+            asked = _same(locates[i] != 0, locating)
+            if self.tangents is not None:
+                asked = asked | (r.constant_integer(0) + i >= self.tangents[2])
+            fired[i] = select(asked, fired[i], 0.0)
             found.value = found.value | (fired[i] != 0.0)
         return found.value
 
-    def _hold_modes(self, r: Routine, reals: Reals, only_first: Boolean) -> None:
-        """Modes that do not contradict their conditions keep their values; of the others, all or the first
-        take those of the reset."""
+    def _any_contradicts(self, r: Routine, reals: Reals, follows: Boolean) -> Boolean:
+        """Whether a mode that follows the signals, or another one, contradicts its condition."""
+        found, contradictions = r.boolean(False), reals.after(self.places.contradictions)
+        followers = r.integers("mode.follows", self.followers)
+        for i in r.each(len(self.modes)):
+            asked = _same(followers[i] != 0, follows)
+            found.value = found.value | (asked & (contradictions[i] != 0.0))
+        return found.value
+
+    def _hold_modes(self, r: Routine, reals: Reals, follows: Boolean, only_first: Boolean) -> None:
+        """Of the modes that follow the signals, or of the others, those that contradict their conditions take
+        the values of the reset, all or the first of them. All other modes keep theirs."""
         z, new_z, contradictions = (
             reals.after(place) for place in (self.places.z, self.places.new_z, self.places.contradictions)
         )
-        places = r.integers("mode.places", self.modes)
+        places, followers = r.integers("mode.places", self.modes), r.integers("mode.follows", self.followers)
         held = r.boolean(False)
         for i in r.each(len(self.modes)):
             place = places[i]
-            contradicts, kept = contradictions[i] != 0.0, held.value
+            asked = _same(followers[i] != 0, follows)
+            contradicts, kept = asked & (contradictions[i] != 0.0), held.value
             new_z[place] = select(contradicts & ~kept, new_z[place], z[place])
             held.value = kept | (contradicts & only_first)
+
+    def _take_followers(self, r: Routine, reals: Reals) -> None:
+        """The modes that follow the signals become what the reset gives, and so do derivatives."""
+        places = self.places
+        x, new_x, z, new_z = (
+            reals.after(place) for place in (places.x, places.new_x, places.z, places.new_z)
+        )
+        of_modes, followers = (
+            r.integers("mode.places", self.modes),
+            r.integers("mode.follows", self.followers),
+        )
+        for i in r.each(len(self.modes)):
+            place = of_modes[i]
+            z[place] = select(followers[i] != 0, new_z[place], z[place])
+        if self.tangents is None:
+            return
+        first_x, first_z, _ = self.tangents
+        r.copy(new_x.after(first_x), x.after(first_x), self.states - first_x)
+        r.copy(new_z.after(first_z), z.after(first_z), self.discrete - first_z)
+
+    def _take_tangent_signs(self, r: Routine, reals: Reals) -> None:
+        """The guards of derivatives that fired take their signs, whatever else is left to happen."""
+        places = self.places
+        values, signs, fired = (reals.after(place) for place in (places.guards, places.signs, places.fired))
+        first = self.count if self.tangents is None else self.tangents[2]
+        for i in range(first, self.count):
+            signs[i] = select(fired[i] != 0.0, sign(values[i]), signs[i])
 
     def _dips(self, r: Routine, reals: Reals, half: Real) -> Integer:
         """Count the guards that may have gone to zero and come back between three values of one sign, which
@@ -158,9 +208,12 @@ class GuardFunctions:
             after = select(has_fired, select(nonzero, now, back), known)
             signs[i] = select(only_fired, after, side)
 
-    def _note_events(self, r: Routine, t: Real, reals: Reals, counts: Integers) -> Real:
+    def _note_events(self, r: Routine, t: Real, reals: Reals, counts: Integers, first: Boolean) -> Real:
         """Count the events of an instant, and those in a row that follow one another without an end; gives a
         bound for the next step, negative where there is no end.
+
+        ``first`` is false for further turns in which modes follow the signals of one instant: only guards
+        that were not counted there count.
 
         Events follow closely where less than ``CLOSE`` of the time lies between them. A series whose
         distances shrink, as those of a bouncing ball, may come to an end by itself: it has none only where
@@ -179,7 +232,7 @@ class GuardFunctions:
         )
         for i in r.each(self.count):
             repeats[i] = select(close, repeats[i], 0.0)
-            with r.when(fired[i] != 0.0):
+            with r.when((fired[i] != 0.0) & (first | (last[i] != t))):
                 fired_one.value = True
                 counts[Count.GUARD] = i + 1
                 counts[Count.EVENTS] = counts[Count.EVENTS] + 1
@@ -198,8 +251,13 @@ class GuardFunctions:
                 last[i] = t
                 bound.value = minimum(SHORT * distance, bound.value)
         shrinks = fired_one.value & ending.value
-        further = counts[Count.CLOSE] + select(shrinks, r.constant_integer(0), 1)
+        further = counts[Count.CLOSE] + (first & ~shrinks).count()
         in_a_row = select(close, further, 0)
         counts[Count.CLOSE] = in_a_row
         without_end = endless.value | (in_a_row > MOST_AT_ONCE)
         return select(without_end, -1.0, bound.value)
+
+
+def _same(one: Boolean, other: Boolean) -> Boolean:
+    """Whether both hold or neither does."""
+    return (one & other) | (~one & ~other)

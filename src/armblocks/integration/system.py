@@ -120,6 +120,9 @@ class CompiledSystem:
             stops=tuple(k for k, action in enumerate(description["guard_actions"]) if action in ENDING),
             captures=bool(description["captures"]),
             modes=tuple(int(place) for place in description["modes"]),
+            followers=tuple(bool(follows) for follows in description["followers"]),
+            locating=tuple(int(guard) for guard in description["locating"]),
+            tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
         self._breakpoint_count = int(description["breakpoints"])
         self._digests: Mapping[str, str] = dict(description["digests"])
@@ -297,6 +300,9 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "clocks": [[clock.period, clock.offset] for clock in system.clocks],
         "captures": system.captures,
         "modes": list(system.modes),
+        "followers": list(system.followers),
+        "locating": list(system.locating),
+        "tangents": system.tangents,
         "guard_directions": list(system.guard_directions),
         "guard_names": list(system.guard_names),
         "guard_actions": list(system.guard_actions),

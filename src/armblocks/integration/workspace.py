@@ -136,7 +136,9 @@ class LoopSizes:
 
     ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
     those that end the run where they are positive. ``captures``: whether ``update`` is also called just
-    before every instant. ``modes``: the places of the modes in ``z``.
+    before every instant. ``modes``: the places of the modes in ``z``; ``followers``, for each, whether it
+    is a function of the signals alone; ``locating``, the guards that only tell when such modes change.
+    ``tangents``: from which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any.
     """
 
     states: int
@@ -148,6 +150,9 @@ class LoopSizes:
     stops: tuple[int, ...] = ()
     captures: bool = False
     modes: tuple[int, ...] = ()
+    followers: tuple[bool, ...] = ()
+    locating: tuple[int, ...] = ()
+    tangents: tuple[int, int, int] | None = None
 
     @property
     def hybrid(self) -> bool:
