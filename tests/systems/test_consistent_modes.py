@@ -30,6 +30,7 @@ from armblocks.blocks import (
     Quantizer,
     RateLimiterContinuous,
     RateLimiterDynamic,
+    RelationalOperator,
     Relay,
     RepeatingSequence,
     ResettableIntegrator,
@@ -42,7 +43,9 @@ from armblocks.blocks import (
     Step,
     Sum,
     Switch,
+    TransportDelay,
     TriggeredSubsystem,
+    ZeroOrderHold,
 )
 from armblocks.diagram import Block, Diagram
 from armblocks.errors import SimulationError
@@ -294,3 +297,33 @@ def test_nothing_with_a_memory_acts_on_a_signal_that_is_not_consistent_yet() -> 
     np.testing.assert_allclose(result["integral/y"], result.time, atol=1e-12)
     np.testing.assert_array_equal(result["hits/count"], 0.0)
     np.testing.assert_array_equal(result["triggered/y"], -1.0)
+
+
+def test_a_touch_at_a_corner_is_sampled_as_it_is_at_the_tick() -> None:
+    """At 0.25 s and 1 s later the course touches 1 at a corner, and a tick samples the comparison there."""
+    builder = DiagramBuilder("touch")
+    course = builder.add(
+        "course", RepeatingSequence(times=(0.0, 0.25, 0.5, 1.0), values=(-1.0, 1.0, 0.5, -1.0))
+    )
+    one = builder.add("one", SignalGenerator(waveform="square", frequency=0.2, amplitude=-1.0))
+    below = builder.add("below", RelationalOperator(relation="<="), course, one)
+    builder.add("held", ZeroOrderHold(sample_time=0.125), below)
+    result = ab.simulate(builder.build(), stop_time=2.0, sample_time=0.0625, rtol=1e-9)
+    np.testing.assert_array_equal(result["below/y"], 1.0)
+    np.testing.assert_array_equal(result["held/y"], 1.0)
+
+
+def test_an_event_next_to_the_start_leaves_a_delay_its_history() -> None:
+    """The speed of the ball leaves 0 right after the start, which is an event of the absolute value."""
+    builder = DiagramBuilder("delayed ball")
+    gravity = builder.add("gravity", Step(time=0.0, final=-9.81))
+    block = SecondOrderIntegratorLimited(initial=0.3, lower=0.0, reinitialize=True)
+    body = builder.add("ball", block)
+    builder.connect(gravity, body["u"])
+    builder.connect(body["dx"], body["dx0"])
+    builder.add("delayed", TransportDelay(delay=0.5), body["x"])
+    builder.add("speed", Abs(), body["dx"])
+    result = ab.simulate(builder.build(), stop_time=1.0, sample_time=0.0625, rtol=1e-9, atol=1e-12)
+    since = result.time - 0.5
+    expected = np.where(since < 0.0, 0.0, np.maximum(0.3 - 9.81 / 2 * since**2, 0.0))
+    np.testing.assert_allclose(result["delayed/y"], expected, atol=1e-9)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from armblocks.integration import system_functions
 from armblocks.integration.evaluation import Evaluation
-from armblocks.integration.frame import SAME_BELOW, Frame, copy
+from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW, Frame, copy
 from armblocks.integration.guard_functions import GuardFunctions
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
@@ -20,6 +20,8 @@ from armblocks.routines.values import Boolean, Integer, IntegerVariable, Real, R
 
 TURNS_TOGETHER, MOST_TURNS = 8, 32
 """Modes are changed together in so many turns, and one for each mode; in all, so many turns for each mode."""
+LAST_PLACE = 2.0**-52
+"""Of a double, beside its size."""
 FINEST = 2.0**-12
 """Guards are evaluated at distances no shorter than this part of a step."""
 
@@ -294,19 +296,23 @@ class Events:
             self._bisect(low, high, time, h)
             with r.when(high.value < end):
                 self.method.interpolate(high.value, time, h, self.y)
-                f.new_time.value = high.value
+                # An event that is one instant with a tick or breakpoint is at its time.
+                known = f.end.value
+                f.new_time.value = select(high.value * SAME_ABOVE >= known, known, high.value)
 
     def _bisect(self, low: RealVariable, high: RealVariable, time: Real, h: Real) -> None:
         """Move ``high`` to the first instant, to the last place, at which a guard has fired.
 
         None has at ``low``, some has at ``high``. Instants within four units in the last place are one
-        instant: located to the last place, an event at a recorded instant or a tick belongs to it.
+        instant: located to the last place, an event at a recorded instant or a tick belongs to it. Near the
+        time 0 the last place is that of a millionth of the run.
         """
         r = self.frame.r
+        closest = (LAST_PLACE * 1e-6) * self.frame.reals[Scalar.SPAN]
         with r.loop() as bisection:
             a, b = low.value, high.value
             middle = fma(0.5, b - a, a)
-            bisection.leave_unless((middle > a) & (middle < b))
+            bisection.leave_unless((middle > a) & (middle < b) & (b - a > closest))
             with r.when(self.watch_inside(middle, time, h) == 0):
                 low.value = middle
             with r.otherwise():
