@@ -227,14 +227,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     # Those whose change is an event are modes; all others are asked where they are needed.
     located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
     asked = tuple(entry for entry in conditions if entry not in located)
-    modes = (
-        *block.all_modes(shapes),
-        *(State(entry.name, entry.shape, entry.doc, follows=True) for entry in located),
-    )
-    guards = (
-        *block.all_guards(shapes),
-        *(Guard(entry.name, entry.shape, entry.doc, locates=True) for entry in located),
-    )
+    modes, guards = _modes_and_guards(block, shapes, located)
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
         "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],
@@ -305,6 +298,15 @@ def _trace(structure: _Structure) -> BlockEquations:
         delays=lines,
         fixed_delays=frozenset(line.name for line in lines) - _moving_delays(groups),
     )
+
+
+def _modes_and_guards(
+    block: Block, shapes: Shapes, located: Sequence[Condition]
+) -> tuple[tuple[State, ...], tuple[Guard, ...]]:
+    """Those of a block, and one of each for every condition whose change is an event."""
+    modes = (State(entry.name, entry.shape, entry.doc, follows=True) for entry in located)
+    guards = (Guard(entry.name, entry.shape, entry.doc, locates=True) for entry in located)
+    return (*block.all_modes(shapes), *modes), (*block.all_guards(shapes), *guards)
 
 
 def _output_shapes(block: Block, inputs: Shapes) -> dict[str, Shape]:

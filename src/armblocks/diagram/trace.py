@@ -76,6 +76,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
 
     loops = Implicit(model, symbols, flow, values)
     guards = _guards(model, flow)
+    entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
     modes, followers, contradictions = _contradictions(model, symbols, flow)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
@@ -84,7 +85,6 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         return _flat_function(name, ends, {key: loops.solved(parts) for key, parts in results.items()})
 
     residual = function("residual", ends, r=[loops.residual])
-    rates = densify(jacobian(residual.results[0], loops.w))
     return HybridSystem(
         name=diagram.name,
         states=signature(*symbols.state_slots),
@@ -97,22 +97,17 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         derivative=function("derivative", ends, xd=_derivatives(model, flow)),
         signals=function("signals", ends, y=[_recorded(diagram, flow, value) for _, _, value in signals]),
         residual=residual,
-        residual_jacobian=dataclasses.replace(
-            residual,
-            name="residual_jacobian",
-            outputs=signature(("J", rates.shape)),
-            results=(flatten(rates, rates.shape),),
-        ),
+        residual_jacobian=_by_unknowns(residual, loops.w),
         captures=_keeps_left_limits(model),
         called=tuple(name for name, block in diagram.blocks.items() if block.called),
         update=function("update", ends | m, z=_updated(model, symbols, flow, loops)),
         guards=function("guards", ends, g=[value for _, _, value in guards]),
-        guard_directions=tuple(guard.direction for _, guard, value in guards for _ in range(value.numel())),
-        guard_names=tuple(name for name, _, value in guards for _ in range(value.numel())),
-        guard_actions=tuple(guard.action for _, guard, value in guards for _ in range(value.numel())),
+        guard_directions=tuple(guard.direction for _, guard in entries),
+        guard_names=tuple(name for name, _ in entries),
+        guard_actions=tuple(guard.action for _, guard in entries),
         modes=modes,
         followers=followers,
-        locating=_locating(guards),
+        locating=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", ends, c=contradictions) if modes else None,
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
@@ -217,6 +212,17 @@ def _same(network: Network, value: Value) -> Value:
     return value._replace(node=value.node._replace(group=group))
 
 
+def _by_unknowns(residual: TracedFunction, w: SX) -> TracedFunction:
+    """The Jacobian of the implicit equations."""
+    rates = densify(jacobian(residual.results[0], w))
+    return dataclasses.replace(
+        residual,
+        name="residual_jacobian",
+        outputs=signature(("J", rates.shape)),
+        results=(flatten(rates, rates.shape),),
+    )
+
+
 def _derivatives(model: Model, flow: Tracing) -> list[SX]:
     return [
         flow.value(model.flow.state_rate(name, state.name, 1))
@@ -231,12 +237,6 @@ def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
         for name, equations in model.flow.equations.items()
         for guard in equations.guards
     ]
-
-
-def _locating(guards: Sequence[tuple[str, Guard, SX]]) -> tuple[int, ...]:
-    """The guards that only locate changes of modes, one number for each entry."""
-    flags = [guard.locates for _, guard, value in guards for _ in range(value.numel())]
-    return tuple(number for number, locates in enumerate(flags) if locates)
 
 
 def _contradictions(

@@ -234,7 +234,6 @@ class GuardFunctions:
             repeats[i] = select(close, repeats[i], 0.0)
             with r.when((fired[i] != 0.0) & (first | (last[i] != t))):
                 fired_one.value = True
-                counts[Count.GUARD] = i + 1
                 counts[Count.EVENTS] = counts[Count.EVENTS] + 1
                 repeats[i] = repeats[i] + 1.0
                 passed, known = t - last[i], gap[i]

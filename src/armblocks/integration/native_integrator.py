@@ -423,11 +423,6 @@ class Integration:
         return [place for place, contradicts in zip(modes, found) if contradicts]
 
     @property
-    def last_guard(self) -> int:
-        """The guard that fired last; -1 before any did."""
-        return int(self.counts[Count.GUARD]) - 1
-
-    @property
     def time(self) -> float:
         """Time that the last accepted step reached, s."""
         return float(self.reals[Scalar.TIME])

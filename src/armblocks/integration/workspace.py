@@ -85,29 +85,27 @@ class Count(IntEnum):
     """Events so far."""
     CLOSE = 12
     """Events in a row that follow one another closely and do not come to an end."""
-    GUARD = 13
-    """The guard that fired last, counted from 1."""
-    SAVED = 14
+    SAVED = 13
     """Whether the checkpoint is written."""
-    WATCHED = 15
+    WATCHED = 14
     """Steps so far that were checked for stiffness."""
-    STIFF = 16
+    STIFF = 15
     """Explicit methods: checks that found a step bound by stability. Methods for stiff systems: so many
     checks in a row at a step that an explicit method could take as well make one take over."""
-    CALM = 17
+    CALM = 16
     """Checks in a row that found no stiffness."""
-    WATCHING = 18
+    WATCHING = 17
     """0: the run keeps its method. Else it wants to be told where another one does better, and pauses
     there; 1 and the number of changes so far."""
-    AT_START = 19
+    AT_START = 18
     """Whether the run is at its start: its modes are still to be made consistent."""
-    HISTORY_ROWS = 20
+    HISTORY_ROWS = 19
     """Rows of the history of delayed signals."""
-    HISTORY_ROOM = 21
+    HISTORY_ROOM = 20
     """Rows that there is room for."""
-    SHORT = 22
+    SHORT = 21
     """Checks that found a step short without need, less some for every check that did not."""
-    END = 23
+    END = 22
 
 
 class Stage(IntEnum):
