@@ -36,8 +36,9 @@ STEPS: dict[str, tuple[str | object, ...]] = {
 }
 BEFORE_ALL = ("page",)
 """Steps whose result the others need."""
-SIDE_BY_SIDE = (("web types", "lint", "format", "types", "layers", "docs"), ("tests",))
-"""Steps that run one after the other, beside those of the other rows."""
+STAGES = ((("types",), ("web types", "lint", "format", "layers", "docs")), (("tests",),))
+"""Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.
+The tests have the machine for themselves: journeys in a browser need it."""
 GLANCE_SECONDS = 0.1
 
 
@@ -105,11 +106,12 @@ def run_steps(names: Sequence[str]) -> list[Step]:
                 if name in BEFORE_ALL:
                     pool.submit(steps[name].run)
                     steps[name].follow()
-            for row in SIDE_BY_SIDE:
-                pool.submit(run_row, row)
-            for name in names:
-                if name not in BEFORE_ALL:
-                    steps[name].follow()
+            for stage in STAGES:
+                for row in stage:
+                    pool.submit(run_row, row)
+                for name in names:
+                    if any(name in row for row in stage):
+                        steps[name].follow()
         except BaseException:
             stopped.set()
             for step in steps.values():

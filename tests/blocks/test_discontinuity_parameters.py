@@ -48,12 +48,13 @@ def test_every_element_of_a_vector_is_guarded_by_itself() -> None:
     assert system.guard_directions == (0, 0, 0, 0)
     p = system.parameter_values
     assert system.guards(0.0, (), [0.0, 0.0], (), p)[0].tolist() == [-1.0, 1.0, 0.5, 3.5]
+    # the second element contradicts its mode, and follows its signal whatever guard fires
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [-1.0, 0.0, 0.0, 0.0])
-    assert z.tolist() == [0.0, 0.0]
-    # one that fired goes by the event, not by the value
+    assert z.tolist() == [0.0, 1.0]
+    # one that fired and contradicts nothing goes by the event
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [1.0, 0.0, 0.0, 0.0])
-    assert z.tolist() == [1.0, 0.0]
-    # none fired: all settle
+    assert z.tolist() == [1.0, 1.0]
+    # none fired: modes are consistent
     _, z = system.reset(0.0, (), [0.0, 0.0], (), p, [0.0, 0.0, 0.0, 0.0])
     assert z.tolist() == [0.0, 1.0]
 

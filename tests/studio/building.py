@@ -44,23 +44,27 @@ def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
 def wire(page: Page, source: str, target: str) -> None:
     """Draw a wire with the mouse, between two handles ``block/port``.
 
-    The sheet pans while the mouse is near its edge: the mouse follows the target until it stays below it.
+    The sheet pans while the mouse is near its edge: the mouse follows the target until the sheet shows that
+    a wire would end there.
     """
 
+    def handle(port: str) -> Locator:
+        name, _, end = port.partition("/")
+        return block(page, name).locator(f'[data-handleid="{end}"]')
+
     def middle(port: str) -> tuple[float, float]:
-        name, _, handle = port.partition("/")
-        box = block(page, name).locator(f'[data-handleid="{handle}"]').bounding_box()
+        box = handle(port).bounding_box()
         assert box is not None
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
     page.mouse.move(*middle(source))
     page.mouse.down()
-    place = middle(target)
+    reached = handle(target).and_(page.locator(".connectingto"))
     for _ in range(MOST_PANS):
-        page.mouse.move(*place, steps=5)
-        before, place = place, middle(target)
-        if place == before:
+        page.mouse.move(*middle(target), steps=5)
+        if reached.count():
             break
+    expect(reached).to_have_count(1)
     page.mouse.up()
 
 

@@ -52,7 +52,15 @@ def edge(page: Page, wire: str) -> Locator:
 
 
 def middle(found: Locator) -> tuple[float, float]:
-    box = found.bounding_box()
+    """Where an element is, once it is drawn: the sheet draws lines anew after its blocks."""
+    box = None
+
+    def drawn() -> bool:
+        nonlocal box
+        box = found.bounding_box()
+        return box is not None
+
+    wait_until(found.page, drawn)
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
