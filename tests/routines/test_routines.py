@@ -23,6 +23,7 @@ from armblocks.routines.arithmetic import (
     sign,
     square_root,
 )
+from armblocks.routines.lanes import LaneArray, Lanes
 from armblocks.routines.llvm import definitions
 from armblocks.routines.routine import UNROLL, Program, Routine, external
 from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
@@ -30,13 +31,16 @@ from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
 CTYPES = {float: ctypes.c_double, int: ctypes.c_int64, list: ctypes.c_void_p, None: None}
 
 
-def both(write: Callable[..., Any], *arguments: Any, result: type | None = None) -> Any:
-    """Run a function in machine code and in the interpreter; gives what both give, lists written in place."""
-    program = Program()
+def both(write: Callable[..., Any], *arguments: Any, result: type | None = None, lanes: int = 1) -> Any:
+    """Run a function in machine code and in the interpreter; gives what both give, lists written in place.
+
+    A list of tuples is an array of rows of lanes.
+    """
+    program = Program(lanes)
     program.define(write, "run", public=True)
     parts = definitions(program)
     code = load_code(("routines test", *parts.values()), lambda: "\n\n".join(parts.values()))
-    arrays = [np.array(a, dtype=type(a[0])) if isinstance(a, list) else None for a in arguments]
+    arrays = [aligned(argument) if isinstance(argument, list) else None for argument in arguments]
     kinds = [CTYPES[type(argument)] for argument in arguments]
     function = ctypes.CFUNCTYPE(CTYPES[result], *kinds)(code.address("run"))
     native = function(*(x if a is None else a.ctypes.data for x, a in zip(arguments, arrays)))
@@ -48,6 +52,18 @@ def both(write: Callable[..., Any], *arguments: Any, result: type | None = None)
             np.testing.assert_array_equal(array, copy)
             argument[:] = copy
     return native
+
+
+def aligned(numbers: list[Any]) -> np.ndarray:
+    """The numbers as an array; rows of lanes lie at multiples of their size."""
+    if not isinstance(numbers[0], tuple):
+        return np.array(numbers, dtype=type(numbers[0]))
+    lanes = len(numbers[0])
+    memory = np.empty((len(numbers) + 1) * lanes)
+    first = -memory.ctypes.data // 8 % lanes
+    array = memory[first : first + len(numbers) * lanes].reshape(-1, lanes)
+    array[:] = numbers
+    return array
 
 
 def test_arithmetic_is_that_of_doubles() -> None:
@@ -103,6 +119,37 @@ def test_integers_wrap_around_and_divide_toward_zero() -> None:
     both(run, -7, out)
     half = ((1 << 64) - 7) // 2
     assert out == [-6, -6, -10, 10, 49, -14, -3, 0, -7, -7, -7, half, 1, -7, 1, 1, 1, 0, 0, 0]
+
+
+@pytest.mark.parametrize("lanes", [1, 2, 4, 8])
+def test_lanes_compute_apart_and_share_control_flow(lanes: int) -> None:
+    """The larger of ``x`` and its reciprocal, doubled until no lane is below 10 (at most 20 times)."""
+
+    def run(r: Routine, x: LaneArray, limit: Real, out: LaneArray) -> Integer:
+        def larger(r: Routine, a: Lanes) -> Lanes:
+            known = (a == a) & ~(a != a) & a.ordered | (a > 1.0)
+            return select(known, select(a > 1.0 / a, a, 1.0 / a), 99.0)
+
+        last = r.variable(r.call(r.program.define(larger, inlined=False), x[0]))
+        turns = r.integer(0)
+        with r.loop() as loop:
+            loop.leave_unless((last.value < 10.0).any)
+            loop.leave_when(turns.value >= 20)
+            last.value = fma(last.value, 2.0, 0.0)
+            turns.value = turns.value + 1
+        rows = x.after(turns.value - turns.value + 1)
+        out[0], out[1], out[2] = last.value, square_root(abs(-rows[0])), rows[0] - 1.0
+        return turns.value + (limit > 0.0).count()
+
+    first = (3.0, 0.5, math.nan, 0.25, -4.0, 1e9, 7.0, 1.0)[:lanes]
+    second = (-4.0, 2.25, -0.0, 16.0, math.inf, 1.0, 9.0, 0.25)[:lanes]
+    out = [(0.0,) * lanes] * 3
+    start = [99.0 if math.isnan(a) else max(a, 1.0 / a) for a in first]
+    turns = next((k for k in range(20) if min(start) * 2.0**k >= 10.0), 20)
+    assert both(run, [first, second], 1.0, out, result=int, lanes=lanes) == turns + 1
+    assert out[0] == tuple(a * 2.0**turns for a in start)
+    assert out[1] == tuple(math.sqrt(abs(b)) for b in second)
+    assert out[2] == tuple(b - 1.0 for b in second)
 
 
 @pytest.mark.parametrize("n", [0, 1, UNROLL, UNROLL + 1, 30])

@@ -1,7 +1,7 @@
 """Runs the structured form of a routine in plain Python: the second opinion on its back ends.
 
-Memory is lists of numbers; an address is a list and a place in it. A jump is an exception that the region
-around it catches.
+Memory is lists of numbers; an address is a list and a place in it. What has lanes is a tuple. A jump is an
+exception that the region around it catches.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from armblocks.routines.routine import Program
 from armblocks.routines.tree import Kind, Operation
 
 Address = tuple[list[Any], int]
+LANES = (Kind.LANES, Kind.MASK)
 
 
 @dataclass
@@ -62,6 +63,7 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.AND: lambda a, b: a & b,
     Operation.OR: lambda a, b: a | b,
     Operation.NOT: lambda a: not a,
+    Operation.ANY: any,
     Operation.SELECT: lambda condition, a, b: a if condition else b,
     Operation.TO_REAL: float,
     Operation.TO_INTEGER: int,
@@ -108,8 +110,8 @@ class _Call:
 
     def value(self, operand: tree.Operand) -> Any:
         match operand:
-            case tree.Constant(_, value):
-                return value
+            case tree.Constant(kind, value):
+                return (value,) * self.interpreter.program.lanes if kind in LANES else value
             case tree.Local():
                 return self.values.setdefault(operand, ([None], 0))
             case tree.Table(_, numbers):
@@ -124,7 +126,11 @@ class _Call:
     def statement(self, statement: tree.Statement) -> None:
         match statement:
             case tree.Compute(result, operation, operands):
-                found = OPERATIONS[operation](*map(self.value, operands))
+                values = list(map(self.value, operands))
+                if result.kind in LANES:
+                    found = tuple(OPERATIONS[operation](*lane) for lane in zip(*values, strict=True))
+                else:
+                    found = OPERATIONS[operation](*values)
                 self.values[result] = _wrapped(found) if result.kind is Kind.INTEGER else found
             case tree.Locate(result, base, index, _):
                 memory, place = self.value(base)

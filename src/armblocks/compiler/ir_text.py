@@ -19,6 +19,9 @@ class Module:
     def __init__(self) -> None:
         self._parts: dict[str, str] = {}
 
+    def __contains__(self, symbol: str) -> bool:
+        return symbol in self._parts
+
     def add(self, symbol: str, text: str) -> None:
         """Add the text that defines ``symbol``; a second text for the same symbol is left out."""
         self._parts.setdefault(symbol, text)

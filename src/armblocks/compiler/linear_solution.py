@@ -1,4 +1,4 @@
-"""The tape's ``SOLVE`` as LLVM IR: dense linear equations over one or more lanes.
+"""The tape's ``SOLVE``: dense linear equations over one or more lanes.
 
 Gaussian elimination with row pivoting. Rows are compared beside their largest entries, so that no scaling of
 an equation changes the choice (Golub, Van Loan, *Matrix Computations*, 4th ed., 3.5.2). One correction by the
@@ -11,10 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from armblocks.compiler.ir_routine import Routine
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.opcodes import solution_length
+from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Tape
+from armblocks.routines.arithmetic import select
+from armblocks.routines.full_matrix import FullMatrix
+from armblocks.routines.lanes import LaneArray, Lanes, Mask
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Integer, NumberArray
 
 SHORTEST_BLOCK = 8
 """From so many neighbours on, inputs are copied in one go: LLVM compares loads and stores pair by pair."""
@@ -33,7 +38,7 @@ def emit_linear_solution(
     """
     n, module = solution_length(len(operands)), body.module
     symbol = f"linear_solution.{n}.{body.lanes}"
-    module.define(symbol, lambda: _Solver(module, n, body.lanes, symbol).text())
+    _define(module, symbol, n, body.lanes)
     module.declare("ptr", "llvm.stacksave.p0")
     module.declare("void", "llvm.stackrestore.p0", "ptr")
     stack = body.let("call ptr @llvm.stacksave.p0()")
@@ -59,6 +64,16 @@ def emit_linear_solution(
     return solution
 
 
+def _define(module: Module, symbol: str, n: int, lanes: int) -> None:
+    def solve(r: Routine, m: LaneArray) -> None:
+        _Solver(n, m).write(r)
+
+    if symbol not in module:
+        program = Program(lanes)
+        program.define(solve, symbol, inlined=False)
+        add_program(module, program)
+
+
 def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
     """First place and length of each run of neighbouring inputs of one slot, and of each other operand."""
     start = 0
@@ -70,165 +85,83 @@ def _blocks(tape: Tape, operands: Sequence[int]) -> Iterator[tuple[int, int]]:
         start = k
 
 
-class _LaneRoutine(Routine):
-    """A routine whose numbers have several lanes; integers and control flow are those of all of them."""
-
-    def __init__(self, module: Module, lanes: int) -> None:
-        super().__init__(module)
-        self.lanes = lanes
-        self.real, self.bit = self.type("double"), self.type("i1")
-
-
 class _Solver:
-    """Writes ``void f(ptr m)``; ``m`` has the matrix, the right side, the solution, then work space."""
+    """What the function does in its memory ``m``: matrix, right side, solution, then work space."""
 
-    def __init__(self, module: Module, n: int, lanes: int, symbol: str) -> None:
-        self.w = _LaneRoutine(module, lanes)
+    def __init__(self, n: int, m: LaneArray) -> None:
         self.n = n
-        self.symbol = symbol
-        self.matrix = 0
-        self.right = n * n
-        self.solution = self.right + n
-        self.factors = self.solution + n
-        self.weights = self.factors + n * n
-        self.work = self.weights + n
+        self.matrix = FullMatrix(size=n, numbers=m)
+        self.right = m.after(n * n)
+        self.solution = self.right.after(n)
+        self.factors = FullMatrix(size=n, numbers=self.solution.after(n))
+        self.weights = self.factors.numbers.after(n * n)
+        self.work = self.weights.after(n)
 
     @staticmethod
     def length(n: int) -> int:
-        """Numbers in the memory that the function gets."""
+        """Rows of lanes in the memory."""
         return 2 * n * n + 4 * n
 
-    def text(self) -> str:
-        self.prepare()
-        self.count("0", self.eliminate)
-        self.count("0", lambda i: self.put(self.get(self.right, i), self.work, i))
-        self.substitute()
-        self.count("0", lambda i: self.put(self.get(self.work, i), self.solution, i))
-        self.count("0", self.leave_residual)
-        self.substitute()
-        self.count("0", self.correct)
-        self.w.do("ret void")
-        return self.w.text(f"define internal void @{self.symbol}(ptr %m) nounwind noinline")
+    def write(self, r: Routine) -> None:
+        """Solve, then correct the solution once."""
+        self.prepare(r)
+        for k in r.range(0, self.n):
+            self.pivot(r, k)
+            self.eliminate(r, k)
+        for i in r.range(0, self.n):
+            self.work[i] = self.right[i]
+        self.substitute(r)
+        for i in r.range(0, self.n):
+            self.solution[i] = self.work[i]
+        for i in r.range(0, self.n):
+            self.work[i] = self.matrix.less_products(r, self.right[i], i, self.solution, 0, self.n)
+        self.substitute(r)
+        for i in r.range(0, self.n):
+            self.solution[i] = self.solution[i] + self.work[i]
 
-    # Memory and loops.
-
-    def count(self, start: str, write: Callable[[str], None], stop: str | None = None) -> None:
-        self.w.count(start, stop or str(self.n), write)
-
-    def address(self, place: int, index: str) -> str:
-        return self.w.at("%m", self.w.word_op("add", index, str(place)), self.w.real)
-
-    def get(self, place: int, index: str) -> str:
-        return self.w.get(self.address(place, index), self.w.real)
-
-    def put(self, value: str, place: int, index: str) -> None:
-        self.w.put(value, self.address(place, index), self.w.real)
-
-    def entry(self, row: str, column: str) -> str:
-        return self.w.word_op("add", self.w.word_op("mul", row, str(self.n)), column)
-
-    # The parts.
-
-    def prepare(self) -> None:
+    def prepare(self, r: Routine) -> None:
         """The factors begin as the matrix; the weight of a row is its largest entry's reciprocal."""
-        w = self.w
+        for i in r.range(0, self.n):
+            largest = r.variable(Lanes.constant(r, 0.0))
+            for j in r.range(0, self.n):
+                place = self.matrix.place(i, j)
+                value = self.matrix.numbers[place]
+                self.factors.numbers[place] = value
+                size, known = abs(value), largest.value
+                largest.value = select(size > known, size, known)
+            self.weights[i] = 1.0 / largest.value
 
-        def row(i: str) -> None:
-            self.put(w.number(0.0), self.weights, i)
+    def pivot(self, r: Routine, k: Integer) -> None:
+        """The row of the largest weighted entry of column ``k`` to place ``k``, in each lane."""
+        for i in r.range(k + 1, self.n):
+            larger = self.weighted(i, k) > self.weighted(k, k)
+            with r.when(larger.any):
+                for matrix in (self.factors, self.matrix):
+                    for j in r.range(0, self.n):
+                        exchange(larger, matrix.numbers, matrix.place(i, j), matrix.place(k, j))
+                for column in (self.weights, self.right):
+                    exchange(larger, column, i, k)
 
-            def take(j: str) -> None:
-                place = self.entry(i, j)
-                value = self.get(self.matrix, place)
-                self.put(value, self.factors, place)
-                size, known = w.absolute(value), self.get(self.weights, i)
-                self.put(w.select(w.compare("ogt", size, known), size, known), self.weights, i)
+    def weighted(self, row: Integer, column: Integer) -> Lanes:
+        """Size of an entry beside the largest of its row."""
+        return abs(self.factors.numbers[self.factors.place(row, column)]) * self.weights[row]
 
-            self.count("0", take)
-            self.put(w.divide(w.number(1.0), self.get(self.weights, i)), self.weights, i)
+    def eliminate(self, r: Routine, k: Integer) -> None:
+        """Column ``k`` out of the rows below."""
+        factors, place = self.factors.numbers, self.factors.place
+        for i in r.range(k + 1, self.n):
+            factor = factors[place(i, k)] / factors[place(k, k)]
+            factors[place(i, k)] = factor
+            self.factors.subtract_from_row(r, i, factor, k)
 
-        self.count("0", row)
-
-    def eliminate(self, k: str) -> None:
-        """The row of the largest weighted entry to place ``k``, then column ``k`` out of the rows below."""
-        w = self.w
-        below = w.word_op("add", k, "1")
-
-        def exchange(i: str) -> None:
-            sizes = [
-                w.multiply(
-                    w.absolute(self.get(self.factors, self.entry(row, k))), self.get(self.weights, row)
-                )
-                for row in (i, k)
-            ]
-            larger = w.compare("ogt", *sizes)
-
-            def swap(place: int, one: str, other: str) -> None:
-                a, b = self.get(place, one), self.get(place, other)
-                self.put(w.select(larger, b, a), place, one)
-                self.put(w.select(larger, a, b), place, other)
-
-            def swap_rows() -> None:
-                for place in (self.factors, self.matrix):
-                    self.count("0", lambda j: swap(place, self.entry(i, j), self.entry(k, j)))  # noqa: B023
-                for place in (self.weights, self.right):
-                    swap(place, i, k)
-
-            if w.lanes > 1:
-                swap_rows()
-                return
-            exchanged, kept = w.fresh("exchange"), w.fresh("kept")
-            w.branch(larger, exchanged, kept)
-            w.place(exchanged)
-            swap_rows()
-            w.place(kept)
-
-        self.count(below, exchange)
-
-        def row(i: str) -> None:
-            own = self.entry(i, k)
-            factor = w.divide(self.get(self.factors, own), self.get(self.factors, self.entry(k, k)))
-            self.put(factor, self.factors, own)
-            minus = w.negate(factor)
-
-            def subtract(j: str) -> None:
-                target = self.entry(i, j)
-                upper = self.get(self.factors, self.entry(k, j))
-                self.put(w.fma(minus, upper, self.get(self.factors, target)), self.factors, target)
-
-            self.count(below, subtract)
-
-        self.count(below, row)
-
-    def substitute(self) -> None:
+    def substitute(self, r: Routine) -> None:
         """``work`` becomes the solution for the right side that stands there."""
-        w = self.w
+        factors = self.factors
+        factors.substitute(r, self.work, lambda value, i: value / factors.numbers[factors.place(i, i)])
 
-        def less(i: str, j: str) -> None:
-            known = w.negate(self.get(self.work, j))
-            factor = self.get(self.factors, self.entry(i, j))
-            self.put(w.fma(known, factor, self.get(self.work, i)), self.work, i)
 
-        self.count("0", lambda i: self.count("0", lambda j: less(i, j), i))
-
-        def back(turn: str) -> None:
-            i = w.word_op("sub", str(self.n - 1), turn)
-            self.count(w.word_op("add", i, "1"), lambda j: less(i, j))
-            pivot = self.get(self.factors, self.entry(i, i))
-            self.put(w.divide(self.get(self.work, i), pivot), self.work, i)
-
-        self.count("0", back)
-
-    def leave_residual(self, i: str) -> None:
-        w = self.w
-        self.put(self.get(self.right, i), self.work, i)
-
-        def subtract(j: str) -> None:
-            known = w.negate(self.get(self.solution, j))
-            entry = self.get(self.matrix, self.entry(i, j))
-            self.put(w.fma(known, entry, self.get(self.work, i)), self.work, i)
-
-        self.count("0", subtract)
-
-    def correct(self, i: str) -> None:
-        corrected = self.w.add(self.get(self.solution, i), self.get(self.work, i))
-        self.put(corrected, self.solution, i)
+def exchange(where: Mask, array: NumberArray[Lanes], one: Integer, other: Integer) -> None:
+    """Exchange two rows of lanes in the lanes where the mask holds."""
+    a, b = array[one], array[other]
+    array[one] = select(where, b, a)
+    array[other] = select(where, a, b)

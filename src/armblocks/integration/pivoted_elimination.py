@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from armblocks.routines.arithmetic import fma, select
+from armblocks.routines.arithmetic import select
+from armblocks.routines.full_matrix import FullMatrix
 from armblocks.routines.routine import Routine
-from armblocks.routines.values import Integer, Integers, Reals
+from armblocks.routines.values import Integer, Integers, Real, Reals
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +23,11 @@ class PivotedElimination:
     pivots: Reals
     swaps: Integers
 
+    @property
+    def full(self) -> FullMatrix[Real]:
+        """The matrix, or its factors."""
+        return FullMatrix(size=self.size, numbers=self.matrix)
+
     def factor(self, r: Routine) -> None:
         """Factor the matrix: the factors ``L`` below the diagonal, ``U`` from the diagonal on."""
         for k in r.range(0, self.size):
@@ -29,31 +35,28 @@ class PivotedElimination:
 
     def _column(self, r: Routine, k: Integer) -> None:
         """Exchange row ``k`` with the one that has the largest entry of column ``k``; eliminate below it."""
-        size, A = self.size, self.matrix
+        A, place = self.matrix, self.full.place
         below = k + 1
         largest = r.integer(k)
-        for i in r.range(below, size):
+        for i in r.range(below, self.size):
             known = largest.value
-            larger = abs(A[i * size + k]) > abs(A[known * size + k])
+            larger = abs(A[place(i, k)]) > abs(A[place(known, k)])
             largest.value = select(larger, i, known)
         row = largest.value
         self.swaps[k] = row
-        for j in r.range(0, size):
-            one, other = k * size + j, row * size + j
+        for j in r.range(0, self.size):
+            one, other = place(k, j), place(row, j)
             a, b = A[one], A[other]
             A[one] = b
             A[other] = a
-        inverse = 1.0 / A[k * size + k]
+        inverse = 1.0 / A[place(k, k)]
         self.pivots[k] = inverse
-        for i in r.range(below, size):
-            place = i * size + k
-            factor = A[place] * inverse
-            A[place] = factor
-            minus = -factor
+        for i in r.range(below, self.size):
+            own = place(i, k)
+            factor = A[own] * inverse
+            A[own] = factor
             with r.when(factor != 0.0):
-                for j in r.range(below, size):
-                    target = i * size + j
-                    A[target] = fma(minus, A[k * size + j], A[target])
+                self.full.subtract_from_row(r, i, factor, k)
 
     def solve(self, r: Routine, y: Reals) -> None:
         """Solve for the right side ``y``, in its place."""
@@ -63,19 +66,4 @@ class PivotedElimination:
             a, b = y[k], y[row]
             y[k] = b
             y[row] = a
-        for i in r.range(0, self.size):
-            self._subtract_products(r, y, i, 0, i)
-        for turn in r.range(0, self.size):
-            i = self.size - 1 - turn
-            self._subtract_products(r, y, i, i + 1, self.size)
-            y[i] = y[i] * self.pivots[i]
-
-    def _subtract_products(
-        self, r: Routine, y: Reals, row: Integer, start: Integer | int, stop: Integer | int
-    ) -> None:
-        """``y[row] -= sum_j matrix[row][j] y[j]`` for ``j = start … stop - 1``."""
-        total = r.real(y[row])
-        for j in r.range(start, stop):
-            minus = -y[j]
-            total.value = fma(self.matrix[row * self.size + j], minus, total.value)
-        y[row] = total.value
+        self.full.substitute(r, y, lambda value, row: value * self.pivots[row])

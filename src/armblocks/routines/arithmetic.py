@@ -5,26 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import overload
 
+from armblocks.routines.lanes import Lanes, Mask
 from armblocks.routines.tree import Kind, Operation
 from armblocks.routines.values import (
     Boolean,
     Integer,
+    NumberT,
     Real,
     integer_operand,
     real_operand,
 )
 
 
-def square_root(a: Real) -> Real:
+def square_root(a: NumberT) -> NumberT:
     """The square root, exactly rounded."""
-    return Real(a.writer, a.writer.compute(Kind.REAL, Operation.SQUARE_ROOT, a.operand))
+    return a.compute(Operation.SQUARE_ROOT, a)
 
 
-def fma(a: Real | float, b: Real | float, c: Real | float) -> Real:
+def fma(a: NumberT | float, b: NumberT | float, c: NumberT | float) -> NumberT:
     """``a b + c``, rounded once; at least one of them is a value of a routine."""
-    writer = next(value.writer for value in (a, b, c) if isinstance(value, Real))
-    operands = (real_operand(value) for value in (a, b, c))
-    return Real(writer, writer.compute(Kind.REAL, Operation.FMA, *operands))
+    number = next(value for value in (a, b, c) if not isinstance(value, float | int))
+    return number.compute(Operation.FMA, a, b, c)
 
 
 @overload
@@ -33,13 +34,20 @@ def select(condition: Boolean, yes: Integer, no: Integer | int) -> Integer: ...
 def select(condition: Boolean, yes: int, no: Integer) -> Integer: ...
 @overload
 def select(condition: Boolean, yes: Real | float, no: Real | float) -> Real: ...
-def select(condition: Boolean, yes: Real | Integer | float, no: Real | Integer | float) -> Real | Integer:
+@overload
+def select(condition: Mask, yes: Lanes | float, no: Lanes | float) -> Lanes: ...
+def select(
+    condition: Boolean | Mask, yes: Real | Lanes | Integer | float, no: Real | Lanes | Integer | float
+) -> Real | Lanes | Integer:
     """``yes`` where the condition holds, else ``no``; both are evaluated. Two Python numbers are reals."""
     writer = condition.writer
+    if isinstance(condition, Mask):
+        operands = (Lanes.place(x) for x in (yes, no) if not isinstance(x, Real | Integer))
+        return Lanes(writer, writer.compute(Kind.LANES, Operation.SELECT, condition.operand, *operands))
     if isinstance(yes, Integer) or isinstance(no, Integer):
         operands = (integer_operand(x if isinstance(x, Integer) else int(_number(x))) for x in (yes, no))
         return Integer(writer, writer.compute(Kind.INTEGER, Operation.SELECT, condition.operand, *operands))
-    operands = (real_operand(x) for x in (yes, no))
+    operands = (real_operand(x) for x in (yes, no) if not isinstance(x, Lanes))
     return Real(writer, writer.compute(Kind.REAL, Operation.SELECT, condition.operand, *operands))
 
 
@@ -88,6 +96,6 @@ def inverse_root(a: Real, k: int) -> Real:
     return y
 
 
-def _number(value: Real | Integer | float) -> float:
-    assert not isinstance(value, Real | Integer)
+def _number(value: Real | Lanes | Integer | float) -> float:
+    assert not isinstance(value, Real | Lanes | Integer)
     return value

@@ -36,6 +36,7 @@ from armblocks.routines.tree import (
 )
 
 _TYPES = {Kind.REAL: "double", Kind.INTEGER: "i64", Kind.BOOLEAN: "i1", Kind.ADDRESS: "ptr"}
+_OF_EACH_LANE = {Kind.LANES: Kind.REAL, Kind.MASK: Kind.BOOLEAN}
 
 _TWO_REALS = {
     Operation.ADD: "fadd",
@@ -65,6 +66,7 @@ _TWO_INTEGERS = {
     Operation.GREATER_EQUAL: "icmp sge",
 }
 _TWO_BOOLEANS = {Operation.AND: "and", Operation.OR: "or"}
+_OF_TWO = {Kind.REAL: _TWO_REALS, Kind.INTEGER: _TWO_INTEGERS, Kind.BOOLEAN: _TWO_BOOLEANS}
 _INTRINSICS = {Operation.SQUARE_ROOT: "sqrt", Operation.ABSOLUTE: "fabs"}
 _CONVERSIONS = {
     (Operation.TO_REAL, Kind.INTEGER): "sitofp i64 {} to double",
@@ -72,8 +74,6 @@ _CONVERSIONS = {
     (Operation.TO_INTEGER, Kind.BOOLEAN): "zext i1 {} to i64",
     (Operation.BITS, Kind.REAL): "bitcast double {} to i64",
     (Operation.FROM_BITS, Kind.INTEGER): "bitcast i64 {} to double",
-    (Operation.NEGATE, Kind.REAL): "fneg double {}",
-    (Operation.NOT, Kind.BOOLEAN): "xor i1 {}, true",
 }
 
 
@@ -89,7 +89,7 @@ def definitions(program: Program) -> dict[str, str]:
         if isinstance(part, Table):
             texts[symbol] = _table(part)
         else:
-            writer = _FunctionText()
+            writer = _FunctionText(program.lanes)
             texts[symbol] = writer.text(part)
             texts.update(writer.declared)
     return texts
@@ -114,7 +114,8 @@ def _literal(kind: Kind, value: float | None) -> str:
 class _FunctionText:
     """The text of one function."""
 
-    def __init__(self) -> None:
+    def __init__(self, lanes: int) -> None:
+        self.lanes = lanes
         self.declared: dict[str, str] = {}
         self._lines: list[str] = []
         self._slots: list[str] = []
@@ -129,29 +130,46 @@ class _FunctionText:
         for parameter in function.parameters:
             self._names[parameter] = f"%{parameter.name}"
         self._part(function.body)
-        result = "void" if function.result is None else _TYPES[function.result]
+        result = "void" if function.result is None else self._type(function.result)
         alias = " noalias" if function.distinct else ""
         arguments = ", ".join(
-            f"{_TYPES[parameter.kind]}{alias if parameter.kind is Kind.ADDRESS else ''} %{parameter.name}"
+            f"{self._type(parameter.kind)}{alias if parameter.kind is Kind.ADDRESS else ''} %{parameter.name}"
             for parameter in function.parameters
         )
         linkage = "" if function.public else "internal "
         inlined = "" if function.inlined else " noinline"
-        head = f"define {linkage}{result} @{function.symbol}({arguments}){inlined} {{"
+        head = f"define {linkage}{result} @{function.symbol}({arguments}){inlined} nounwind {{"
         return "\n".join([head, "entry:", *self._slots, *self._lines, "}"])
 
-    # Names.
+    # Types and names.
+
+    def _type(self, kind: Kind) -> str:
+        if kind not in _OF_EACH_LANE:
+            return _TYPES[kind]
+        single = _TYPES[_OF_EACH_LANE[kind]]
+        return single if self.lanes == 1 else f"<{self.lanes} x {single}>"
+
+    def _typed(self, operand: Operand) -> str:
+        """The type of an operand; a variable or a table stands for its address."""
+        return "ptr" if isinstance(operand, Local | Table) else self._type(operand.kind)
+
+    def _constant(self, constant: Constant) -> str:
+        if constant.kind not in _OF_EACH_LANE:
+            return _literal(constant.kind, constant.value)
+        kind = _OF_EACH_LANE[constant.kind]
+        literal = _literal(kind, constant.value)
+        return literal if self.lanes == 1 else f"splat ({_TYPES[kind]} {literal})"
 
     def _operand(self, operand: Operand) -> str:
         if isinstance(operand, Constant):
-            return _literal(operand.kind, operand.value)
+            return self._constant(operand)
         if isinstance(operand, Table):
             return f"@{operand.symbol}"
         name = self._names.get(operand)
         if name is None:  # the first use of a variable; a temporary is named where it is computed
             assert isinstance(operand, Local), "a value is used where it is not valid"
             name = self._names[operand] = f"%x{len(self._slots) + 1}"
-            self._slots.append(f"  {name} = alloca {_TYPES[operand.kind]}")
+            self._slots.append(f"  {name} = alloca {self._type(operand.kind)}")
         return name
 
     def _new(self, temporary: Temporary, text: str) -> str:
@@ -194,7 +212,7 @@ class _FunctionText:
             case Jump(mark):
                 self._end(f"br label %{self._label(mark)}")
             case Return(value):
-                self._end("ret void" if value is None else f"ret {_typed(value)} {self._operand(value)}")
+                self._end("ret void" if value is None else f"ret {self._typed(value)} {self._operand(value)}")
             case Stage(mark):
                 self._place(self._label(mark))
             case Region():
@@ -245,24 +263,24 @@ class _FunctionText:
             case Compute(result, operation, operands):
                 self._new(result, self._operation(operation, operands))
             case Locate(result, base, index, element):
-                text = f"getelementptr inbounds {_TYPES[element]}, ptr {self._operand(base)}"
+                text = f"getelementptr inbounds {self._type(element)}, ptr {self._operand(base)}"
                 self._new(result, f"{text}, i64 {self._operand(index)}")
             case Load(result, address):
-                self._new(result, f"load {_TYPES[result.kind]}, ptr {self._operand(address)}")
+                self._new(result, f"load {self._type(result.kind)}, ptr {self._operand(address)}")
             case Store(value, address):
-                self._line(f"store {_typed(value)} {self._operand(value)}, ptr {self._operand(address)}")
+                self._line(f"store {self._typed(value)} {self._operand(value)}, ptr {self._operand(address)}")
             case Copy(source, target, size):
                 self._declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
                 target, source, size = (self._operand(operand) for operand in (target, source, size))
                 arguments = f"ptr {target}, ptr {source}, i64 {size}, i1 false"
                 self._line(f"call void @llvm.memcpy.p0.p0.i64({arguments})")
             case Call(result, symbol, arguments):
-                texts = [f"{_typed(argument)} {self._operand(argument)}" for argument in arguments]
+                texts = [f"{self._typed(argument)} {self._operand(argument)}" for argument in arguments]
                 call = f"@{symbol}({', '.join(texts)})"
                 if result is None:
                     self._line(f"call void {call}")
                 else:
-                    self._new(result, f"call {_TYPES[result.kind]} {call}")
+                    self._new(result, f"call {self._type(result.kind)} {call}")
             case _:
                 raise AssertionError(statement)
 
@@ -273,29 +291,43 @@ class _FunctionText:
         kind = operands[0].kind if not isinstance(operands[0], Table) else Kind.ADDRESS
         texts = [self._operand(operand) for operand in operands]
         if operation is Operation.SELECT:
-            chosen = _typed(operands[1])
-            return f"select i1 {texts[0]}, {chosen} {texts[1]}, {chosen} {texts[2]}"
+            chosen = self._typed(operands[1])
+            return f"select {self._type(kind)} {texts[0]}, {chosen} {texts[1]}, {chosen} {texts[2]}"
+        if operation is Operation.ANY:
+            return self._any(texts[0])
         if operation is Operation.FMA:
-            # For -(a b + c) LLVM selects FNMADD of ARM64, which is (-a) b + (-c): where the sum is exactly
-            # zero that gives +0 instead of -0. The fence keeps the two operations apart.
-            product = self._new(Temporary(Kind.REAL), self._intrinsic("fma", *texts))
-            return self._intrinsic("arithmetic.fence", product)
+            return self._fma(kind, texts)
         if operation in _INTRINSICS:
-            return self._intrinsic(_INTRINSICS[operation], *texts)
+            return self._intrinsic(_INTRINSICS[operation], kind, *texts)
+        if operation is Operation.NEGATE:
+            return f"fneg {self._type(kind)} {texts[0]}"
+        if operation is Operation.NOT:
+            return f"xor {self._type(kind)} {texts[0]}, {self._constant(Constant(kind, True))}"
         if (operation, kind) in _CONVERSIONS:
             return _CONVERSIONS[operation, kind].format(texts[0])
-        table = {Kind.REAL: _TWO_REALS, Kind.INTEGER: _TWO_INTEGERS, Kind.BOOLEAN: _TWO_BOOLEANS}[kind]
-        return f"{table[operation]} {_TYPES[kind]} {texts[0]}, {texts[1]}"
+        table = _OF_TWO[_OF_EACH_LANE.get(kind, kind)]
+        return f"{table[operation]} {self._type(kind)} {texts[0]}, {texts[1]}"
 
-    def _intrinsic(self, name: str, *operands: str) -> str:
-        symbol = f"llvm.{name}.f64"
-        self._declare("double", symbol, *["double"] * len(operands))
-        return f"call double @{symbol}({', '.join(f'double {operand}' for operand in operands)})"
+    def _any(self, mask: str) -> str:
+        if self.lanes == 1:
+            return f"or i1 {mask}, false"
+        bits = self._new(Temporary(Kind.INTEGER), f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
+        return f"icmp ne i{self.lanes} {bits}, 0"
+
+    def _fma(self, kind: Kind, operands: Sequence[str]) -> str:
+        call = self._intrinsic("fma", kind, *operands)
+        if self._type(kind) != "double":
+            return call
+        # For -(a b + c) LLVM selects FNMADD of ARM64, which is (-a) b + (-c): where the sum is exactly
+        # zero that gives +0 instead of -0. The fence keeps the two operations apart; vectors have no such
+        # instruction.
+        return self._intrinsic("arithmetic.fence", kind, self._new(Temporary(kind), call))
+
+    def _intrinsic(self, name: str, kind: Kind, *operands: str) -> str:
+        number = self._type(kind)
+        symbol = f"llvm.{name}.{'f64' if number == 'double' else f'v{self.lanes}f64'}"
+        self._declare(number, symbol, *[number] * len(operands))
+        return f"call {number} @{symbol}({', '.join(f'{number} {operand}' for operand in operands)})"
 
     def _declare(self, result: str, symbol: str, *arguments: str) -> None:
         self.declared[symbol] = f"declare {result} @{symbol}({', '.join(arguments)})"
-
-
-def _typed(operand: Operand) -> str:
-    """The type of an operand; a variable or a table stands for its address."""
-    return "ptr" if isinstance(operand, Local | Table) else _TYPES[operand.kind]

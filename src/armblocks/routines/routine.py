@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from typing import Concatenate, Generic, ParamSpec, TypeVar, cast
 
 from armblocks.routines import tree
+from armblocks.routines.lanes import LaneArray, Lanes, Mask
 from armblocks.routines.tree import Constant, Jump, Kind, Local, Mark, Operand, Statement, Table, Temporary
 from armblocks.routines.values import (
     Array,
@@ -34,6 +35,8 @@ from armblocks.routines.values import (
     Integer,
     Integers,
     IntegerVariable,
+    NumberT,
+    NumberVariable,
     Real,
     Reals,
     RealVariable,
@@ -56,6 +59,9 @@ _KINDS: dict[type, Kind] = {
     Boolean: Kind.BOOLEAN,
     Reals: Kind.ADDRESS,
     Integers: Kind.ADDRESS,
+    Lanes: Kind.LANES,
+    Mask: Kind.MASK,
+    LaneArray: Kind.ADDRESS,
 }
 _BY_NAME: dict[str, type[Value]] = {kind.__name__: kind for kind in _KINDS}
 
@@ -75,9 +81,10 @@ def external(write: Callable[Concatenate[Routine, P], R], symbol: str = "") -> F
 
 
 class Program:
-    """Functions and tables in the order in which they were first named."""
+    """Functions and tables in the order in which they were first named. ``lanes`` is a power of two."""
 
-    def __init__(self) -> None:
+    def __init__(self, lanes: int = 1) -> None:
+        self.lanes = lanes
         self.parts: dict[str, tree.Function | Table] = {}
 
     def define(
@@ -178,9 +185,11 @@ class Routine(Writer):
 
     def real(self, initial: Real | float) -> RealVariable:
         """A variable double. It gets its initial value here, at every passage."""
-        variable = RealVariable(self, Local(Kind.REAL))
-        variable.value = initial
-        return variable
+        return RealVariable(Real(self, real_operand(initial)))
+
+    def variable(self, initial: NumberT) -> NumberVariable[NumberT]:
+        """A variable double, or one in each lane, as its initial value is, which it gets at every passage."""
+        return NumberVariable(initial)
 
     def integer(self, initial: Integer | int) -> IntegerVariable:
         """A variable integer. It gets its initial value here, at every passage."""

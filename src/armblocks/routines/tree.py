@@ -21,10 +21,14 @@ class Kind(Enum):
     """A 64-bit signed integer; sums and products wrap around."""
     BOOLEAN = "boolean"
     ADDRESS = "address"
+    LANES = "lanes"
+    """A double in each lane: so many as the program has."""
+    MASK = "mask"
+    """A condition in each lane."""
 
 
 class Operation(Enum):
-    """An operation without side effects. Real operations round once, to nearest."""
+    """An operation without side effects. Real operations round once, to nearest, in every lane alike."""
 
     ADD = "add"
     SUBTRACT = "subtract"
@@ -47,11 +51,13 @@ class Operation(Enum):
     ORDERED = "ordered"
     """Neither is NaN."""
     AND = "and"
-    """Of Booleans, or of the bits of integers."""
+    """Of conditions, or of the bits of integers."""
     OR = "or"
     NOT = "not"
+    ANY = "any"
+    """Whether a mask holds in any lane."""
     SELECT = "select"
-    """The second operand where the first holds, else the third."""
+    """The second operand where the first holds, else the third; a mask chooses in each lane."""
     TO_REAL = "to real"
     """An integer as a double."""
     TO_INTEGER = "to integer"
@@ -79,7 +85,7 @@ class Local:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A number; an address only as ``None``, the null address."""
+    """A number, the same in all lanes; an address only as ``None``, the null address."""
 
     kind: Kind
     value: float | int | bool | None

@@ -8,7 +8,7 @@ not known yet.
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Any, ClassVar, Generic, NoReturn, Self, TypeVar, cast
 
 from armblocks.routines.tree import (
     Compute,
@@ -72,88 +72,136 @@ class Value:
         )
 
 
-class Boolean(Value):
-    """A condition."""
+class Condition(Value):
+    """A condition of a routine, or one in each lane."""
 
-    def __and__(self, other: Boolean) -> Boolean:
+    __slots__ = ()
+    kind: ClassVar[Kind]
+
+    def __and__(self, other: Self) -> Self:
         return self._with(Operation.AND, other)
 
-    def __or__(self, other: Boolean) -> Boolean:
+    def __or__(self, other: Self) -> Self:
         return self._with(Operation.OR, other)
 
-    def __invert__(self) -> Boolean:
-        return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, Operation.NOT, self.operand))
+    def __invert__(self) -> Self:
+        return self._with(Operation.NOT)
 
-    def _with(self, operation: Operation, other: Boolean) -> Boolean:
-        return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, operation, self.operand, other.operand))
+    def _with(self, operation: Operation, *others: Self) -> Self:
+        operands = (value.operand for value in (self, *others))
+        return type(self)(self.writer, self.writer.compute(self.kind, operation, *operands))
+
+
+class Boolean(Condition):
+    """A condition: it decides what a routine does."""
+
+    __slots__ = ()
+    kind = Kind.BOOLEAN
 
     def count(self) -> Integer:
         """1 where it holds, else 0."""
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
 
 
-class Real(Value):
-    """A double. Each operation is rounded once; comparisons with NaN fail, except ``!=``."""
+ConditionT = TypeVar("ConditionT", bound=Condition)
 
-    def __add__(self, other: Real | float) -> Real:
-        return self._real(Operation.ADD, self, other)
 
-    def __radd__(self, other: float) -> Real:
-        return self._real(Operation.ADD, other, self)
+class Number(Value, Generic[ConditionT]):
+    """A double, or one in each lane. Each operation is rounded once; comparisons with NaN fail, except
+    ``!=``."""
 
-    def __sub__(self, other: Real | float) -> Real:
-        return self._real(Operation.SUBTRACT, self, other)
+    __slots__ = ()
+    kind: ClassVar[Kind]
+    condition: ClassVar[type[Condition]]
+    """What comparisons give."""
 
-    def __rsub__(self, other: float) -> Real:
-        return self._real(Operation.SUBTRACT, other, self)
+    def __add__(self, other: Self | float) -> Self:
+        return self.compute(Operation.ADD, self, other)
 
-    def __mul__(self, other: Real | float) -> Real:
-        return self._real(Operation.MULTIPLY, self, other)
+    def __radd__(self, other: float) -> Self:
+        return self.compute(Operation.ADD, other, self)
 
-    def __rmul__(self, other: float) -> Real:
-        return self._real(Operation.MULTIPLY, other, self)
+    def __sub__(self, other: Self | float) -> Self:
+        return self.compute(Operation.SUBTRACT, self, other)
 
-    def __truediv__(self, other: Real | float) -> Real:
-        return self._real(Operation.DIVIDE, self, other)
+    def __rsub__(self, other: float) -> Self:
+        return self.compute(Operation.SUBTRACT, other, self)
 
-    def __rtruediv__(self, other: float) -> Real:
-        return self._real(Operation.DIVIDE, other, self)
+    def __mul__(self, other: Self | float) -> Self:
+        return self.compute(Operation.MULTIPLY, self, other)
 
-    def __neg__(self) -> Real:
-        return self._real(Operation.NEGATE, self)
+    def __rmul__(self, other: float) -> Self:
+        return self.compute(Operation.MULTIPLY, other, self)
 
-    def __abs__(self) -> Real:
-        return self._real(Operation.ABSOLUTE, self)
+    def __truediv__(self, other: Self | float) -> Self:
+        return self.compute(Operation.DIVIDE, self, other)
 
-    def __lt__(self, other: Real | float) -> Boolean:
+    def __rtruediv__(self, other: float) -> Self:
+        return self.compute(Operation.DIVIDE, other, self)
+
+    def __neg__(self) -> Self:
+        return self.compute(Operation.NEGATE, self)
+
+    def __abs__(self) -> Self:
+        return self.compute(Operation.ABSOLUTE, self)
+
+    def __lt__(self, other: Self | float) -> ConditionT:
         return self._compare(Operation.LESS, other)
 
-    def __le__(self, other: Real | float) -> Boolean:
+    def __le__(self, other: Self | float) -> ConditionT:
         return self._compare(Operation.LESS_EQUAL, other)
 
-    def __gt__(self, other: Real | float) -> Boolean:
+    def __gt__(self, other: Self | float) -> ConditionT:
         return self._compare(Operation.GREATER, other)
 
-    def __ge__(self, other: Real | float) -> Boolean:
+    def __ge__(self, other: Self | float) -> ConditionT:
         return self._compare(Operation.GREATER_EQUAL, other)
 
-    def __eq__(self, other: Real | float) -> Boolean:  # type: ignore[override]  # as in NumPy: element by element
+    def __eq__(self, other: Self | float) -> ConditionT:  # type: ignore[override]  # as in NumPy: element by element
         return self._compare(Operation.EQUAL, other)
 
-    def __ne__(self, other: Real | float) -> Boolean:  # type: ignore[override]
+    def __ne__(self, other: Self | float) -> ConditionT:  # type: ignore[override]
         return self._compare(Operation.NOT_EQUAL, other)
 
     __hash__ = object.__hash__
 
     @property
-    def ordered(self) -> Boolean:
+    def ordered(self) -> ConditionT:
         """Whether it is not NaN."""
         return self._compare(Operation.ORDERED, self)
 
     @property
-    def finite(self) -> Boolean:
+    def finite(self) -> ConditionT:
         """Whether it is neither infinite nor NaN: ``0 a`` is zero."""
         return self * 0.0 == 0.0
+
+    def compute(self, operation: Operation, *operands: Self | float) -> Self:
+        """An operation on numbers of this kind."""
+        return type(self)(self.writer, self.writer.compute(self.kind, operation, *map(self.place, operands)))
+
+    @classmethod
+    def constant(cls, writer: Writer, value: float) -> Self:
+        """A constant, for where a Python number does not do."""
+        return cls(writer, Constant(cls.kind, float(value)))
+
+    @classmethod
+    def place(cls, value: Self | float) -> Operand:
+        """The operand of a number; a Python number is a constant."""
+        return value.operand if isinstance(value, cls) else Constant(cls.kind, float(cast("float", value)))
+
+    def _compare(self, operation: Operation, other: Self | float) -> ConditionT:
+        found = self.writer.compute(self.condition.kind, operation, self.operand, self.place(other))
+        return cast("ConditionT", self.condition(self.writer, found))
+
+
+NumberT = TypeVar("NumberT", bound=Number[Any])
+
+
+class Real(Number[Boolean]):
+    """A double."""
+
+    __slots__ = ()
+    kind, condition = Kind.REAL, Boolean
 
     def to_integer(self) -> Integer:
         """Cut to an integer, which must be within 64 bits."""
@@ -162,14 +210,6 @@ class Real(Value):
     def bits(self) -> Integer:
         """The bits as an integer: one more is the next double, away from zero."""
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.BITS, self.operand))
-
-    def _real(self, operation: Operation, *operands: Real | float) -> Real:
-        places = [real_operand(operand) for operand in operands]
-        return Real(self.writer, self.writer.compute(Kind.REAL, operation, *places))
-
-    def _compare(self, operation: Operation, other: Real | float) -> Boolean:
-        found = self.writer.compute(Kind.BOOLEAN, operation, self.operand, real_operand(other))
-        return Boolean(self.writer, found)
 
 
 class Integer(Value):
@@ -266,23 +306,31 @@ class Array(Value):
         return self.writer.locate(self.operand, place, self.element)
 
 
-class Reals(Array):
-    """Doubles in memory; ``v[i]`` reads one, ``v[i] = x`` writes one. No bounds are checked."""
+class NumberArray(Array, Generic[NumberT]):
+    """Numbers in memory; ``v[i]`` reads one, ``v[i] = x`` writes one. No bounds are checked."""
 
     __slots__ = ()
-    element = Kind.REAL
+    number: ClassVar[type[Number[Any]]]
 
-    def __getitem__(self, index: Integer | int) -> Real:
-        return Real(self.writer, self.writer.load(self.address(index), Kind.REAL))
+    def __getitem__(self, index: Integer | int) -> NumberT:
+        found = self.writer.load(self.address(index), self.element)
+        return cast("NumberT", self.number(self.writer, found))
 
-    def __setitem__(self, index: Integer | int, value: Real | float) -> None:
-        self.writer.store(real_operand(value), self.address(index))
+    def __setitem__(self, index: Integer | int, value: NumberT | float) -> None:
+        self.writer.store(self.number.place(value), self.address(index))
 
-    def after(self, index: Integer | int) -> Reals:
-        """The doubles from an element on."""
+    def after(self, index: Integer | int) -> Self:
+        """The numbers from an element on."""
         if isinstance(index, int):
-            return Reals(self.writer, self.operand, self.first + index)
-        return Reals(self.writer, self.address(index))
+            return type(self)(self.writer, self.operand, self.first + index)
+        return type(self)(self.writer, self.address(index))
+
+
+class Reals(NumberArray[Real]):
+    """Doubles in memory."""
+
+    __slots__ = ()
+    element, number = Kind.REAL, Real
 
     @property
     def integers(self) -> Integers:
@@ -319,19 +367,30 @@ class Variable:
         self.local = local
 
 
-class RealVariable(Variable):
+class NumberVariable(Variable, Generic[NumberT]):
+    """A variable double, or one in each lane."""
+
+    __slots__ = ("number",)
+
+    def __init__(self, initial: NumberT) -> None:
+        super().__init__(initial.writer, Local(initial.kind))
+        self.number = type(initial)
+        self.value = initial
+
+    @property
+    def value(self) -> NumberT:
+        """The value that was written last."""
+        return self.number(self.writer, self.writer.load(self.local, self.number.kind))
+
+    @value.setter
+    def value(self, value: NumberT | float) -> None:
+        self.writer.store(self.number.place(value), self.local)
+
+
+class RealVariable(NumberVariable[Real]):
     """A variable double."""
 
     __slots__ = ()
-
-    @property
-    def value(self) -> Real:
-        """The value that was written last."""
-        return Real(self.writer, self.writer.load(self.local, Kind.REAL))
-
-    @value.setter
-    def value(self, value: Real | float) -> None:
-        self.writer.store(real_operand(value), self.local)
 
     @property
     def memory(self) -> Reals:
@@ -371,7 +430,7 @@ class BooleanVariable(Variable):
 
 def real_operand(value: Real | float) -> Operand:
     """The operand of a double; a Python number is a constant."""
-    return value.operand if isinstance(value, Real) else Constant(Kind.REAL, float(value))
+    return Real.place(value)
 
 
 def integer_operand(value: Integer | int) -> Operand:

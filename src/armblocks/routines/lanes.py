@@ -1,0 +1,36 @@
+"""Values in lanes: the same operation on several doubles at a time, in one vector register.
+
+The number of lanes is that of the program; with one lane they are single doubles. Integers, conditions and so
+the control flow are common to all lanes. What is to differ between them is chosen by :class:`Mask`.
+"""
+
+from __future__ import annotations
+
+from armblocks.routines.tree import Kind, Operation
+from armblocks.routines.values import Boolean, Condition, Number, NumberArray
+
+
+class Mask(Condition):
+    """A condition in each lane."""
+
+    __slots__ = ()
+    kind = Kind.MASK
+
+    @property
+    def any(self) -> Boolean:
+        """Whether it holds in any lane."""
+        return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, Operation.ANY, self.operand))
+
+
+class Lanes(Number[Mask]):
+    """A double in each lane. A Python number is the same in all of them."""
+
+    __slots__ = ()
+    kind, condition = Kind.LANES, Mask
+
+
+class LaneArray(NumberArray[Lanes]):
+    """Rows of one double for each lane, aligned to the size of a row; ``v[i]`` is a row."""
+
+    __slots__ = ()
+    element, number = Kind.LANES, Lanes
