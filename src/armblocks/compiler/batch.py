@@ -241,7 +241,7 @@ def _inputs(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Inputs:
     def block(register: int) -> str | None:
         slot, place = tape.input_place(register)
         kind, size = layout.inputs[slot], tape.input_sizes[slot]
-        if body.lanes > 1 or kind is Layout.COLUMNS:
+        if kind is Layout.COLUMNS or (kind is Layout.ROWS and body.lanes > 1):
             return None
         begin = "0" if kind is Layout.SHARED else _row(body, sample, size)
         there = body.let(f"add nsw i64 {begin}, {place}")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import casadi
 from casadi import SX, Function
 
+from armblocks.compiler.matrix_products import with_matrix_products
 from armblocks.compiler.opcodes import Opcode
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_builder import TapeBuilder
@@ -66,7 +67,7 @@ _NAMES: dict[int, str] = {
     for name, number in vars(casadi).items()
     if name.startswith("OP_") and isinstance(number, int)
 }
-_OPCODES = {number: _SAME[name] for number, name in _NAMES.items() if name in _SAME}
+_OPCODES = {number: (_SAME[name], _SAME[name].arity) for number, name in _NAMES.items() if name in _SAME}
 
 
 def tape_from(traced: TracedFunction) -> Tape:
@@ -82,7 +83,7 @@ def tape_from(traced: TracedFunction) -> Tape:
     for slot, entries in enumerate(_inlined(builder, function, inputs, traced.name)):
         for place, handle in zip(places[slot], entries):
             outputs[slot][place] = handle
-    return builder.build(outputs)
+    return with_matrix_products(builder.build(outputs))
 
 
 def _inlined(
@@ -94,21 +95,29 @@ def _inlined(
     called: SX | None = None
     for k in range(function.n_instructions()):
         number = function.instruction_id(k)
-        if number == casadi.OP_OUTPUT:
-            slot, place = function.instruction_output(k)
-            outputs[slot][place] = work[function.instruction_input(k)[0]]
+        targets, sources = function.instruction_output(k), function.instruction_input(k)
+        same = _OPCODES.get(number)
+        if same is not None:
+            opcode, arity = same
+            operands = [work[source] for source in sources[:arity]]
+            work[targets[0]] = builder.add(opcode, *operands)
+        elif number == casadi.OP_OUTPUT:
+            slot, place = targets
+            outputs[slot][place] = work[sources[0]]
         elif number == casadi.OP_INPUT:
-            slot, place = function.instruction_input(k)
-            work[function.instruction_output(k)[0]] = inputs[slot][place]
+            slot, place = sources
+            work[targets[0]] = inputs[slot][place]
+        elif number == casadi.OP_CONST:
+            work[targets[0]] = builder.constant(function.instruction_constant(k))
         elif number == casadi.OP_CALL:
             called = function.instructions_sx() if called is None else called
-            arguments = [work[source] for source in function.instruction_input(k)]
+            arguments = [work[source] for source in sources]
             results = _call(builder, called[k].which_function(), arguments, name)
-            for target, handle in zip(function.instruction_output(k), results):
+            for target, handle in zip(targets, results):
                 if target >= 0:
                     work[target] = handle
         else:
-            work[function.instruction_output(k)[0]] = _translate(builder, function, k, work, name)
+            work[targets[0]] = _translate(builder, number, [work[source] for source in sources], name)
     return outputs
 
 
@@ -133,14 +142,8 @@ def _call(builder: TapeBuilder, function: Function, arguments: Sequence[int], na
     return [handle for entries in _inlined(builder, rule, inputs, name) for handle in entries]
 
 
-def _translate(builder: TapeBuilder, function: Function, k: int, work: list[int], name: str) -> int:
-    number = function.instruction_id(k)
-    if number == casadi.OP_CONST:
-        return builder.constant(function.instruction_constant(k))
-    operands = [work[source] for source in function.instruction_input(k)]
-    opcode = _OPCODES.get(number)
-    if opcode is not None:
-        return builder.add(opcode, *operands[: opcode.arity])
+def _translate(builder: TapeBuilder, number: int, operands: Sequence[int], name: str) -> int:
+    """An operation of CasADi that is no single one of a tape."""
     if number == casadi.OP_SQ:
         return builder.add(Opcode.MULTIPLY, operands[0], operands[0])
     if number == casadi.OP_TWICE:

@@ -52,6 +52,9 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
                 values = [registers[operand] for operand in operands]
                 registers.append(_solve(values, solution_length(len(operands)), fused=fused))
                 continue
+            if opcode is Opcode.PRODUCT:
+                registers.append(_product(registers, tape, operands, fused=fused))
+                continue
             if opcode is Opcode.MEMBER:
                 vector, place = operands
                 registers.append(registers[vector][..., int(tape.constants[place - tape.first_constant])])
@@ -72,6 +75,17 @@ def _read(registers: Sequence[Values], tape: Tape, first: int, count: int, index
         chosen = places == place
         found[chosen] = registers[first + int(place)][chosen]
     return found
+
+
+def _product(registers: Sequence[Values], tape: Tape, operands: Sequence[int], *, fused: bool) -> Values:
+    """The sums (…, m) of a matrix (m, n) times a vector, term by term."""
+    m, n = (int(tape.constants[size - tape.first_constant]) for size in operands[1:3])
+    matrix = np.stack(registers[operands[0] : operands[0] + m * n], axis=-1)
+    sums = np.stack([registers[start] for start in operands[3 + n :]], axis=-1)
+    for j, x in enumerate(operands[3 : 3 + n]):
+        values = [matrix[..., j::n], np.broadcast_to(registers[x][..., None], sums.shape), sums]
+        sums = evaluate(Opcode.FMA, values, fused=fused)
+    return sums
 
 
 def _solve(values: Sequence[Values], n: int, *, fused: bool) -> Values:

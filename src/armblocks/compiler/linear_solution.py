@@ -49,7 +49,7 @@ def emit_linear_solution(
         return body.let(f"getelementptr inbounds {body.real}, ptr {memory}, i64 {index}")
 
     for index, length in _blocks(tape, operands):
-        source = address(operands[index]) if length >= SHORTEST_BLOCK else None
+        source = address(operands[index]) if body.lanes == 1 and length >= SHORTEST_BLOCK else None
         if source is not None:
             module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
             ends = f"ptr align 8 {place(index)}, ptr align 8 {source}"

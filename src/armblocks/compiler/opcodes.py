@@ -15,6 +15,10 @@ Every operation works on IEEE 754 doubles and rounds to nearest. Where the sourc
   from input ``x`` on, all of one slot; ``n`` is a constant.
 * ``SOLVE a11 a12 … ann b1 … bn`` solves n linear equations (:mod:`armblocks.compiler.linear_solution`). Its
   value is n numbers, of which ``MEMBER s k`` is number k, a constant from 0; nothing else may read it.
+* ``PRODUCT a m n x1 … xn c1 … cm`` adds a matrix times a vector: number i of its value, for ``MEMBER``, is
+  ``((ci + ai1 x1) + ai2 x2) + … + ain xn``, each term by ``FMA``. The matrix is the ``m n`` scalars from
+  input ``a`` on, row by row, all of one slot; ``m`` and ``n`` are constants
+  (:mod:`armblocks.compiler.matrix_products`).
 * ``POWER`` follows C99: ``x**0`` and ``1**y`` are 1 even with NaN.
 """
 
@@ -76,6 +80,7 @@ class Opcode(IntEnum):
     READ = auto()
     SOLVE = auto()
     MEMBER = auto()
+    PRODUCT = auto()
 
     @property
     def arity(self) -> int:
@@ -83,7 +88,7 @@ class Opcode(IntEnum):
         return _ARITY.get(self, 1)
 
 
-VECTORS = frozenset({Opcode.SOLVE})
+VECTORS = frozenset({Opcode.SOLVE, Opcode.PRODUCT})
 """Operations of any count of operands whose value is several numbers."""
 
 COMMUTATIVE = frozenset(
@@ -109,7 +114,7 @@ def solution_length(operands: int) -> int:
 
 
 _ARITY = {
-    Opcode.SOLVE: 0,
+    **dict.fromkeys(VECTORS, 0),
     **dict.fromkeys((Opcode.FMA, Opcode.FMS, Opcode.FNMA, Opcode.SELECT, Opcode.READ), 3),
     **dict.fromkeys(
         (

@@ -7,6 +7,7 @@ register ``size of inputs + count of constants + k``.
 
 from __future__ import annotations
 
+import math
 import struct
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -140,7 +141,7 @@ class Tape:
         named = {
             "multiplies": total(Opcode.MULTIPLY),
             "adds": total(Opcode.ADD, Opcode.SUBTRACT),
-            "fused_multiply_adds": total(Opcode.FMA, Opcode.FMS, Opcode.FNMA),
+            "fused_multiply_adds": total(Opcode.FMA, Opcode.FMS, Opcode.FNMA) + self._products_in_matrices,
             "divisions": total(Opcode.DIVIDE),
             "square_roots": total(Opcode.SQUARE_ROOT),
             "comparisons": total(*COMPARISONS),
@@ -148,8 +149,16 @@ class Tape:
         functions = tuple(
             (opcode.name.lower(), tally[opcode]) for opcode in sorted(ELEMENTARY) if opcode in tally
         )
-        rest = len(self.operations) - sum(named.values()) - sum(count for _, count in functions)
+        counted = total(Opcode.PRODUCT) + sum(count for _, count in functions)
+        rest = len(self.operations) + self._products_in_matrices - sum(named.values()) - counted
         return OperationCount(**named, others=rest, functions=functions)
+
+    @property
+    def _products_in_matrices(self) -> int:
+        """Multiply-adds of all matrices times vectors."""
+        products = (operands for opcode, operands in self.operations if opcode is Opcode.PRODUCT)
+        sizes = (operands[1:3] for operands in products)
+        return sum(math.prod(int(self.constants[r - self.first_constant]) for r in pair) for pair in sizes)
 
     def __str__(self) -> str:
         lines = [f"inputs {self.input_sizes}"]

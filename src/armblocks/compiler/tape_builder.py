@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from armblocks.compiler.opcodes import COMMUTATIVE, ELEMENTARY, VECTORS, Opcode
 from armblocks.compiler.tape import Operation, Tape
 
 _Node = tuple[Opcode, tuple[int, ...]]
+_NOT_FOLDED = ELEMENTARY | VECTORS
 
 
 class TapeBuilder:
@@ -31,6 +32,15 @@ class TapeBuilder:
         # None for an input, float for a constant, else the operation.
         self._nodes: list[_Node | float | None] = [None] * self._starts[-1]
         self._known: dict[_Node | bytes, int] = {}
+        self._rules: dict[Opcode, Callable[..., int | None]] = {
+            Opcode.ADD: self._simplify_add,
+            Opcode.SUBTRACT: self._simplify_subtract,
+            Opcode.MULTIPLY: self._simplify_multiply,
+            Opcode.DIVIDE: self._simplify_divide,
+            Opcode.NEGATE: self._simplify_negate,
+            Opcode.SELECT: self._simplify_select,
+            Opcode.ABSOLUTE: self._simplify_absolute,
+        }
 
     def input(self, slot: int, place: int) -> int:
         """The scalar at ``place`` of the flat input ``slot``."""
@@ -49,28 +59,17 @@ class TapeBuilder:
 
     def add(self, opcode: Opcode, *operands: int) -> int:
         """``opcode`` of the operands, simplified where that changes no bit."""
-        values = [self._nodes[operand] for operand in operands]
-        if opcode not in ELEMENTARY | VECTORS and all(isinstance(value, float) for value in values):
-            return self.constant(_fold(opcode, [value for value in values if isinstance(value, float)]))
-        simpler = self._simplify(opcode, operands)
+        nodes = self._nodes
+        values = [node for operand in operands if isinstance(node := nodes[operand], float)]
+        if len(values) == len(operands) and opcode not in _NOT_FOLDED:
+            return self.constant(_fold(opcode, values))
+        rule = self._rules.get(opcode)
+        simpler = rule(*operands) if rule else None
         if simpler is not None:
             return simpler
         if opcode in COMMUTATIVE and operands[0] > operands[1]:
             operands = (operands[1], operands[0])
         return self._number((opcode, operands), (opcode, operands))
-
-    def _simplify(self, opcode: Opcode, operands: tuple[int, ...]) -> int | None:
-        rules = {
-            Opcode.ADD: self._simplify_add,
-            Opcode.SUBTRACT: self._simplify_subtract,
-            Opcode.MULTIPLY: self._simplify_multiply,
-            Opcode.DIVIDE: self._simplify_divide,
-            Opcode.NEGATE: self._simplify_negate,
-            Opcode.SELECT: self._simplify_select,
-            Opcode.ABSOLUTE: self._simplify_absolute,
-        }
-        rule = rules.get(opcode)
-        return rule(*operands) if rule else None
 
     def operands_of(self, handle: int, opcode: Opcode) -> tuple[int, ...] | None:
         """The operands of a value, if ``opcode`` gives it."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body
 from armblocks.compiler.linear_solution import emit_linear_solution
+from armblocks.compiler.matrix_products import emit_matrix_product
 from armblocks.compiler.opcodes import COMPARISONS, Opcode
 from armblocks.compiler.tape import Tape
 
@@ -16,7 +17,7 @@ LoadEntry = Callable[[int, str], str]
 """Gives the value of the input register that lies so many (an integer in each lane) behind another."""
 BlockAddress = Callable[[int], "str | None"]
 """Gives the address from which an input register and those after it in its slot follow one another as plain
-doubles; ``None`` where they do not."""
+doubles, the same for all lanes; ``None`` where they do not."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,9 @@ def emit_operations(
             registers.set_number(target, inputs.load_entry(first, behind))
         elif opcode is Opcode.SOLVE:
             members = emit_linear_solution(body, tape, operands, registers.number, inputs.address)
+            registers.vectors[target] = members
+        elif opcode is Opcode.PRODUCT:
+            members = emit_matrix_product(body, tape, operands, registers.number, inputs.address)
             registers.vectors[target] = members
         elif opcode is Opcode.MEMBER:
             vector, place = operands

@@ -1,0 +1,265 @@
+"""Products of a matrix and a vector: found in a tape, and written as LLVM IR.
+
+A matrix that is an input, such as the parameter of a matrix gain, times a vector becomes a chain of
+multiply-adds for each row. The text of 500 by 500 entries is half a million instructions, for which LLVM
+takes many minutes. :func:`with_matrix_products` finds the chains and puts one ``PRODUCT`` in their place. It
+multiplies and adds in the same order, so the bits are the same.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from armblocks.compiler.ir_text import Body
+from armblocks.compiler.opcodes import Opcode
+from armblocks.compiler.program_text import add_program
+from armblocks.compiler.tape import Operation, Tape
+from armblocks.routines.arithmetic import fma
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Integer, Reals
+
+SHORTEST_ROW = 8
+"""Fewer products of a row stay as they are."""
+FEWEST_ENTRIES = 256
+"""Smaller matrices stay as they are: LLVM keeps their vectors in registers."""
+MOST_ROWS = 256
+"""Rows of one ``PRODUCT``: its results are read and stored by one function, which should not be long."""
+ROWS_AT_ONCE = 8
+"""Sums that are under way at the same time: a multiply-add takes 4 cycles, and two can begin in each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Row:
+    """``c + a1 x1 + … + an xn`` as the operations ``members`` of a tape, with ``a1`` in register ``first``.
+
+    ``start`` is the register of ``c``; ``None`` where there is none.
+    """
+
+    first: int
+    vector: tuple[int, ...]
+    start: int | None
+    members: tuple[int, ...]
+
+    @property
+    def last(self) -> int:
+        """The operation that gives the result."""
+        return self.members[-1]
+
+
+def with_matrix_products(tape: Tape) -> Tape:
+    """The tape with each large product of an input matrix, row by row, and a vector as one operation."""
+    choices = [rows for chain in _chains(tape) for rows in _rows(tape, chain)]
+    # Where both factors follow one another in memory, the vector is the one that several rows have.
+    shared = Counter(row.vector for rows in choices for row in rows)
+    chosen = [max(rows, key=lambda row: shared[row.vector]) for rows in choices]
+    products = [group for group in _matrices(tape, chosen) if _entries(group) >= FEWEST_ENTRIES]
+    return _rewritten(tape, products) if products else tape
+
+
+def _entries(rows: Sequence[_Row]) -> int:
+    return sum(len(row.vector) for row in rows)
+
+
+def _chains(tape: Tape) -> Iterator[list[int]]:
+    """Operations that each add a product to the sum of the one before, which nothing else reads."""
+    first = tape.first_operation
+    uses = [0] * tape.size
+    for _, operands in tape.operations:
+        for register in operands:
+            uses[register] += 1
+    for slot in tape.outputs:
+        for register in slot:
+            uses[register] += 1
+    following: dict[int, int] = {}
+    for k, (opcode, operands) in enumerate(tape.operations):
+        if opcode is Opcode.FMA:
+            a, b, c = operands
+            inner = tape.operations[c - first].opcode if c >= first else None
+            if inner in (Opcode.FMA, Opcode.MULTIPLY) and uses[c] == 1 and c not in (a, b):
+                following[c - first] = k
+    begun = set(following) - set(following.values())
+    for k in sorted(begun):
+        chain = [k]
+        while (after := following.get(chain[-1])) is not None:
+            chain.append(after)
+        if len(chain) >= SHORTEST_ROW:
+            yield chain
+
+
+def _rows(tape: Tape, chain: Sequence[int]) -> Iterator[list[_Row]]:
+    """The parts of a chain whose factors on one side are inputs that follow one another.
+
+    Each as one row, or as two where the factors of both sides do.
+    """
+    place = 0
+    while place < len(chain):
+        runs = [_run(tape, chain, place, side) for side in (0, 1)]
+        length = max(map(len, runs))
+        if length >= SHORTEST_ROW:
+            opcode, operands = tape.operations[chain[place]]
+            yield [
+                _Row(
+                    first=run[0][0],
+                    vector=tuple(x for _, x in run),
+                    start=operands[2] if opcode is Opcode.FMA else None,
+                    members=tuple(chain[place : place + length]),
+                )
+                for run in runs
+                if len(run) == length
+            ]
+        place += max(1, length)
+
+
+def _run(tape: Tape, chain: Sequence[int], place: int, side: int) -> list[tuple[int, int]]:
+    """Pairs of a matrix entry and its factor, from the entry at one side of the operation at ``place`` on."""
+    entry = tape.operations[chain[place]].operands[side]
+    if entry >= tape.first_constant:
+        return []
+    slot = tape.input_place(entry)[0]
+    end = tape.input_starts[slot + 1]
+    run: list[tuple[int, int]] = []
+    for k in chain[place:]:
+        a, b = tape.operations[k].operands[:2]
+        if entry == end or entry not in (a, b):
+            break
+        run.append((entry, b if a == entry else a))
+        entry += 1
+    return run
+
+
+def _matrices(tape: Tape, rows: Sequence[_Row]) -> Iterator[list[_Row]]:
+    """Rows of one vector that follow one another in memory, and whose results do not depend on each other."""
+    by_vector: dict[tuple[int, ...], list[_Row]] = {}
+    for row in rows:
+        by_vector.setdefault(row.vector, []).append(row)
+    for vector, found in by_vector.items():
+        matrix: list[_Row] = []
+        for row in sorted(found, key=lambda row: row.first):
+            together = [*matrix, row]
+            ready = tape.first_operation + min(row.last for row in together)
+            fits = not matrix or (
+                row.first == matrix[-1].first + len(vector)
+                and tape.input_place(row.first)[0] == tape.input_place(matrix[0].first)[0]
+                and len(matrix) < MOST_ROWS
+                and all(row.start is None or row.start < ready for row in together)
+            )
+            if not fits:
+                yield matrix
+            matrix = together if fits else [row]
+        yield matrix
+
+
+def _rewritten(tape: Tape, products: Sequence[Sequence[_Row]]) -> Tape:
+    """The tape with a ``PRODUCT`` for each group of rows, where the first of them is ready."""
+    constants = list(tape.constants)
+    known: dict[str, int] = {}
+
+    def constant(value: float) -> int:
+        text = value.hex()
+        if text not in known:
+            known[text] = tape.first_constant + len(constants)
+            constants.append(value)
+        return known[text]
+
+    heads: dict[int, tuple[Sequence[_Row], list[int]]] = {}
+    gone: set[int] = set()
+    for rows in products:
+        sizes = [constant(float(len(rows))), constant(float(len(rows[0].vector)))]
+        heads[min(row.last for row in rows)] = rows, sizes
+        gone.update(member for row in rows for member in row.members)
+    places = [constant(float(k)) for k in range(max(len(rows) for rows in products))]
+    none = constant(-0.0)  # a b + -0 has the bits of a b
+    register = list(range(tape.first_operation)) + [-1] * len(tape.operations)
+    operations: list[Operation] = []
+    first = tape.first_constant + len(constants)
+    for k, (opcode, operands) in enumerate(tape.operations):
+        if k in heads:
+            rows, sizes = heads[k]
+            starts = [none if row.start is None else register[row.start] for row in rows]
+            vector = [register[x] for x in rows[0].vector]
+            product = first + len(operations)
+            operations.append(Operation(Opcode.PRODUCT, (rows[0].first, *sizes, *vector, *starts)))
+            for place, row in enumerate(rows):
+                register[tape.first_operation + row.last] = first + len(operations)
+                operations.append(Operation(Opcode.MEMBER, (product, places[place])))
+        if k not in gone:
+            register[tape.first_operation + k] = first + len(operations)
+            operations.append(Operation(opcode, tuple(register[operand] for operand in operands)))
+    outputs = tuple(tuple(register[member] for member in slot) for slot in tape.outputs)
+    return replace(tape, constants=tuple(constants), operations=tuple(operations), outputs=outputs)
+
+
+def emit_matrix_product(
+    body: Body,
+    tape: Tape,
+    operands: Sequence[int],
+    number: Callable[[int], str],
+    address: Callable[[int], str | None],
+) -> list[str]:
+    """The values of the members of a ``PRODUCT``.
+
+    ``number(register)`` gives a register's value, ``address`` where an input lies with those after it.
+    """
+    first = operands[0]
+    m, n = product_shape(tape, operands)
+    vector, starts = operands[3 : 3 + n], operands[3 + n :]
+    matrix = address(first)
+    if matrix is None:  # a matrix of which every sample of a batch has its own
+        sums = [number(register) for register in starts]
+        for j, x in enumerate(vector):
+            for i in range(m):
+                sums[i] = body.fma(number(first + i * n + j), number(x), sums[i])
+        return sums
+    module, align = body.module, 8 * body.lanes
+    program = Program()
+    symbol = program.define(matrix_product, inlined=False).symbol
+    add_program(module, program)
+    module.declare("ptr", "llvm.stacksave.p0")
+    module.declare("void", "llvm.stackrestore.p0", "ptr")
+    stack = body.let("call ptr @llvm.stacksave.p0()")
+    memory = body.let(f"alloca {body.real}, i64 {m + n}, align {align}")
+
+    def place(index: int) -> str:
+        return body.let(f"getelementptr inbounds {body.real}, ptr {memory}, i64 {index}")
+
+    for k, register in enumerate([*starts, *vector]):
+        body.do(f"store {body.real} {number(register)}, ptr {place(k)}, align {align}")
+    sizes = f"i64 {m}, i64 {n}, i64 {body.lanes}"
+    body.do(f"call void @{symbol}(ptr {matrix}, ptr {place(m)}, ptr {memory}, {sizes})")
+    sums = [body.let(f"load {body.real}, ptr {place(i)}, align {align}") for i in range(m)]
+    body.do(f"call void @llvm.stackrestore.p0(ptr {stack})")
+    return sums
+
+
+def product_shape(tape: Tape, operands: Sequence[int]) -> tuple[int, int]:
+    """Rows and columns of the matrix of a ``PRODUCT``."""
+    rows, columns = (int(tape.constants[register - tape.first_constant]) for register in operands[1:3])
+    return rows, columns
+
+
+def matrix_product(r: Routine, A: Reals, x: Reals, y: Reals, m: Integer, n: Integer, lanes: Integer) -> None:
+    """``y += A x`` for ``A`` (m, n), row by row in memory; each sum from the left.
+
+    Every lane has its own ``x`` and ``y``: an element's numbers stand side by side, one for each lane.
+    """
+    row = r.integer(0)
+
+    def add_rows(count: int) -> None:
+        start = row.value
+        lines = [A.after((start + k) * n) for k in range(count)]
+        for lane in r.range(0, lanes):
+            sums = [r.real(y[(start + k) * lanes + lane]) for k in range(count)]
+            for j in r.range(0, n):
+                factor = x[j * lanes + lane]
+                for line, total in zip(lines, sums):
+                    total.value = fma(line[j], factor, total.value)
+            for k, total in enumerate(sums):
+                y[(start + k) * lanes + lane] = total.value
+        row.value = start + count
+
+    for count in (ROWS_AT_ONCE, 1):
+        with r.loop() as turn:
+            turn.leave_when(row.value + count > m)
+            add_rows(count)

@@ -1,0 +1,103 @@
+"""Matrices times vectors on the tape: found where they stand, with the bits of the sums as written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from casadi import SX, mtimes, sin, sum1, vertcat
+
+from armblocks.compiler import compile_function
+from armblocks.compiler.interpret import interpret, multiply_add
+from armblocks.compiler.matrix_products import FEWEST_ENTRIES, MOST_ROWS
+from armblocks.compiler.opcodes import Opcode
+from armblocks.compiler.tape import Tape
+from armblocks.equations import Signature, Slot, TracedFunction
+
+SHAPES = ((16, 16), (33, 8), (7, 50), (2, 128))
+
+
+def traced(m: int, n: int) -> TracedFunction:
+    """Products by inputs and by signals, with terms before and behind; numbers stand around the matrix."""
+    inputs = Signature((Slot("x", (n,)), Slot("p", (m * n + 3,)), Slot("c", (m,))))
+    outputs = Signature(tuple(Slot(name, (m,)) for name in ("plain", "added", "bent", "twice")))
+
+    def equations(x: SX, p: SX, c: SX) -> list[SX]:
+        A = p[2 : 2 + m * n].reshape((n, m)).T
+        plain = mtimes(A, x)
+        added = c
+        for j in range(n):
+            added = added + A[:, j] * x[n - 1 - j]
+        bent = mtimes(A, sin(x)) + p[0] * c
+        twice = mtimes(A, vertcat(*[sum1(plain)] * n))
+        return [plain, added, bent, twice]
+
+    return TracedFunction.trace("products", inputs, outputs, equations)
+
+
+def chained(A: np.ndarray, x: np.ndarray, start: np.ndarray | None) -> np.ndarray:
+    """``start + A x`` term by term; without a start the first product is rounded alone, as -0 leaves it."""
+    total = np.full(len(A), -0.0) if start is None else start
+    for j, factor in enumerate(x):
+        total = multiply_add(A[:, j].copy(), np.full(len(A), factor), total)
+    return total
+
+
+@pytest.mark.parametrize(("m", "n"), SHAPES)
+def test_a_product_has_the_bits_of_its_terms_one_after_the_other(m: int, n: int) -> None:
+    random = np.random.default_rng(m + n)
+    kernel = compile_function(traced(m, n))
+    found = [operation.opcode for operation in kernel.tape.operations].count(Opcode.PRODUCT)
+    assert found >= 4
+    assert Tape.from_bytes(kernel.tape.to_bytes()) == kernel.tape
+    samples = 19
+    x, c = random.normal(size=(samples, n)), random.normal(size=(samples, m))
+    p = random.normal(size=m * n + 3)
+    p[random.random(p.size) < 0.2] = -0.0
+    x[random.random(x.shape) < 0.2] = 0.0
+    plain, added, bent, twice = kernel(x, p, c)
+    A = p[2 : 2 + m * n].reshape(m, n)
+    for k in range(samples):
+        np.testing.assert_array_equal(plain[k], chained(A, x[k], None))
+        np.testing.assert_array_equal(np.signbit(plain[k]), np.signbit(chained(A, x[k], None)))
+        np.testing.assert_array_equal(added[k], chained(A, x[k, ::-1], c[k]))
+    np.testing.assert_allclose(bent, np.sin(x) @ A.T + p[0] * c, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(twice, np.outer(plain.sum(axis=1), A.sum(axis=1)), rtol=1e-9, atol=1e-9)
+    every = (plain, added, bent, twice)
+    single = [np.array(results) for results in zip(*(kernel(x[k], p, c[k]) for k in range(samples)))]
+    others = [single]
+    if m == n:  # a matrix of each sample's own, which is written out and takes long to compile
+        others += [kernel(x, np.tile(p, (samples, 1)), c), [part.T for part in kernel.columns(x, p, c)]]
+    for other in others:
+        for results, known in zip(other, every):
+            np.testing.assert_array_equal(results, known)
+    read = interpret(kernel.tape, [x, p, c])
+    np.testing.assert_array_equal(read[0], plain)
+    np.testing.assert_array_equal(read[1], added)
+
+
+def test_small_matrices_stay_as_they_are() -> None:
+    n = 15
+    assert n * n < FEWEST_ENTRIES
+    ends = Signature((Slot("A", (n, n)), Slot("x", (n,)))), Signature((Slot("y", (n,)),))
+    kernel = compile_function(TracedFunction.trace("small", *ends, lambda A, x: [mtimes(A, x)]))
+    opcodes = [operation.opcode for operation in kernel.tape.operations]
+    assert Opcode.PRODUCT not in opcodes
+    assert kernel.tape.count.fused_multiply_adds == n * (n - 1)
+
+
+def test_a_tall_matrix_is_multiplied_in_several_parts() -> None:
+    m, n = MOST_ROWS + 9, 30
+    ends = Signature((Slot("A", (m, n)), Slot("x", (n,)))), Signature((Slot("y", (m,)),))
+    kernel = compile_function(TracedFunction.trace("tall", *ends, lambda A, x: [mtimes(A, x)]))
+    random = np.random.default_rng(5)
+    A, x = random.normal(size=(m, n)), random.normal(size=n)
+    assert [operation.opcode for operation in kernel.tape.operations].count(Opcode.PRODUCT) == 2
+    np.testing.assert_array_equal(kernel(A, x), chained(A, x, None))
+
+
+def test_a_product_counts_as_its_multiply_adds_and_lines_of_a_matrix_are_one_operation() -> None:
+    m, n = 100, 120
+    ends = Signature((Slot("A", (m, n)), Slot("x", (n,)))), Signature((Slot("y", (m,)),))
+    tape = compile_function(TracedFunction.trace("large", *ends, lambda A, x: [mtimes(A, x)])).tape
+    assert len(tape.operations) == m + 1
+    assert tape.count.fused_multiply_adds == m * n
