@@ -278,6 +278,28 @@ def test_functions_that_stand_elsewhere_are_called_by_their_names() -> None:
     assert "call double @derivative(double %v" in definitions(program)["run"]
 
 
+def test_functions_of_any_number_of_arrays_take_shares_of_the_work() -> None:
+    """Sums of three elements a turn, by steps, until the shared count of ``job`` is used up."""
+
+    def run(r: Routine, job: Integers, out: Reals, x: Reals) -> Integer:
+        def add(r: Routine, start: Integer, *arrays: Reals) -> None:
+            out, given = arrays[0], arrays[1:]
+            for i in r.range(start, start + 5, 2):
+                for array in given:
+                    out[0] = out[0] + array[i]
+
+        summed = r.program.define(add, distinct=True, rest=("out", "a", "b"))
+        with r.loop() as turn:
+            start = job.fetch_add(0, 6)
+            turn.leave_unless(start < job.acquire(1))
+            r.call(summed, start, out, x, x.after(1))
+        return job.fetch_add(1, -1)
+
+    job, out, x = [0, 12], [0.0], [float(k * k) for k in range(13)]
+    assert both(run, job, out, x, result=int) == 12
+    assert (job, out) == ([18, 11], [sum(x[:12])])
+
+
 def test_null_addresses_and_repeated_declarations() -> None:
     @external
     def take(r: Routine, x: Reals) -> None: ...

@@ -138,6 +138,10 @@ class _Call:
             case tree.Load(result, address):
                 memory, place = self.value(address)
                 self.values[result] = memory[place]
+            case tree.FetchAdd(result, address, value):
+                memory, place = self.value(address)
+                self.values[result] = memory[place]
+                memory[place] = _wrapped(memory[place] + self.value(value))
             case tree.Store(value, address):
                 memory, place = self.value(address)
                 memory[place] = self.value(value)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from armblocks.compiler.ir_text import Body, Module
 from armblocks.compiler.lane_memory import load_rows, store_rows
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.pieces import emit_pieces, is_long
+from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
+from armblocks.routines.arithmetic import select
+from armblocks.routines.routine import Program, Routine, external
+from armblocks.routines.values import Boolean, Integer, Integers, Reals
 
 __all__ = ["BatchLayout", "Layout", "emit_batch", "emit_shares"]
 
@@ -22,42 +24,25 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     once. Samples that do not fill a register, and blocks with a sample that a vector function leaves
     undecided (the sine of a huge angle), are evaluated with one lane: the bits are the same.
     """
-    pointers = [f"%i{k}" for k in range(len(tape.input_sizes))] + [f"%o{k}" for k in range(len(tape.outputs))]
-    passed = ", ".join(["i64 %columns", *(f"ptr {pointer}" for pointer in pointers)])
-    declared = ", ".join(
-        ["i64 %columns"] + [f"ptr noalias {'readonly ' if p.startswith('%i') else ''}{p}" for p in pointers]
-    )
-    sample = _block(module, tape, layout, 1, f"{name}.sample", "%k", pointers)
-    module.add(
-        f"{name}.sample",
-        "\n".join(
-            [
-                f"define internal void @{name}.sample(i64 %k, {declared}) nounwind noinline {{",
-                "entry:",
-                *sample.room,
-                *sample.lines,
-                "  ret void\n}",
-            ]
-        ),
-    )
-    call = [f"  call void @{name}.sample(i64 %tail, {passed})"]
-    if lanes == 1:
-        lines = ["  br label %tail.enter", *_loop("tail", "%start", "%stop", 1, call)]
-    else:
-        block = _block(module, tape, layout, lanes, f"{name}.lanes", "%vector", pointers)
-        again = _retry(block, name, passed, lanes)
-        lines = [
-            *block.room,
-            "  %count = sub i64 %stop, %start",
-            f"  %odd = and i64 %count, {lanes - 1}",
-            "  %first = sub i64 %stop, %odd",
-            "  br label %vector.enter",
-            *_loop("vector", "%start", "%first", lanes, [*block.lines, *again]),
-            "  br label %tail.enter",
-            *_loop("tail", "%first", "%stop", 1, call),
-        ]
-    head = f"define void @{name}(i64 %start, i64 %stop, {declared}) nounwind {{\nentry:"
-    module.add(name, "\n".join([head, *lines, "  ret void\n}"]))
+    _add_block(module, tape, layout, 1, f"{name}.sample")
+    if lanes > 1:
+        _add_block(module, tape, layout, lanes, f"{name}.lanes")
+    sample, block = external(_sample, f"{name}.sample"), external(_lanes, f"{name}.lanes")
+
+    def batch(r: Routine, start: Integer, stop: Integer, columns: Integer, *arrays: Reals) -> None:
+        rest = start
+        if lanes > 1:
+            rest = stop - ((stop - start) & (lanes - 1))
+            for first in r.range(start, rest, lanes):
+                with r.when(r.call(block, first, columns, *arrays)):
+                    for k in r.range(first, first + lanes):
+                        r.call(sample, k, columns, *arrays)
+        for k in r.range(rest, stop):
+            r.call(sample, k, columns, *arrays)
+
+    program = Program()
+    program.define(batch, name, public=True, distinct=True, rest=_pointers(tape))
+    add_program(module, program)
 
 
 def emit_shares(module: Module, tape: Tape, name: str) -> None:
@@ -67,124 +52,94 @@ def emit_shares(module: Module, tape: Tape, name: str) -> None:
     samples of a share, the samples of the batch. Each takes shares until there are none. Then it spins:
     ``hold`` turns in any case, and up to ``patience`` turns while other threads are at work.
     """
-    pointers = [f"%i{k}" for k in range(len(tape.input_sizes))] + [f"%o{k}" for k in range(len(tape.outputs))]
-    passed = ", ".join(f"ptr {pointer}" for pointer in pointers)
-    call = f"  call void @{name}(i64 %start, i64 %stop, i64 %samples, {passed})"
-    lines = [
-        f"define void @{name}.shares(ptr %job, i64 %hold, i64 %patience, {passed}) nounwind {{",
-        "entry:",
-        "  %running = getelementptr inbounds i64, ptr %job, i64 1",
-        "  %share.at = getelementptr inbounds i64, ptr %job, i64 2",
-        "  %samples.at = getelementptr inbounds i64, ptr %job, i64 3",
-        "  %share = load i64, ptr %share.at",
-        "  %samples = load i64, ptr %samples.at",
-        "  %joined = atomicrmw add ptr %running, i64 1 acq_rel",
-        "  br label %take",
-        "take:",
-        "  %start = atomicrmw add ptr %job, i64 %share acq_rel",
-        "  %some = icmp slt i64 %start, %samples",
-        "  br i1 %some, label %work, label %leave",
-        "work:",
-        "  %end = add nsw i64 %start, %share",
-        "  %whole = icmp slt i64 %end, %samples",
-        "  %stop = select i1 %whole, i64 %end, i64 %samples",
-        call,
-        "  br label %take",
-        "leave:",
-        "  %left = atomicrmw sub ptr %running, i64 1 acq_rel",
-        "  br label %spin",
-        "spin:",
-        "  %turn = phi i64 [ 0, %leave ], [ %turn.next, %spin ]",
-        "  %turn.next = add nsw i64 %turn, 1",
-        "  %others = load atomic i64, ptr %running acquire, align 8",
-        "  %busy = icmp ne i64 %others, 0",
-        "  %patient = icmp slt i64 %turn, %patience",
-        "  %waiting = and i1 %busy, %patient",
-        "  %holding = icmp slt i64 %turn, %hold",
-        "  %stays = or i1 %holding, %waiting",
-        "  br i1 %stays, label %spin, label %done",
-        "done:",
-        "  ret void\n}",
-    ]
-    module.add(f"{name}.shares", "\n".join(lines))
+    following, at_work = 0, 1  # places in the job that the threads change
+
+    def batch(r: Routine, start: Integer, stop: Integer, columns: Integer, *arrays: Reals) -> None:
+        """What :func:`emit_batch` adds."""
+
+    evaluate = external(batch, name)
+
+    def shares(r: Routine, job: Integers, hold: Integer, patience: Integer, *arrays: Reals) -> None:
+        share, samples = job[2], job[3]
+        job.fetch_add(at_work, 1)
+        with r.loop() as taking:
+            start = job.fetch_add(following, share)
+            taking.leave_unless(start < samples)
+            end = start + share
+            r.call(evaluate, start, select(end < samples, end, samples), samples, *arrays)
+        job.fetch_add(at_work, -1)
+        turn = r.integer(0)
+        with r.loop() as spinning:
+            passed = turn.value
+            waits = (job.acquire(at_work) != 0) & (passed < patience)
+            spinning.leave_unless((passed < hold) | waits)
+            turn.value = passed + 1
+
+    program = Program()
+    program.define(shares, f"{name}.shares", public=True, rest=_pointers(tape))
+    add_program(module, program)
 
 
-def _loop(name: str, start: str, stop: str, step: int, body: list[str]) -> list[str]:
-    """Text of ``for (%name = start; %name < stop; %name += step)``, entered at the label ``name.enter``."""
-    return [
-        f"{name}.enter:",
-        f"  %{name}.any = icmp slt i64 {start}, {stop}",
-        f"  br i1 %{name}.any, label %{name}.head, label %{name}.done",
-        f"{name}.head:",
-        f"  %{name} = phi i64 [ {start}, %{name}.enter ], [ %{name}.next, %{name}.latch ]",
-        *body,
-        f"  br label %{name}.latch",
-        f"{name}.latch:",
-        f"  %{name}.next = add nsw i64 %{name}, {step}",
-        f"  %{name}.more = icmp slt i64 %{name}.next, {stop}",
-        f"  br i1 %{name}.more, label %{name}.head, label %{name}.done",
-        f"{name}.done:",
-    ]
+def _sample(r: Routine, sample: Integer, columns: Integer, *arrays: Reals) -> None:
+    """Evaluate one sample: what :func:`_add_block` adds for one lane."""
 
 
-def _retry(block: _Block, name: str, passed: str, lanes: int) -> list[str]:
-    """Text that evaluates the block's samples one by one if a function was undecided in any lane."""
-    if block.doubtful is None:
-        return []
-    lines = [
-        f"  %doubtful = icmp ne i{lanes} {block.doubtful}, 0",
-        "  br i1 %doubtful, label %retry.enter, label %retry.done",
-    ]
-    body = [
-        "  %retry.place = add i64 %vector, %retry",
-        f"  call void @{name}.sample(i64 %retry.place, {passed})",
-    ]
-    return lines + _loop("retry", "0", str(lanes), 1, body)
+def _lanes(r: Routine, first: Integer, columns: Integer, *arrays: Reals) -> Boolean:
+    """Evaluate as many samples as there are lanes; gives whether they must be evaluated one by one."""
+    raise NotImplementedError
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Block:
-    """Text that evaluates as many samples as lanes; ``doubtful``: the lanes to be done again, as bits."""
-
-    room: tuple[str, ...] = ()
-    lines: tuple[str, ...]
-    doubtful: str | None
+def _pointers(tape: Tape) -> list[str]:
+    return [f"i{k}" for k in range(len(tape.input_sizes))] + [f"o{k}" for k in range(len(tape.outputs))]
 
 
-def _block(
-    module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str, sample: str, pointers: list[str]
-) -> _Block:
-    """Load the samples from ``sample`` on, one per lane, evaluate the tape, store the outputs."""
+def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name: str) -> None:
+    """Add the function of :func:`_sample` or :func:`_lanes`: load the samples, one for each lane, evaluate
+    the tape, store the outputs."""
     groups = _groups(tape, layout, lanes)
     stores = {k: registers for k, (_, _, registers) in enumerate(groups)}
 
     def inputs_of(body: Body) -> Inputs:
-        return _inputs(body, tape, layout, sample)
+        return _inputs(body, tape, layout, "%sample")
 
     def store(body: Body, registers: Registers, k: int) -> None:
         slot, first, members = groups[k]
         columns = [registers.number(register) for register in members]
         if layout.outputs[slot] is Layout.COLUMNS:
-            address = _column(body, f"%o{slot}", first, sample)
+            address = _column(body, f"%o{slot}", first, "%sample")
             body.do(f"store {body.real} {columns[0]}, ptr {address}, align 8")
             return
         size = len(tape.outputs[slot])
-        base = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {_row(body, sample, size)}")
+        row = _row(body, "%sample", size)
+        base = body.let(f"getelementptr inbounds double, ptr %o{slot}, i64 {row}")
         store_rows(body, base, size, first, columns)
 
-    if is_long(tape):
-        declared = [("i64", sample), ("i64", "%columns")]
-        declared += [(f"ptr noalias{' readonly' if p.startswith('%i') else ''}", p) for p in pointers]
-        calls = emit_pieces(module, tape, name, lanes, declared, stores, inputs_of, store)
-        return _Block(room=(calls.room,), lines=calls.lines, doubtful=calls.doubtful)
+    declared = [("i64", "%sample"), ("i64", "%columns")]
+    declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in _pointers(tape)]
     body = Body(module, lanes)
-    registers = emit_operations(body, tape, inputs_of(body))
-    for k in stores:
-        store(body, registers, k)
-    doubtful = None
-    if body.undecided is not None:
-        doubtful = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
-    return _Block(lines=tuple(body.lines), doubtful=doubtful)
+    if is_long(tape):
+        calls = emit_pieces(module, tape, name, lanes, declared, stores, inputs_of, store)
+        body.lines += [calls.room, *calls.lines]
+        doubtful = calls.doubtful
+    else:
+        registers = emit_operations(body, tape, inputs_of(body))
+        for k in stores:
+            store(body, registers, k)
+        doubtful = None
+        if body.undecided is not None:
+            doubtful = body.let(f"bitcast {body.bit} {body.undecided} to i{lanes}")
+    if lanes == 1:
+        result, inlined = "void", "noinline"
+        body.do("ret void")
+    else:
+        # In the loop, what depends on shared inputs alone is worked out before the first turn. The loop's own
+        # parameters say already that arrays do not overlap; LLVM would note it at each load and store.
+        result, inlined = "i1", "alwaysinline"
+        declared = [(kind.split()[0], argument) for kind, argument in declared]
+        body.do(f"ret i1 {'false' if doubtful is None else body.let(f'icmp ne i{lanes} {doubtful}, 0')}")
+    arguments = ", ".join(f"{kind} {argument}" for kind, argument in declared)
+    head = f"define internal {result} @{name}({arguments}) nounwind {inlined} {{\nentry:\n"
+    module.add(name, head + "\n".join(body.lines) + "\n}")
 
 
 def _groups(tape: Tape, layout: BatchLayout, lanes: int) -> list[tuple[int, int, tuple[int, ...]]]:

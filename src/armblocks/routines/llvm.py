@@ -16,6 +16,7 @@ from armblocks.routines.tree import (
     Compute,
     Constant,
     Copy,
+    FetchAdd,
     Function,
     Jump,
     Kind,
@@ -265,8 +266,13 @@ class _FunctionText:
             case Locate(result, base, index, element):
                 text = f"getelementptr inbounds {self._type(element)}, ptr {self._operand(base)}"
                 self._new(result, f"{text}, i64 {self._operand(index)}")
-            case Load(result, address):
-                self._new(result, f"load {self._type(result.kind)}, ptr {self._operand(address)}")
+            case Load(result, address, acquiring):
+                kind = self._type(result.kind)
+                atomic, order = (" atomic", " acquire, align 8") if acquiring else ("", "")
+                self._new(result, f"load{atomic} {kind}, ptr {self._operand(address)}{order}")
+            case FetchAdd(result, address, value):
+                place = self._operand(address)
+                self._new(result, f"atomicrmw add ptr {place}, i64 {self._operand(value)} acq_rel")
             case Store(value, address):
                 self._line(f"store {self._typed(value)} {self._operand(value)}, ptr {self._operand(address)}")
             case Copy(source, target, size):

@@ -95,16 +95,20 @@ class Program:
         public: bool = False,
         inlined: bool = True,
         distinct: bool = False,
+        rest: Sequence[str] = (),
     ) -> Function[P, R]:
         """The function that ``write`` writes, under its own name where no ``symbol`` is said.
 
         ``public``: it is called from outside the program. ``inlined``: it may be written into its callers.
-        ``distinct``: arrays that are passed to it do not overlap. Where the symbol is defined already, that
-        definition stays.
+        ``distinct``: arrays that are passed to it do not overlap. ``rest`` names the parameters that Python's
+        ``*`` stands for, all of one type. Where the symbol is defined already, that definition stays.
         """
         symbol = symbol or write.__name__
         if symbol not in self.parts:
             types = _parameters(write)
+            if write.__code__.co_flags & inspect.CO_VARARGS:
+                _, kind = types.popitem()
+                types |= dict.fromkeys(rest, kind)
             parameters = {name: Temporary(_KINDS[kind], name) for name, kind in types.items()}
             result = _result(write)
             function = tree.Function(
@@ -288,14 +292,17 @@ class Routine(Writer):
             index.value = following
             turn.again_when(following < count)
 
-    def range(self, start: Integer | int, stop: Integer | int) -> Generator[Integer]:
-        """``for i in r.range(a, b)``: what stands inside, for ``i = a … b-1``, as a loop."""
+    def range(self, start: Integer | int, stop: Integer | int, step: int = 1) -> Generator[Integer]:
+        """``for i in r.range(a, b)``: what stands inside, for ``i = a … b-1``, as a loop.
+
+        With a ``step`` above 1 for ``i = a, a + step …`` below ``b``.
+        """
         index = self.integer(start)
         with self.loop() as turn:
             i = index.value
             turn.leave_unless(i < stop)
             yield i
-            index.value = i + 1
+            index.value = i + step
 
     def stages(self, *names: str) -> Stages:
         """A part made of stages that follow one another and can be gone to from any of them."""

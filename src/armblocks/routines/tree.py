@@ -124,10 +124,14 @@ class Locate:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """``result`` is the number at an address."""
+    """``result`` is the number at an address.
+
+    ``acquiring``: other threads write it, and what they wrote before is seen from here on.
+    """
 
     result: Temporary
     address: Operand
+    acquiring: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +140,18 @@ class Store:
 
     value: Operand
     address: Operand
+
+
+@dataclass(frozen=True, slots=True)
+class FetchAdd:
+    """Add to an integer that other threads write too, in one step; ``result`` is what it was before.
+
+    What stands before it in one thread is seen by the threads that come to it later.
+    """
+
+    result: Temporary
+    address: Operand
+    value: Operand
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +223,7 @@ class Stage:
     mark: Mark
 
 
-Statement = Compute | Locate | Load | Store | Copy | Call | Return | Jump | When | Region | Stage
+Statement = Compute | Locate | Load | Store | FetchAdd | Copy | Call | Return | Jump | When | Region | Stage
 
 
 @dataclass(frozen=True, slots=True)

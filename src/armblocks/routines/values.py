@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Generic, NoReturn, Self, TypeVar, cast
 from armblocks.routines.tree import (
     Compute,
     Constant,
+    FetchAdd,
     Kind,
     Load,
     Local,
@@ -37,10 +38,16 @@ class Writer:
         self.statements.append(Compute(result, operation, operands))
         return result
 
-    def load(self, address: Operand, kind: Kind) -> Temporary:
+    def load(self, address: Operand, kind: Kind, *, acquiring: bool = False) -> Temporary:
         """Append the reading of a number."""
         result = Temporary(kind)
-        self.statements.append(Load(result, address))
+        self.statements.append(Load(result, address, acquiring))
+        return result
+
+    def fetch_add(self, value: Operand, address: Operand) -> Temporary:
+        """Append an addition that other threads see in one step; gives what was there before."""
+        result = Temporary(Kind.INTEGER)
+        self.statements.append(FetchAdd(result, address, value))
         return result
 
     def store(self, value: Operand, address: Operand) -> None:
@@ -355,6 +362,15 @@ class Integers(Array):
         if isinstance(index, int):
             return Integers(self.writer, self.operand, self.first + index)
         return Integers(self.writer, self.address(index))
+
+    def fetch_add(self, index: Integer | int, value: Integer | int) -> Integer:
+        """Add to an element that other threads write too, in one step; gives what it was before."""
+        before = self.writer.fetch_add(integer_operand(value), self.address(index))
+        return Integer(self.writer, before)
+
+    def acquire(self, index: Integer | int) -> Integer:
+        """Read an element that other threads write; all that they wrote before it is seen from here on."""
+        return Integer(self.writer, self.writer.load(self.address(index), Kind.INTEGER, acquiring=True))
 
 
 class Variable:
