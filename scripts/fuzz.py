@@ -2,9 +2,9 @@
 
     python scripts/fuzz.py --minutes 60 --seed 7
 
-Prints counts, and each finding reduced to a small diagram with a script that builds it. The same seeds give
-the same diagrams. ``--laws`` picks some of the laws of ``tests/reference/fuzz_laws.py``. The exit status is 1
-where there was a finding.
+Prints each finding reduced to a small diagram with a script that builds it, how many diagrams were judged, and
+why nothing can be said of some. The same seeds give the same diagrams. ``--laws`` picks some of the laws of
+``tests/reference/fuzz_laws.py``. The exit status is 1 where there was a finding.
 """
 
 from __future__ import annotations
@@ -50,7 +50,11 @@ def main() -> int:
         print(f"--- {found} ---\n{finding.report()}\n", flush=True)
         if found >= arguments.findings:
             break
-    print(f"seeds from {arguments.seed}:", ", ".join(f"{value} {name}" for name, value in counts.items()))
+    totals = {name: value for name, value in counts.items() if ": " not in name}
+    print(f"seeds from {arguments.seed}:", ", ".join(f"{value} {name}" for name, value in totals.items()))
+    for name, value in counts.most_common():
+        if ": " in name:
+            print(f"{value:6} {name}")
     return 1 if found else 0
 
 

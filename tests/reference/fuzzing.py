@@ -7,6 +7,7 @@ finding, too.
 from __future__ import annotations
 
 import multiprocessing
+import re
 import time
 import traceback
 from collections import Counter
@@ -99,6 +100,12 @@ def _judging(pipe: Connection) -> None:
 NO_FINDING = ("inconclusive", "refused")
 
 
+def kind_of(reason: str) -> str:
+    """A reason without what is special to its diagram, so that equal ones can be counted."""
+    first = reason.splitlines()[0].partition(" Allowed:")[0]
+    return re.sub(r"-?\d[\d.e+-]*", "#", re.sub(r"'[^']*'", "'…'", first))[:110]
+
+
 def reduced(
     judge: Callable[[Recipe, Sequence[str]], Found], recipe: Recipe, law: str, until: float
 ) -> tuple[Recipe, str]:
@@ -135,6 +142,8 @@ def fuzz(
             counts["blocks"] += len(recipe.nodes)
             for law, texts in found.items():
                 counts[law] += 1
+                if law in NO_FINDING:
+                    counts[f"{law}: {kind_of(texts[0])}"] += 1
                 if law not in NO_FINDING:
                     smaller, text = reduced(judge.judge, recipe, law, time.monotonic() + reduce_for)
                     yield Finding(seed, law, text or texts[0], smaller)

@@ -37,7 +37,7 @@ from armblocks.blocks import (
 )
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
-from armblocks.errors import DiagramError
+from armblocks.errors import DiagramError, InputError
 from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
 
@@ -144,6 +144,18 @@ def test_speed_and_position_have_limits(run: Run) -> None:
     close(found["mass/x"], np.where(t < 4.5, rise, 1.875 - 0.5 * (t - 4.5)), 1e-9)
     speed = np.select([t < 1, t < 2.5, t < 4, t < 4.5], [t, 1.0, 0.0, 4.0 - t], -0.5)
     assert found["mass/dx"][(abs(t - 2.5) > 0.01)] == pytest.approx(speed[abs(t - 2.5) > 0.01], abs=1e-9)
+
+
+def test_a_limit_of_the_position_needs_a_speed_of_zero() -> None:
+    message = (
+        r"x has a limit, and dx is held between -inf and -1\.0\. Allowed: lower_speed <= 0"
+    )
+    with pytest.raises(InputError, match=message):
+        SecondOrderIntegratorLimited(initial=1.0, lower=0.0, upper_speed=-1.0)
+    with pytest.raises(InputError, match=r"where x has a limit, because x stands still there"):
+        SecondOrderIntegratorLimited(upper=(2.0, math.inf), lower_speed=(1.0, 1.0))
+    SecondOrderIntegratorLimited(upper=(2.0, math.inf), lower_speed=(0.0, 1.0))
+    SecondOrderIntegratorLimited(lower=0.0, lower_speed=1.0)
 
 
 def test_moving_limits(run: Run) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_and, logic_not, logic_or
 from numpy.typing import ArrayLike
 
@@ -24,8 +25,10 @@ from armblocks.diagram import (
     broadcast,
     made,
     parameter,
+    shape_of,
 )
 from armblocks.equations import Shape
+from armblocks.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +86,7 @@ class SecondOrderIntegratorLimited(Block):
     ``reinitialize``, dx jumps to the input ``dx0``, which may be made of dx itself: a bounce. A bounce no
     faster than ``rest_speed`` is a stop: x then rests exactly at the limit until u drives away from it, so
     that a ball whose bounces get shorter for ever comes to rest instead of never ending. The speed has limits
-    of its own.
+    of its own; they allow 0 where x has a limit in the direction of motion.
     """
 
     family: ClassVar[str] = "continuous"
@@ -113,6 +116,19 @@ class SecondOrderIntegratorLimited(Block):
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
         limits_in_order(self, "lower_speed", "upper_speed")
+        names = ("lower", "upper", "lower_speed", "upper_speed")
+        found = {name: self.parameter_value(name) for name in names}
+        broadcast({name: shape_of(value) for name, value in found.items()})
+        limits = [np.asarray(found[name], dtype=np.float64) for name in names]
+        lower, upper, slowest, fastest = np.broadcast_arrays(*limits)
+        moving = (slowest > 0.0) & np.isfinite(upper) | (fastest < 0.0) & np.isfinite(lower)
+        if moving.any():
+            raise InputError(
+                f"x has a limit, and dx is held between {found['lower_speed']} and {found['upper_speed']}",
+                where=self.type_name(),
+                allowed="lower_speed <= 0 <= upper_speed where x has a limit, because x stands still there",
+                fix="widen the limits of dx, or take away the limit of x",
+            )
 
     def input_ports(self) -> tuple[Port, ...]:
         ports = (Port("u", "the acceleration"),)
