@@ -2,7 +2,7 @@
 
     python scripts/fuzz.py --minutes 60 --seed 7
 
-Prints each finding reduced to a small diagram with a script that builds it, how many diagrams were judged, and
+Prints each finding as a small diagram with a script that builds it, how many diagrams were judged, and
 why nothing can be said of some. The same seeds give the same diagrams. ``--laws`` picks some of the laws of
 ``tests/reference/fuzz_laws.py``. The exit status is 1 where there was a finding.
 """
