@@ -110,15 +110,24 @@ def test_integers_wrap_around_and_divide_toward_zero() -> None:
     def run(r: Routine, i: Integer, out: Integers) -> None:
         values = [i + 1, 1 + i, i - 3, 3 - i, i * i, 2 * i, i // 2, i & 6, i.to_real().to_integer()]
         values += [select(i < 0, i, 5), select(i >= 0, 1, i), i.unsigned_quotient(2)]
+        values += [
+            i << 3,
+            i >> 1,
+            i >> (i & 3),
+            i.unsigned_remainder(10),
+            i.unsigned_remainder(i + 8),
+            i | 16,
+        ]
         values += [((1 << 62) + (i - i)) * 4 + 1, (i.to_real().bits() + 0).from_bits().to_integer()]
         tests = [i < 0, i <= -7, i == -7, i != -7, i > 0, i >= 0]
         for k, value in enumerate([*values, *(test.count() for test in tests)]):
             out[k] = value
 
-    out = [0] * 20
+    out = [0] * 26
     both(run, -7, out)
-    half = ((1 << 64) - 7) // 2
-    assert out == [-6, -6, -10, 10, 49, -14, -3, 0, -7, -7, -7, half, 1, -7, 1, 1, 1, 0, 0, 0]
+    plain = (1 << 64) - 7
+    shifted = [-56, -4, -7 >> 1, plain % 10, 0, -7 | 16]
+    assert out == [-6, -6, -10, 10, 49, -14, -3, 0, -7, -7, -7, plain // 2, *shifted, 1, -7, 1, 1, 1, 0, 0, 0]
 
 
 @pytest.mark.parametrize("lanes", [1, 2, 4, 8])
@@ -276,6 +285,23 @@ def test_functions_that_stand_elsewhere_are_called_by_their_names() -> None:
     interpreter = Interpreter(program, derivative=lambda t, x: t * x[0][0])
     assert interpreter.call("run", ([3.0, 4.0], 0)) == 13.0
     assert "call double @derivative(double %v" in definitions(program)["run"]
+
+
+def test_functions_have_several_results_and_rare_cases() -> None:
+    def run(r: Routine, x: Real, n: Integer, out: Reals) -> Integer:
+        def parts(r: Routine, x: Real, n: Integer) -> tuple[Real, Integer, Boolean]:
+            with r.when(x < 0.0, rarely=True):
+                r.return_(-x, n + 1, n > 3)
+            return x * 2.0, n, x.ordered
+
+        value, count, condition = r.call(r.program.define(parts, inlined=True), x, n)
+        out[0] = value
+        return select(condition, count, -1)
+
+    for x, n, value, count in ((-1.5, 3, 1.5, -1), (-1.5, 4, 1.5, 5), (2.0, 7, 4.0, 7)):
+        out = [0.0]
+        assert both(run, x, n, out, result=int) == count
+        assert out == [value]
 
 
 def test_functions_of_any_number_of_arrays_take_shares_of_the_work() -> None:

@@ -48,7 +48,10 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.SUBTRACT: lambda a, b: a - b,
     Operation.MULTIPLY: lambda a, b: a * b,
     Operation.DIVIDE: _divided,
-    Operation.DIVIDE_UNSIGNED: lambda a, b: (a % (1 << 64)) // b,
+    Operation.DIVIDE_UNSIGNED: lambda a, b: (a % (1 << 64)) // (b % (1 << 64)),
+    Operation.REMAINDER_UNSIGNED: lambda a, b: (a % (1 << 64)) % (b % (1 << 64)),
+    Operation.SHIFT_LEFT: lambda a, b: a << b,
+    Operation.SHIFT_RIGHT: lambda a, b: a >> b,
     Operation.NEGATE: lambda a: -a,
     Operation.ABSOLUTE: abs,
     Operation.SQUARE_ROOT: lambda a: math.sqrt(a) if a >= 0.0 else math.nan,
@@ -149,15 +152,15 @@ class _Call:
                 (given, first), (taken, place) = self.value(source), self.value(target)
                 count = self.value(size) // 8
                 taken[place : place + count] = given[first : first + count]
-            case tree.Call(result, symbol, arguments):
+            case tree.Call(results, symbol, arguments):
                 found = self.interpreter.call(symbol, *map(self.value, arguments))
-                if result is not None:
-                    self.values[result] = found
-            case tree.Return(value):
-                raise Returned(None if value is None else self.value(value))
+                self.values.update(zip(results, found if len(results) > 1 else (found,)))
+            case tree.Return(values):
+                found = tuple(map(self.value, values))
+                raise Returned(found if len(found) > 1 else found[0] if found else None)
             case tree.Jump(mark):
                 raise Jumped(mark)
-            case tree.When(condition, yes, no):
+            case tree.When(condition, yes, no, _):
                 self.part(yes if self.value(condition) else no)
             case tree.Region():
                 self.region(statement)

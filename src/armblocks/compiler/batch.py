@@ -35,8 +35,8 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
             rest = stop - ((stop - start) & (lanes - 1))
             for first in r.range(start, rest, lanes):
                 with r.when(r.call(block, first, columns, *arrays)):
-                    for k in r.range(first, first + lanes):
-                        r.call(sample, k, columns, *arrays)
+                    for lane in r.range(0, lanes):
+                        r.call(sample, first + lane, columns, *arrays)
         for k in r.range(rest, stop):
             r.call(sample, k, columns, *arrays)
 

@@ -44,6 +44,15 @@ class Routine(Body):
 
     # Control.
 
+    def label(self, name: str) -> None:
+        """Begin a basic block."""
+        self.lines.append(f"{name}:")
+
+    def fresh(self, stem: str) -> str:
+        """A name for a label that no other has."""
+        self._count += 1
+        return f"{stem}{self._count}"
+
     def place(self, label: str) -> None:
         """Begin the block ``label``; a block that has not ended yet goes on into it."""
         if not self.lines or not self.lines[-1].startswith(("  br ", "  ret ")):

@@ -74,15 +74,6 @@ class Body:
         self.lines.append(f"  {name} = {instruction}")
         return name
 
-    def label(self, name: str) -> None:
-        """Begin a basic block."""
-        self.lines.append(f"{name}:")
-
-    def fresh(self, stem: str) -> str:
-        """A name for a label that no other has."""
-        self._count += 1
-        return f"{stem}{self._count}"
-
     def _splat(self, scalar: str, literal: str) -> str:
         return literal if self.lanes == 1 else f"splat ({scalar} {literal})"
 
@@ -194,25 +185,6 @@ class Body:
     def either(self, a: str, b: str) -> str:
         """Disjunction of conditions."""
         return self.let(f"or {self.bit} {a}, {b}")
-
-    def rarely(
-        self, condition: str, usual: Sequence[tuple[str, str]], write: Callable[[], Sequence[str]]
-    ) -> list[str]:
-        """One lane: ``usual`` (types and values), or what ``write`` emits where the rare condition holds."""
-        before, rare, after = self.fresh("usual"), self.fresh("rare"), self.fresh("after")
-        self.module.declare("i1", "llvm.expect.i1", "i1", "i1")
-        self.do(f"br label %{before}")
-        self.label(before)
-        expected = self.let(f"call i1 @llvm.expect.i1(i1 {condition}, i1 false)")
-        self.do(f"br i1 {expected}, label %{rare}, label %{after}")
-        self.label(rare)
-        values = write()
-        self.do(f"br label %{after}")
-        self.label(after)
-        return [
-            self.let(f"phi {kind} [ {value}, %{before} ], [ {other}, %{rare} ]")
-            for (kind, value), other in zip(usual, values)
-        ]
 
     def doubt(self, condition: str) -> None:
         """Mark lanes in which this body's results are wrong and must be worked out with one lane."""

@@ -58,7 +58,11 @@ _TWO_INTEGERS = {
     Operation.MULTIPLY: "mul",
     Operation.DIVIDE: "sdiv",
     Operation.DIVIDE_UNSIGNED: "udiv",
+    Operation.REMAINDER_UNSIGNED: "urem",
+    Operation.SHIFT_LEFT: "shl",
+    Operation.SHIFT_RIGHT: "ashr",
     Operation.AND: "and",
+    Operation.OR: "or",
     Operation.LESS: "icmp slt",
     Operation.LESS_EQUAL: "icmp sle",
     Operation.EQUAL: "icmp eq",
@@ -122,24 +126,26 @@ class _FunctionText:
         self._slots: list[str] = []
         self._names: dict[Temporary | Local, str] = {}
         self._labels: dict[Mark, str] = {}
+        self._results: tuple[Kind, ...] = ()
         self._count = 0
         self._ended = False
         """Whether nothing follows the last line: a branch or a return."""
 
     def text(self, function: Function) -> str:
         """The whole definition."""
+        self._results = function.results
         for parameter in function.parameters:
             self._names[parameter] = f"%{parameter.name}"
         self._part(function.body)
-        result = "void" if function.result is None else self._type(function.result)
         alias = " noalias" if function.distinct else ""
         arguments = ", ".join(
             f"{self._type(parameter.kind)}{alias if parameter.kind is Kind.ADDRESS else ''} %{parameter.name}"
             for parameter in function.parameters
         )
         linkage = "" if function.public else "internal "
-        inlined = "" if function.inlined else " noinline"
-        head = f"define {linkage}{result} @{function.symbol}({arguments}){inlined} nounwind {{"
+        inlined = {True: " alwaysinline", False: " noinline", None: ""}[function.inlined]
+        head = f"define {linkage}{self._result(function.results)} @{function.symbol}({arguments})"
+        head += f"{inlined} nounwind {{"
         return "\n".join([head, "entry:", *self._slots, *self._lines, "}"])
 
     # Types and names.
@@ -149,6 +155,11 @@ class _FunctionText:
             return _TYPES[kind]
         single = _TYPES[_OF_EACH_LANE[kind]]
         return single if self.lanes == 1 else f"<{self.lanes} x {single}>"
+
+    def _result(self, kinds: Sequence[Kind]) -> str:
+        """The type that a function returns."""
+        types = ", ".join(map(self._type, kinds))
+        return types if len(kinds) == 1 else f"{{ {types} }}" if kinds else "void"
 
     def _typed(self, operand: Operand) -> str:
         """The type of an operand; a variable or a table stands for its address."""
@@ -175,10 +186,14 @@ class _FunctionText:
 
     def _new(self, temporary: Temporary, text: str) -> str:
         """Append the line that computes a temporary; gives its name."""
-        self._count += 1
-        name = self._names[temporary] = f"%v{self._count}"
-        self._lines.append(f"  {name} = {text}")
+        name = self._names[temporary] = self._name(text)
         return name
+
+    def _name(self, text: str) -> str:
+        """Append a line that computes something; gives its name."""
+        self._count += 1
+        self._lines.append(f"  %v{self._count} = {text}")
+        return f"%v{self._count}"
 
     def _label(self, mark: Mark) -> str:
         label = self._labels.get(mark)
@@ -212,8 +227,8 @@ class _FunctionText:
         match statement:
             case Jump(mark):
                 self._end(f"br label %{self._label(mark)}")
-            case Return(value):
-                self._end("ret void" if value is None else f"ret {self._typed(value)} {self._operand(value)}")
+            case Return(values):
+                self._return(values)
             case Stage(mark):
                 self._place(self._label(mark))
             case Region():
@@ -222,6 +237,17 @@ class _FunctionText:
                 self._when(statement, following)
             case _:
                 self._plain(statement)
+
+    def _return(self, values: Sequence[Operand]) -> None:
+        if not values:
+            return self._end("ret void")
+        text, result = self._operand(values[0]), self._result(self._results)
+        if len(values) > 1:
+            text = "poison"
+            for k, value in enumerate(values):
+                part = f"{self._typed(value)} {self._operand(value)}"
+                text = self._name(f"insertvalue {result} {text}, {part}, {k}")
+        return self._end(f"ret {result} {text}")
 
     def _region(self, region: Region) -> None:
         if region.start.used:
@@ -233,6 +259,9 @@ class _FunctionText:
     def _when(self, when: When, following: Statement | None) -> None:
         """Where a part, or what follows, only jumps, the branch goes there at once."""
         condition = self._operand(when.condition)
+        if when.rarely:
+            self._declare("i1", "llvm.expect.i1", "i1", "i1")
+            condition = self._name(f"call i1 @llvm.expect.i1(i1 {condition}, i1 false)")
         places = [self._only_jump(when.yes), self._only_jump(when.no)]
         leads_on = isinstance(following, Jump)
         after = self._label(following.mark) if isinstance(following, Jump) else self._fresh("after")
@@ -280,15 +309,23 @@ class _FunctionText:
                 target, source, size = (self._operand(operand) for operand in (target, source, size))
                 arguments = f"ptr {target}, ptr {source}, i64 {size}, i1 false"
                 self._line(f"call void @llvm.memcpy.p0.p0.i64({arguments})")
-            case Call(result, symbol, arguments):
-                texts = [f"{self._typed(argument)} {self._operand(argument)}" for argument in arguments]
-                call = f"@{symbol}({', '.join(texts)})"
-                if result is None:
-                    self._line(f"call void {call}")
-                else:
-                    self._new(result, f"call {self._type(result.kind)} {call}")
+            case Call():
+                self._call(statement)
             case _:
                 raise AssertionError(statement)
+
+    def _call(self, call: Call) -> None:
+        arguments = ", ".join(f"{self._typed(given)} {self._operand(given)}" for given in call.arguments)
+        result = self._result([result.kind for result in call.results])
+        text = f"call {result} @{call.symbol}({arguments})"
+        if not call.results:
+            self._line(text)
+        elif len(call.results) == 1:
+            self._new(call.results[0], text)
+        else:
+            together = self._name(text)
+            for k, part in enumerate(call.results):
+                self._new(part, f"extractvalue {result} {together}, {k}")
 
     def _line(self, text: str) -> None:
         self._lines.append(f"  {text}")
@@ -317,7 +354,7 @@ class _FunctionText:
     def _any(self, mask: str) -> str:
         if self.lanes == 1:
             return f"or i1 {mask}, false"
-        bits = self._new(Temporary(Kind.INTEGER), f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
+        bits = self._name(f"bitcast {self._type(Kind.MASK)} {mask} to i{self.lanes}")
         return f"icmp ne i{self.lanes} {bits}, 0"
 
     def _fma(self, kind: Kind, operands: Sequence[str]) -> str:
@@ -327,7 +364,7 @@ class _FunctionText:
         # For -(a b + c) LLVM selects FNMADD of ARM64, which is (-a) b + (-c): where the sum is exactly
         # zero that gives +0 instead of -0. The fence keeps the two operations apart; vectors have no such
         # instruction.
-        return self._intrinsic("arithmetic.fence", kind, self._new(Temporary(kind), call))
+        return self._intrinsic("arithmetic.fence", kind, self._name(call))
 
     def _intrinsic(self, name: str, kind: Kind, *operands: str) -> str:
         number = self._type(kind)

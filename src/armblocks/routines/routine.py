@@ -23,7 +23,7 @@ import inspect
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Concatenate, Generic, ParamSpec, TypeVar, cast
+from typing import Concatenate, Generic, ParamSpec, TypeVar, cast, get_args
 
 from armblocks.routines import tree
 from armblocks.routines.lanes import LaneArray, Lanes, Mask
@@ -72,12 +72,12 @@ class Function(Generic[P, R]):
 
     symbol: str
     write: Callable[Concatenate[Routine, P], R]
-    result: type[Value] | None
+    results: tuple[type[Value], ...]
 
 
 def external(write: Callable[Concatenate[Routine, P], R], symbol: str = "") -> Function[P, R]:
     """A function that stands elsewhere, by its name (or ``symbol``) and annotations; it is never run."""
-    return Function(symbol or write.__name__, write, _result(write))
+    return Function(symbol or write.__name__, write, _results(write))
 
 
 class Program:
@@ -93,15 +93,16 @@ class Program:
         symbol: str = "",
         *,
         public: bool = False,
-        inlined: bool = True,
+        inlined: bool | None = None,
         distinct: bool = False,
         rest: Sequence[str] = (),
     ) -> Function[P, R]:
         """The function that ``write`` writes, under its own name where no ``symbol`` is said.
 
-        ``public``: it is called from outside the program. ``inlined``: it may be written into its callers.
-        ``distinct``: arrays that are passed to it do not overlap. ``rest`` names the parameters that Python's
-        ``*`` stands for, all of one type. Where the symbol is defined already, that definition stays.
+        ``public``: it is called from outside the program. ``inlined``: whether it is written into its
+        callers; ``None`` leaves that to the back end. ``distinct``: arrays that are passed to it do not
+        overlap. ``rest`` names the parameters that Python's ``*`` stands for, all of one type. Where the
+        symbol is defined already, that definition stays.
         """
         symbol = symbol or write.__name__
         if symbol not in self.parts:
@@ -110,11 +111,10 @@ class Program:
                 _, kind = types.popitem()
                 types |= dict.fromkeys(rest, kind)
             parameters = {name: Temporary(_KINDS[kind], name) for name, kind in types.items()}
-            result = _result(write)
             function = tree.Function(
                 symbol,
                 tuple(parameters.values()),
-                None if result is None else _KINDS[result],
+                tuple(_KINDS[kind] for kind in _results(write)),
                 public=public,
                 inlined=inlined,
                 distinct=distinct,
@@ -122,10 +122,10 @@ class Program:
             self.parts[symbol] = function
             routine = Routine(self, function.body)
             arguments = [types[name](routine, operand) for name, operand in parameters.items()]
-            given = cast("Callable[..., Value | None]", write)(routine, *arguments)
+            given = cast("Callable[..., Value | tuple[Value, ...] | None]", write)(routine, *arguments)
             assert routine.statements is function.body, "Python's break has left a loop of the routine"
-            routine.return_(given)
-        return Function(symbol, write, _result(write))
+            routine.return_(*(given if isinstance(given, tuple) else () if given is None else (given,)))
+        return Function(symbol, write, _results(write))
 
     def integers(self, symbol: str, numbers: Sequence[int]) -> Table:
         """A table of integer constants."""
@@ -235,9 +235,9 @@ class Routine(Writer):
     # Control flow.
 
     @contextmanager
-    def when(self, condition: Boolean) -> Generator[None]:
-        """What stands inside happens where the condition holds."""
-        statement = tree.When(condition.operand, [], [])
+    def when(self, condition: Boolean, *, rarely: bool = False) -> Generator[None]:
+        """What stands inside happens where the condition holds; ``rarely``: it hardly ever does."""
+        statement = tree.When(condition.operand, [], [], rarely)
         self.statements.append(statement)
         with self._inside(statement.yes):
             yield
@@ -308,25 +308,23 @@ class Routine(Writer):
         """A part made of stages that follow one another and can be gone to from any of them."""
         return Stages(self, names)
 
-    def return_(self, value: Value | None = None) -> None:
-        """Leave the function; its last value is returned by Python's ``return``."""
-        self.statements.append(tree.Return(None if value is None else value.operand))
+    def return_(self, *values: Value) -> None:
+        """Leave the function with its results; at its end Python's ``return`` does."""
+        self.statements.append(tree.Return(tuple(value.operand for value in values)))
 
     # Calls.
 
     def call(self, function: Function[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Call a function; gives its result."""
+        """Call a function; gives its result, or a tuple of them."""
         values = args
         if kwargs:
             bound = inspect.signature(function.write).bind(self, *args, **kwargs)
             values = tuple(bound.arguments.values())[1:]
         operands = tuple(self._argument(value) for value in values)
-        if function.result is None:
-            self.statements.append(tree.Call(None, function.symbol, operands))
-            return cast("R", None)
-        found = Temporary(_KINDS[function.result])
+        found = tuple(Temporary(_KINDS[kind]) for kind in function.results)
         self.statements.append(tree.Call(found, function.symbol, operands))
-        return cast("R", function.result(self, found))
+        results = tuple(kind(self, operand) for kind, operand in zip(function.results, found))
+        return cast("R", results if len(results) > 1 else results[0] if results else None)
 
     def copy(self, source: Reals | Integers, target: Reals | Integers, count: Integer | int) -> None:
         """Copy so many numbers from one place to another; the two do not overlap."""
@@ -397,9 +395,15 @@ def _parameters(write: Callable[..., object]) -> dict[str, type[Value]]:
     return {name: _value_type(hint) for name, hint in hints}
 
 
-def _result(write: Callable[..., object]) -> type[Value] | None:
+def _results(write: Callable[..., object]) -> tuple[type[Value], ...]:
     found = write.__annotations__["return"]
-    return None if found in (None, "None") else _value_type(found)
+    if found in (None, "None"):
+        return ()
+    if isinstance(found, str):
+        found = found.removeprefix("tuple[").removesuffix("]").split(", ")
+    else:
+        found = get_args(found) or (found,)
+    return tuple(map(_value_type, found))
 
 
 def _value_type(annotation: type[Value] | str) -> type[Value]:

@@ -36,6 +36,11 @@ class Operation(Enum):
     DIVIDE = "divide"
     """Reals; integers toward zero."""
     DIVIDE_UNSIGNED = "divide unsigned"
+    REMAINDER_UNSIGNED = "remainder unsigned"
+    SHIFT_LEFT = "shift left"
+    """Of integers, by 0 to 63 places."""
+    SHIFT_RIGHT = "shift right"
+    """Likewise, with the sign."""
     NEGATE = "negate"
     ABSOLUTE = "absolute"
     SQUARE_ROOT = "square root"
@@ -167,7 +172,7 @@ class Copy:
 class Call:
     """Call a function of the program, or one that the program only names."""
 
-    result: Temporary | None
+    results: tuple[Temporary, ...]
     symbol: str
     arguments: tuple[Operand, ...]
 
@@ -176,7 +181,7 @@ class Call:
 class Return:
     """Leave the function."""
 
-    value: Operand | None
+    values: tuple[Operand, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -199,11 +204,12 @@ class Jump:
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """Run one of two parts, either of which may be empty."""
+    """Run one of two parts, either of which may be empty. ``rarely``: the condition hardly ever holds."""
 
     condition: Operand
     yes: list[Statement]
     no: list[Statement]
+    rarely: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,14 +236,14 @@ Statement = Compute | Locate | Load | Store | FetchAdd | Copy | Call | Return | 
 class Function:
     """One function.
 
-    ``public``: its address is asked for from outside. ``inlined``: it may be written into its callers.
-    ``distinct``: its addresses never point to the same numbers.
+    ``public``: its address is asked for from outside. ``inlined``: whether it is written into its callers;
+    ``None`` leaves that to the back end. ``distinct``: its addresses never point to the same numbers.
     """
 
     symbol: str
     parameters: tuple[Temporary, ...]
-    result: Kind | None
+    results: tuple[Kind, ...]
     body: list[Statement] = field(default_factory=list[Statement])
     public: bool = False
-    inlined: bool = True
+    inlined: bool | None = None
     distinct: bool = False

@@ -220,7 +220,8 @@ class Real(Number[Boolean]):
 
 
 class Integer(Value):
-    """A 64-bit signed integer; sums and products wrap around, ``//`` cuts toward zero."""
+    """A 64-bit signed integer. Sums and products wrap around; ``//`` cuts toward zero, and ``>>`` keeps the
+    sign."""
 
     def __add__(self, other: Integer | int) -> Integer:
         return self._integer(Operation.ADD, self, other)
@@ -246,9 +247,22 @@ class Integer(Value):
     def __and__(self, other: Integer | int) -> Integer:
         return self._integer(Operation.AND, self, other)
 
-    def unsigned_quotient(self, divisor: int) -> Integer:
+    def __or__(self, other: Integer | int) -> Integer:
+        return self._integer(Operation.OR, self, other)
+
+    def __lshift__(self, places: Integer | int) -> Integer:
+        return self._integer(Operation.SHIFT_LEFT, self, places)
+
+    def __rshift__(self, places: Integer | int) -> Integer:
+        return self._integer(Operation.SHIFT_RIGHT, self, places)
+
+    def unsigned_quotient(self, divisor: Integer | int) -> Integer:
         """The quotient where both are read as numbers without a sign."""
         return self._integer(Operation.DIVIDE_UNSIGNED, self, divisor)
+
+    def unsigned_remainder(self, divisor: Integer | int) -> Integer:
+        """What is left over by :meth:`unsigned_quotient`."""
+        return self._integer(Operation.REMAINDER_UNSIGNED, self, divisor)
 
     def __lt__(self, other: Integer | int) -> Boolean:
         return self._compare(Operation.LESS, other)

@@ -7,9 +7,14 @@ Larger quotients are divided by integers, in one lane.
 from __future__ import annotations
 
 from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.program_text import add_program
+from armblocks.routines.arithmetic import select
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Boolean, Integer, Real
 
 _INFINITY = float("inf")
-_LONG_DIVISION = "armblocks_long_division"
+_SMALLEST = 5e-324
+_LARGE, _LONG_DIVISION = "armblocks_modulo_of_large", "armblocks_long_division"
 
 
 def modulo(body: Body, x: str, y: str) -> str:
@@ -52,56 +57,49 @@ def _modulo(body: Body, a: str, b: str) -> str:
         body.doubt(large)
         return rest
 
-    def write() -> list[str]:
-        body.module.define(_LONG_DIVISION, lambda: _write_long_division(body.module))
-        return [body.let(f"call double @{_LONG_DIVISION}(double {a}, double {b})")]
-
-    return body.rarely(large, [("double", rest)], write)[0]
+    _define_large(body.module)
+    return body.let(f"call double @{_LARGE}(double {rest}, i1 {large}, double {a}, double {b})")
 
 
-def _write_long_division(module: Module) -> str:
-    """Text of ``a mod b`` for finite ``a >= b > 0``: integer mantissas, 11 bits of quotient a turn."""
-    body = Body(module)
-    mantissas: list[str] = []
-    exponents: list[str] = []
-    for name in ("%a", "%b"):
-        bits = body.bits(name)
-        fraction = body.word_op("and", bits, str((1 << 52) - 1))
-        biased = body.word_op("lshr", bits, "52")
-        subnormal = body.word_test("eq", biased, "0")
-        whole = body.word_op("or", fraction, str(1 << 52))
-        mantissas.append(body.let(f"select i1 {subnormal}, i64 {fraction}, i64 {whole}"))
-        exponents.append(body.let(f"select i1 {subnormal}, i64 1, i64 {biased}"))
-    distance = body.word_op("sub", *exponents)
-    first = body.word_op("urem", *mantissas)
-    loop = f"""  br label %head
-head:
-  %rest = phi i64 [ {first}, %entry ], [ %next, %turn ]
-  %left = phi i64 [ {distance}, %entry ], [ %less, %turn ]
-  %more = icmp sgt i64 %left, 0
-  br i1 %more, label %turn, label %done
-turn:
-  %short = icmp slt i64 %left, 11
-  %step = select i1 %short, i64 %left, i64 11
-  %moved = shl i64 %rest, %step
-  %next = urem i64 %moved, {mantissas[1]}
-  %less = sub i64 %left, %step
-  br label %head
-done:
-  ; rest 2**(exponent of b), exact: units of the smallest number, times a power of two in two halves
-  %number = uitofp i64 %rest to double
-  %units = add i64 {exponents[1]}, -1
-  %half = lshr i64 %units, 1
-  %other = sub i64 %units, %half
-  %halfbiased = add i64 %half, 1023
-  %otherbiased = add i64 %other, 1023
-  %halfbits = shl i64 %halfbiased, 52
-  %otherbits = shl i64 %otherbiased, 52
-  %halfpower = bitcast i64 %halfbits to double
-  %otherpower = bitcast i64 %otherbits to double
-  %small = fmul double %number, 0x0000000000000001
-  %larger = fmul double %small, %halfpower
-  %result = fmul double %larger, %otherpower
-  ret double %result"""
-    head = f"define internal double @{_LONG_DIVISION}(double %a, double %b) noinline cold nounwind {{"
-    return "\n".join([head, "entry:", *body.lines, loop, "}"])
+def _define_large(module: Module) -> None:
+    """Add the choice between the usual remainder and long division."""
+
+    def modulo_of_large(r: Routine, rest: Real, large: Boolean, a: Real, b: Real) -> Real:
+        with r.when(large, rarely=True):
+            r.return_(r.call(r.program.define(long_division, _LONG_DIVISION, inlined=False), a, b))
+        return rest
+
+    if _LARGE not in module:
+        program = Program()
+        program.define(modulo_of_large, _LARGE, inlined=True)
+        add_program(module, program)
+
+
+def long_division(r: Routine, a: Real, b: Real) -> Real:
+    """``a mod b`` for finite ``a >= b > 0``: integer mantissas, 11 bits of quotient a turn."""
+    dividend, exponent = _mantissa_and_exponent(a)
+    divisor, unit = _mantissa_and_exponent(b)
+    rest = r.integer(dividend.unsigned_remainder(divisor))
+    left = r.integer(exponent - unit)
+    with r.loop() as turn:
+        places = left.value
+        turn.leave_unless(places > 0)
+        step = select(places < 11, places, 11)
+        rest.value = (rest.value << step).unsigned_remainder(divisor)
+        left.value = places - step
+    # rest 2**unit, exact: units of the smallest number, times a power of two in two halves
+    power = unit - 1
+    half = power >> 1
+    return rest.value.to_real() * _SMALLEST * _power_of_two(half) * _power_of_two(power - half)
+
+
+def _mantissa_and_exponent(x: Real) -> tuple[Integer, Integer]:
+    """``x = mantissa 2**exponent``, but for a factor that all positive finite numbers share."""
+    bits = x.bits()
+    fraction, biased = bits & ((1 << 52) - 1), bits >> 52
+    subnormal = biased == 0
+    return select(subnormal, fraction, fraction | (1 << 52)), select(subnormal, 1, biased)
+
+
+def _power_of_two(exponent: Integer) -> Real:
+    return ((exponent + 1023) << 52).from_bits()

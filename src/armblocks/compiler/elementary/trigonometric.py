@@ -19,11 +19,16 @@ from armblocks.compiler.elementary.coefficients import (
     TWO_OVER_PI_WORDS,
 )
 from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.program_text import add_program
+from armblocks.routines.routine import Program, Routine, external
+from armblocks.routines.values import Boolean, Integer, Real
 
 _MODERATE = 2.0**31
 _SIGN_BIT = 1 << 63
 _HUGE = "armblocks_reduce_huge_angle"
-_HUGE_TYPE = "{ double, double, i64 }"
+_REDUCTION = "armblocks_reduce_angle"
+_PARTS = "{ double, double, i64 }"
+"""Angle, rest and quarter of :class:`_Reduced`."""
 
 
 class _Reduced(NamedTuple):
@@ -88,13 +93,32 @@ def _reduce(body: Body, magnitude: str) -> _Reduced:
         body.doubt(huge)
         return _Reduced(angle, rest, quarter)
 
-    def write() -> list[str]:
-        body.module.define(_HUGE, lambda: _write_huge(body.module))
-        parts = body.let(f"call {_HUGE_TYPE} @{_HUGE}(double {magnitude})")
-        return [body.let(f"extractvalue {_HUGE_TYPE} {parts}, {k}") for k in range(3)]
+    _define_reduction(body.module)
+    arguments = f"double {magnitude}, i1 {huge}, double {angle}, double {rest}, i64 {quarter}"
+    parts = body.let(f"call {_PARTS} @{_REDUCTION}({arguments})")
+    return _Reduced(*[body.let(f"extractvalue {_PARTS} {parts}, {k}") for k in range(3)])
 
-    usual = (("double", angle), ("double", rest), ("i64", quarter))
-    return _Reduced(*body.rarely(huge, usual, write))
+
+def _define_reduction(module: Module) -> None:
+    """Add the choice between the usual reduction and that of huge angles."""
+
+    def reduction(
+        r: Routine, magnitude: Real, huge: Boolean, angle: Real, rest: Real, quarter: Integer
+    ) -> tuple[Real, Real, Integer]:
+        with r.when(huge, rarely=True):
+            r.return_(*r.call(external(_huge_reduction, _HUGE), magnitude))
+        return angle, rest, quarter
+
+    if _REDUCTION not in module:
+        module.add(_HUGE, _huge_text(module))
+        program = Program()
+        program.define(reduction, _REDUCTION, inlined=True)
+        add_program(module, program)
+
+
+def _huge_reduction(r: Routine, magnitude: Real) -> tuple[Real, Real, Integer]:
+    """The parts of a huge angle: :func:`_huge_text` is what it does."""
+    raise NotImplementedError
 
 
 def _sine_parts(body: Body, reduced: _Reduced, squared: str) -> tuple[str, str]:
@@ -134,7 +158,7 @@ def _signed(body: Body, value: str, sign: str) -> str:
     return body.from_bits(body.word_op("xor", body.bits(value), sign))
 
 
-def _write_huge(module: Module) -> str:
+def _huge_text(module: Module) -> str:
     """Text of the reduction of ``|x| >= 2**31``, infinity and NaN included, for one lane.
 
     With ``|x| = mantissa 2**exponent``, the bits of 2/pi that weigh 4 or more in the product change the
@@ -181,11 +205,11 @@ def _write_huge(module: Module) -> str:
     endless = body.compare("oeq", "%x", body.number(float("inf")))
     angle = body.select(endless, body.number(float("nan")), _signed(body, angle, sign))
     error = _signed(body, error, sign)
-    value = body.let(f"insertvalue {_HUGE_TYPE} poison, double {angle}, 0")
-    value = body.let(f"insertvalue {_HUGE_TYPE} {value}, double {error}, 1")
-    value = body.let(f"insertvalue {_HUGE_TYPE} {value}, i64 {quarter}, 2")
-    body.do(f"ret {_HUGE_TYPE} {value}")
-    head = f"define internal {_HUGE_TYPE} @{_HUGE}(double %x) noinline cold nounwind {{"
+    value = body.let(f"insertvalue {_PARTS} poison, double {angle}, 0")
+    value = body.let(f"insertvalue {_PARTS} {value}, double {error}, 1")
+    value = body.let(f"insertvalue {_PARTS} {value}, i64 {quarter}, 2")
+    body.do(f"ret {_PARTS} {value}")
+    head = f"define internal {_PARTS} @{_HUGE}(double %x) noinline cold nounwind {{"
     return "\n".join([head, "entry:", *body.lines, "}"])
 
 
