@@ -49,6 +49,8 @@ from armblocks.diagram import Diagram
 __all__ = ["EndlessEventsError", "Network", "ReferenceRun", "UnsupportedError", "run_reference"]
 
 MOST_TURNS = 100
+JUST_AFTER = 1e-10
+"""s"""
 SAME = 2.0**-50
 """Times within this relative distance are one instant."""
 
@@ -164,7 +166,8 @@ class ReferenceRun:
             calm = calm and (place == 0.0 or not network.modes_differ())
             return found
 
-        a = rate(0.0, 0.0)
+        # The right limit: a signal may have a value for the instant alone, as the height at a bounce.
+        a = rate(0.0, min(h, JUST_AFTER) * rate(0.0, 0.0))
         b = rate(h / 2, h / 2 * a)
         c = rate(h / 2, h / 2 * b)
         d = rate(h, h * c)
