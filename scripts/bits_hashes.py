@@ -77,6 +77,31 @@ def rounded_constants() -> Numbers:
         yield name, np.array([function(*map(float, given)) for given in arguments])
 
 
+def linear_algebra() -> Numbers:
+    """Linear equations and matrices times vectors, in batches and one by one."""
+    from casadi import mtimes
+
+    from armblocks.compiler import compile_function
+    from armblocks.equations import TracedFunction, signature
+    from armblocks.equations.linear_solution import linear_solution
+
+    rng = np.random.default_rng(12)
+    works = {"solution": (linear_solution, (2, 3, 7, 20)), "product": (mtimes, (3, 16, 33))}
+    for name, (work, sizes) in works.items():
+        for n in sizes:
+            traced = TracedFunction.trace(
+                name,
+                signature(("A", (n, n)), ("b", (n,))),
+                signature(("x", (n,))),
+                lambda A, b, work=work: [work(A, b)],
+            )
+            kernel = compile_function(traced)
+            A, b = rng.random((ROWS, n, n)) - 0.5, rng.random((ROWS, n)) - 0.5
+            yield f"{name} {n}", kernel(A, b)
+            yield f"{name} {n} of one matrix", kernel(A[0], b)
+            yield f"{name} {n} single", np.array([kernel(*one) for one in zip(A, b)])
+
+
 def robots() -> Numbers:
     """Every function of every robot, and of one with angles that are no quarter turns."""
     import armblocks as ab
@@ -189,6 +214,7 @@ def shipped_diagrams() -> Numbers:
 GROUPS: dict[str, Callable[[], Numbers]] = {
     "elementary functions": elementary_functions,
     "rounded constants": rounded_constants,
+    "linear algebra": linear_algebra,
     "robots": robots,
     "constants": constants,
     "blocks": shipped_blocks,
