@@ -16,7 +16,8 @@ from armblocks.compiler.ir_text import Body
 from armblocks.compiler.opcodes import Opcode
 from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Operation, Tape
-from armblocks.routines.arithmetic import fma
+from armblocks.routines.arithmetic import fma, in_all_lanes
+from armblocks.routines.lanes import LaneArray
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer, Reals
 
@@ -213,8 +214,8 @@ def emit_matrix_product(
                 sums[i] = body.fma(number(first + i * n + j), number(x), sums[i])
         return sums
     module, align = body.module, 8 * body.lanes
-    program = Program()
-    symbol = program.define(matrix_product, inlined=False).symbol
+    program = Program(body.lanes)
+    symbol = program.define(matrix_product, f"matrix_product.{body.lanes}", inlined=False).symbol
     add_program(module, program)
     module.declare("ptr", "llvm.stacksave.p0")
     module.declare("void", "llvm.stackrestore.p0", "ptr")
@@ -226,8 +227,7 @@ def emit_matrix_product(
 
     for k, register in enumerate([*starts, *vector]):
         body.do(f"store {body.real} {number(register)}, ptr {place(k)}, align {align}")
-    sizes = f"i64 {m}, i64 {n}, i64 {body.lanes}"
-    body.do(f"call void @{symbol}(ptr {matrix}, ptr {place(m)}, ptr {memory}, {sizes})")
+    body.do(f"call void @{symbol}(ptr {matrix}, ptr {place(m)}, ptr {memory}, i64 {m}, i64 {n})")
     sums = [body.let(f"load {body.real}, ptr {place(i)}, align {align}") for i in range(m)]
     body.do(f"call void @llvm.stackrestore.p0(ptr {stack})")
     return sums
@@ -239,24 +239,20 @@ def product_shape(tape: Tape, operands: Sequence[int]) -> tuple[int, int]:
     return rows, columns
 
 
-def matrix_product(r: Routine, A: Reals, x: Reals, y: Reals, m: Integer, n: Integer, lanes: Integer) -> None:
-    """``y += A x`` for ``A`` (m, n), row by row in memory; each sum from the left.
-
-    Every lane has its own ``x`` and ``y``: an element's numbers stand side by side, one for each lane.
-    """
+def matrix_product(r: Routine, A: Reals, x: LaneArray, y: LaneArray, m: Integer, n: Integer) -> None:
+    """``y += A x`` in every lane, for ``A`` (m, n), row by row in memory; each sum from the left."""
     row = r.integer(0)
 
     def add_rows(count: int) -> None:
         start = row.value
+        sums = [r.variable(y[start + k]) for k in range(count)]
         lines = [A.after((start + k) * n) for k in range(count)]
-        for lane in r.range(0, lanes):
-            sums = [r.real(y[(start + k) * lanes + lane]) for k in range(count)]
-            for j in r.range(0, n):
-                factor = x[j * lanes + lane]
-                for line, total in zip(lines, sums):
-                    total.value = fma(line[j], factor, total.value)
-            for k, total in enumerate(sums):
-                y[(start + k) * lanes + lane] = total.value
+        for j in r.range(0, n):
+            factor = x[j]
+            for line, total in zip(lines, sums):
+                total.value = fma(in_all_lanes(line[j]), factor, total.value)
+        for k, total in enumerate(sums):
+            y[start + k] = total.value
         row.value = start + count
 
     for count in (ROWS_AT_ONCE, 1):

@@ -28,6 +28,11 @@ def fma(a: NumberT | float, b: NumberT | float, c: NumberT | float) -> NumberT:
     return number.compute(Operation.FMA, a, b, c)
 
 
+def in_all_lanes(a: Real) -> Lanes:
+    """The same double in every lane."""
+    return Lanes(a.writer, a.writer.compute(Kind.LANES, Operation.SPREAD, a.operand))
+
+
 @overload
 def select(condition: Boolean, yes: Integer, no: Integer | int) -> Integer: ...
 @overload

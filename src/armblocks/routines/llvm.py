@@ -338,6 +338,8 @@ class _FunctionText:
             return f"select {self._type(kind)} {texts[0]}, {chosen} {texts[1]}, {chosen} {texts[2]}"
         if operation is Operation.ANY:
             return self._any(texts[0])
+        if operation is Operation.SPREAD:
+            return self._spread(texts[0])
         if operation is Operation.FMA:
             return self._fma(kind, texts)
         if operation in _INTRINSICS:
@@ -350,6 +352,13 @@ class _FunctionText:
             return _CONVERSIONS[operation, kind].format(texts[0])
         table = _OF_TWO[_OF_EACH_LANE.get(kind, kind)]
         return f"{table[operation]} {self._type(kind)} {texts[0]}, {texts[1]}"
+
+    def _spread(self, number: str) -> str:
+        if self.lanes == 1:
+            return f"bitcast double {number} to double"
+        lanes = self._type(Kind.LANES)
+        first = self._name(f"insertelement {lanes} poison, double {number}, i64 0")
+        return f"shufflevector {lanes} {first}, {lanes} poison, <{self.lanes} x i32> zeroinitializer"
 
     def _any(self, mask: str) -> str:
         if self.lanes == 1:

@@ -61,6 +61,8 @@ class Operation(Enum):
     NOT = "not"
     ANY = "any"
     """Whether a mask holds in any lane."""
+    SPREAD = "spread"
+    """A double in all lanes."""
     SELECT = "select"
     """The second operand where the first holds, else the third; a mask chooses in each lane."""
     TO_REAL = "to real"
