@@ -13,7 +13,7 @@ from small_functions import mixed, same_bits, traced
 
 from armblocks.compiler import compile_function
 from armblocks.compiler.batch import emit_batch
-from armblocks.compiler.entry_ir import emit_entry
+from armblocks.compiler.entry_function import emit_entry
 from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.layout import BatchLayout, Layout

@@ -1,6 +1,7 @@
 """Rules that every file of the package keeps, read from its syntax tree."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,6 +27,8 @@ DOORS = {"studio/launch.py": {"socket", "urllib"}}
 """Files that may import one of these, for what they are there for."""
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "manager", "core", "misc", "common"}
 LONGEST_FUNCTION = 80
+CONTROL_FLOW = re.compile(r"\b(br label|br i1|switch i\d+|indirectbr) | = phi |\.(label|branch)\(")
+"""Text of LLVM IR that jumps, branches or merges, and calls that would write it."""
 
 
 def functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
@@ -78,6 +81,13 @@ def test_functions_can_be_read_in_one_sitting(tree: ast.Module) -> None:
         if (lines := (function.end_lineno or 0) - function.lineno + 1) > LONGEST_FUNCTION
     }
     assert long == set()
+
+
+def test_control_flow_of_native_code_is_written_in_the_routine_language() -> None:
+    found = [
+        name for name, path in zip(NAMES, MODULES) if CONTROL_FLOW.search(path.read_text(encoding="utf-8"))
+    ]
+    assert found == ["routines/llvm.py"]
 
 
 def test_files_are_named_for_their_subject() -> None:

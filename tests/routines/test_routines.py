@@ -15,6 +15,7 @@ from tree_interpreter import Interpreter
 from armblocks.compiler.native import load_code
 from armblocks.routines.arithmetic import (
     fma,
+    in_all_lanes,
     inverse_root,
     maximum,
     minimum,
@@ -26,7 +27,7 @@ from armblocks.routines.arithmetic import (
 from armblocks.routines.lanes import LaneArray, Lanes
 from armblocks.routines.llvm import definitions
 from armblocks.routines.routine import UNROLL, Program, Routine, external
-from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
+from armblocks.routines.values import Address, Boolean, Int32, Integer, Integers, Real, Reals
 
 CTYPES = {float: ctypes.c_double, int: ctypes.c_int64, list: ctypes.c_void_p, None: None}
 
@@ -134,12 +135,12 @@ def test_integers_wrap_around_and_divide_toward_zero() -> None:
 def test_lanes_compute_apart_and_share_control_flow(lanes: int) -> None:
     """The larger of ``x`` and its reciprocal, doubled until no lane is below 10 (at most 20 times)."""
 
-    def run(r: Routine, x: LaneArray, limit: Real, out: LaneArray) -> Integer:
-        def larger(r: Routine, a: Lanes) -> Lanes:
+    def run(r: Routine, x: LaneArray, one: Real, out: LaneArray) -> Integer:
+        def larger(r: Routine, a: Lanes, one: Real) -> Lanes:
             known = (a == a) & ~(a != a) & a.ordered | (a > 1.0)
-            return select(known, select(a > 1.0 / a, a, 1.0 / a), 99.0)
+            return select(known, select(a > 1.0 / a, a, in_all_lanes(one) / a), 99.0)
 
-        last = r.variable(r.call(r.program.define(larger, inlined=False), x[0]))
+        last = r.variable(r.call(r.program.define(larger, inlined=False), x[0], one))
         turns = r.integer(0)
         with r.loop() as loop:
             loop.leave_unless((last.value < 10.0).any)
@@ -148,7 +149,7 @@ def test_lanes_compute_apart_and_share_control_flow(lanes: int) -> None:
             turns.value = turns.value + 1
         rows = x.after(turns.value - turns.value + 1)
         out[0], out[1], out[2] = last.value, square_root(abs(-rows[0])), rows[0] - 1.0
-        return turns.value + (limit > 0.0).count()
+        return turns.value + (one > 0.0).count()
 
     first = (3.0, 0.5, math.nan, 0.25, -4.0, 1e9, 7.0, 1.0)[:lanes]
     second = (-4.0, 2.25, -0.0, 16.0, math.inf, 1.0, 9.0, 0.25)[:lanes]
@@ -324,6 +325,65 @@ def test_functions_of_any_number_of_arrays_take_shares_of_the_work() -> None:
     job, out, x = [0, 12], [0.0], [float(k * k) for k in range(13)]
     assert both(run, job, out, x, result=int) == 12
     assert (job, out) == ([18, 11], [sum(x[:12])])
+
+
+def test_fields_of_structures_are_read_by_their_offsets() -> None:
+    """The sum of a vector whose length stands in the upper half of a word, its start in the word before."""
+
+    def run(r: Routine, structure: Address, out: Integers) -> Real:
+        room = r.integer_room(3)
+        for k, value in enumerate((structure.int32(8), structure.int32(12), 7)):
+            room[k] = value
+        r.copy(room, out, 3)
+        numbers = r.address(r.null)
+        with r.when(numbers.value.is_null):
+            numbers.value = structure.address(0)
+        second = numbers.value.after(8)
+        same = second == numbers.value.reals.after(1).start
+        choice = select(same & (numbers.value <= second), numbers.value, r.null)
+        out[3] = (same & (choice != second) & ~choice.is_null).count() + structure.integers.after(1)[0]
+        total = r.real(0.0)
+        for i in r.range(0, room[1]):
+            total.value = total.value + choice.reals[i]
+        return total.value
+
+    program = Program()
+    program.define(run, public=True)
+    text = "\n\n".join(definitions(program).values())
+    code = load_code(("routines test", text), lambda: text)
+    numbers, out = np.array([1.5, 2.0, 4.0]), np.zeros(4, np.int64)
+    word = (2 << 32) + (1 << 32) - 5  # the lower half is -5
+    structure = np.array([numbers.ctypes.data, word])
+    native = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p)(code.address("run"))
+    listed = [0] * 4
+    vector = (numbers.tolist(), 0)
+    assert native(structure.ctypes.data, out.ctypes.data) == 3.5
+    assert Interpreter(program).call("run", ([vector, word], 0), (listed, 0)) == 3.5
+    assert out.tolist() == listed == [-5, 2, 7, word + 1]
+
+
+def test_functions_are_called_by_their_addresses() -> None:
+    """C's ``int`` in and out, and a table of addresses that is filled in after loading."""
+
+    @external
+    def scaled(r: Routine, x: Real, by: Int32) -> Int32: ...
+
+    def run(r: Routine, x: Real, by: Integer) -> Integer:
+        functions = r.filled_in("functions", 2)
+        with r.when(functions[0].is_null):
+            r.return_(r.constant_integer(-1))
+        return r.call(scaled.at(functions.after(1)[0]), x, by.to_int32()).to_integer()
+
+    program = Program()
+    program.define(run, public=True)
+    text = "\n\n".join(definitions(program).values())
+    code = load_code(("routines test", text), lambda: text)
+    native = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double, ctypes.c_int64)(code.address("run"))
+    assert native(2.5, -4) == -1
+    function = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, ctypes.c_int32)(lambda x, by: int(x * by))
+    address = ctypes.cast(function, ctypes.c_void_p).value
+    (ctypes.c_void_p * 2).from_address(code.address("functions"))[:] = [address, address]
+    assert native(2.5, (1 << 32) - 4) == -10
 
 
 def test_null_addresses_and_repeated_declarations() -> None:

@@ -1,7 +1,8 @@
 """Runs the structured form of a routine in plain Python: the second opinion on its back ends.
 
-Memory is lists of numbers; an address is a list and a place in it. What has lanes is a tuple. A jump is an
-exception that the region around it catches.
+Memory is lists of numbers; an address is a list and a place in it, which lies between two numbers where it
+counts halves of them, or a Python function. What has lanes is a tuple. A jump is an exception that the region
+around it catches.
 """
 
 from __future__ import annotations
@@ -57,9 +58,9 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.SQUARE_ROOT: lambda a: math.sqrt(a) if a >= 0.0 else math.nan,
     Operation.FMA: lambda a, b, c: math.fma(a, b, c) if hasattr(math, "fma") else _fma(a, b, c),
     Operation.LESS: lambda a, b: a < b,
-    Operation.LESS_EQUAL: lambda a, b: a <= b,
-    Operation.EQUAL: lambda a, b: a == b,
-    Operation.NOT_EQUAL: lambda a, b: a != b,
+    Operation.LESS_EQUAL: lambda a, b: a[1] <= b[1] if isinstance(a, tuple) else a <= b,
+    Operation.EQUAL: lambda a, b: _same(a, b) if _pointing(a) or _pointing(b) else a == b,
+    Operation.NOT_EQUAL: lambda a, b: not _same(a, b) if _pointing(a) or _pointing(b) else a != b,
     Operation.GREATER: lambda a, b: a > b,
     Operation.GREATER_EQUAL: lambda a, b: a >= b,
     Operation.ORDERED: lambda a, b: a == a and b == b,
@@ -70,9 +71,20 @@ OPERATIONS: dict[Operation, Callable[..., Any]] = {
     Operation.SELECT: lambda condition, a, b: a if condition else b,
     Operation.TO_REAL: float,
     Operation.TO_INTEGER: int,
+    Operation.TO_INT32: lambda a: (a + (1 << 31)) % (1 << 32) - (1 << 31),
     Operation.BITS: lambda a: struct.unpack("<q", struct.pack("<d", a))[0],
     Operation.FROM_BITS: lambda a: struct.unpack("<d", struct.pack("<q", a))[0],
 }
+
+
+def _pointing(value: Any) -> bool:
+    return value is None or isinstance(value, tuple) or callable(value)
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return a[0] is b[0] and a[1] == b[1]
+    return a is b
 
 
 def _fma(a: float, b: float, c: float) -> float:
@@ -116,7 +128,7 @@ class _Call:
             case tree.Constant(kind, value):
                 return (value,) * self.interpreter.program.lanes if kind in LANES else value
             case tree.Local():
-                return self.values.setdefault(operand, ([None], 0))
+                return self.values.setdefault(operand, ([None] * operand.count, 0))
             case tree.Table(_, numbers):
                 return (list(numbers), 0)
             case _:
@@ -130,30 +142,40 @@ class _Call:
         match statement:
             case tree.Compute(result, operation, operands):
                 values = list(map(self.value, operands))
-                if result.kind in LANES:
+                if operation is Operation.SPREAD:
+                    found = (values[0],) * self.interpreter.program.lanes
+                elif result.kind in LANES:
                     found = tuple(OPERATIONS[operation](*lane) for lane in zip(*values, strict=True))
                 else:
                     found = OPERATIONS[operation](*values)
                 self.values[result] = _wrapped(found) if result.kind is Kind.INTEGER else found
-            case tree.Locate(result, base, index, _):
+            case tree.Locate(result, base, index, element):
                 memory, place = self.value(base)
-                self.values[result] = (memory, place + self.value(index))
+                step = self.value(index) / 8 if element is Kind.BYTE else self.value(index)
+                self.values[result] = (memory, place + step)
             case tree.Load(result, address):
                 memory, place = self.value(address)
-                self.values[result] = memory[place]
+                found = memory[int(place)]
+                if result.kind is Kind.INT32:
+                    found = OPERATIONS[Operation.TO_INT32](found >> 32 * (place != int(place)))
+                self.values[result] = found
             case tree.FetchAdd(result, address, value):
                 memory, place = self.value(address)
                 self.values[result] = memory[place]
                 memory[place] = _wrapped(memory[place] + self.value(value))
             case tree.Store(value, address):
                 memory, place = self.value(address)
-                memory[place] = self.value(value)
+                memory[int(place)] = self.value(value)
             case tree.Copy(source, target, size):
                 (given, first), (taken, place) = self.value(source), self.value(target)
                 count = self.value(size) // 8
                 taken[place : place + count] = given[first : first + count]
-            case tree.Call(results, symbol, arguments):
-                found = self.interpreter.call(symbol, *map(self.value, arguments))
+            case tree.Call(results, called, arguments):
+                values = list(map(self.value, arguments))
+                if isinstance(called, str):
+                    found = self.interpreter.call(called, *values)
+                else:
+                    found = self.value(called)(*values)
                 self.values.update(zip(results, found if len(results) > 1 else (found,)))
             case tree.Return(values):
                 found = tuple(map(self.value, values))

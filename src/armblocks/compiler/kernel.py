@@ -167,7 +167,7 @@ class Kernel:
     @cached_property
     def _single(self) -> NativeCode:
         def write() -> str:
-            from armblocks.compiler.entry_ir import emit_entry
+            from armblocks.compiler.entry_function import emit_entry
             from armblocks.compiler.ir_text import Module
             from armblocks.compiler.llvm_ir import emit_function
 

@@ -5,7 +5,9 @@ For those who write native code around compiled equations (an integrator's loop)
     def write() -> str:
         module = Module()
         emit_function(module, tape, "f")      # define internal void @f(ptr in0, …, ptr out0, …)
-        module.add("loop", "define void @loop(…) { … call void @f(ptr %t, ptr %x, ptr %p, ptr %xd) … }")
+        program = Program()                   # armblocks.routines
+        program.define(loop, public=True)     # … r.call(f, t, x, p, xd) …, with f declared as external
+        add_program(module, program)
         return module.text
 
     code = load_code(("loop", tape.digest), write)       # armblocks.compiler.native, with the disk cache

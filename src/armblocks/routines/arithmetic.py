@@ -6,15 +6,8 @@ from collections.abc import Sequence
 from typing import overload
 
 from armblocks.routines.lanes import Lanes, Mask
-from armblocks.routines.tree import Kind, Operation
-from armblocks.routines.values import (
-    Boolean,
-    Integer,
-    NumberT,
-    Real,
-    integer_operand,
-    real_operand,
-)
+from armblocks.routines.tree import Constant, Operation
+from armblocks.routines.values import Address, Boolean, Integer, NumberT, Real, Value
 
 
 def square_root(a: NumberT) -> NumberT:
@@ -30,7 +23,7 @@ def fma(a: NumberT | float, b: NumberT | float, c: NumberT | float) -> NumberT:
 
 def in_all_lanes(a: Real) -> Lanes:
     """The same double in every lane."""
-    return Lanes(a.writer, a.writer.compute(Kind.LANES, Operation.SPREAD, a.operand))
+    return Lanes(a.writer, a.writer.compute(Lanes.kind, Operation.SPREAD, a.operand))
 
 
 @overload
@@ -40,20 +33,21 @@ def select(condition: Boolean, yes: int, no: Integer) -> Integer: ...
 @overload
 def select(condition: Boolean, yes: Real | float, no: Real | float) -> Real: ...
 @overload
+def select(condition: Boolean, yes: Address, no: Address) -> Address: ...
+@overload
 def select(condition: Mask, yes: Lanes | float, no: Lanes | float) -> Lanes: ...
 def select(
-    condition: Boolean | Mask, yes: Real | Lanes | Integer | float, no: Real | Lanes | Integer | float
-) -> Real | Lanes | Integer:
+    condition: Boolean | Mask,
+    yes: Real | Integer | Address | Lanes | float,
+    no: Real | Integer | Address | Lanes | float,
+) -> Real | Integer | Address | Lanes:
     """``yes`` where the condition holds, else ``no``; both are evaluated. Two Python numbers are reals."""
+    known = next((x for x in (yes, no) if isinstance(x, Value)), None)
+    kind = Lanes if isinstance(condition, Mask) else Real if known is None else type(known)
+    number = int if kind is Integer else float
+    operands = (x.operand if isinstance(x, Value) else Constant(kind.kind, number(x)) for x in (yes, no))
     writer = condition.writer
-    if isinstance(condition, Mask):
-        operands = (Lanes.place(x) for x in (yes, no) if not isinstance(x, Real | Integer))
-        return Lanes(writer, writer.compute(Kind.LANES, Operation.SELECT, condition.operand, *operands))
-    if isinstance(yes, Integer) or isinstance(no, Integer):
-        operands = (integer_operand(x if isinstance(x, Integer) else int(_number(x))) for x in (yes, no))
-        return Integer(writer, writer.compute(Kind.INTEGER, Operation.SELECT, condition.operand, *operands))
-    operands = (real_operand(x) for x in (yes, no) if not isinstance(x, Lanes))
-    return Real(writer, writer.compute(Kind.REAL, Operation.SELECT, condition.operand, *operands))
+    return kind(writer, writer.compute(kind.kind, Operation.SELECT, condition.operand, *operands))
 
 
 def minimum(a: Real, b: Real | float) -> Real:
@@ -99,8 +93,3 @@ def inverse_root(a: Real, k: int) -> Real:
         r = 1.0 - a * power
         y = y * polynomial(r, coefficients)
     return y
-
-
-def _number(value: Real | Lanes | Integer | float) -> float:
-    assert not isinstance(value, Real | Lanes | Integer)
-    return value

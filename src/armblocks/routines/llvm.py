@@ -36,7 +36,14 @@ from armblocks.routines.tree import (
     When,
 )
 
-_TYPES = {Kind.REAL: "double", Kind.INTEGER: "i64", Kind.BOOLEAN: "i1", Kind.ADDRESS: "ptr"}
+_TYPES = {
+    Kind.REAL: "double",
+    Kind.INTEGER: "i64",
+    Kind.INT32: "i32",
+    Kind.BYTE: "i8",
+    Kind.BOOLEAN: "i1",
+    Kind.ADDRESS: "ptr",
+}
 _OF_EACH_LANE = {Kind.LANES: Kind.REAL, Kind.MASK: Kind.BOOLEAN}
 
 _TWO_REALS = {
@@ -71,12 +78,24 @@ _TWO_INTEGERS = {
     Operation.GREATER_EQUAL: "icmp sge",
 }
 _TWO_BOOLEANS = {Operation.AND: "and", Operation.OR: "or"}
-_OF_TWO = {Kind.REAL: _TWO_REALS, Kind.INTEGER: _TWO_INTEGERS, Kind.BOOLEAN: _TWO_BOOLEANS}
+_TWO_ADDRESSES = {
+    Operation.EQUAL: "icmp eq",
+    Operation.NOT_EQUAL: "icmp ne",
+    Operation.LESS_EQUAL: "icmp ule",
+}
+_OF_TWO = {
+    Kind.REAL: _TWO_REALS,
+    Kind.INTEGER: _TWO_INTEGERS,
+    Kind.BOOLEAN: _TWO_BOOLEANS,
+    Kind.ADDRESS: _TWO_ADDRESSES,
+}
 _INTRINSICS = {Operation.SQUARE_ROOT: "sqrt", Operation.ABSOLUTE: "fabs"}
 _CONVERSIONS = {
     (Operation.TO_REAL, Kind.INTEGER): "sitofp i64 {} to double",
     (Operation.TO_INTEGER, Kind.REAL): "fptosi double {} to i64",
+    (Operation.TO_INTEGER, Kind.INT32): "sext i32 {} to i64",
     (Operation.TO_INTEGER, Kind.BOOLEAN): "zext i1 {} to i64",
+    (Operation.TO_INT32, Kind.INTEGER): "trunc i64 {} to i32",
     (Operation.BITS, Kind.REAL): "bitcast double {} to i64",
     (Operation.FROM_BITS, Kind.INTEGER): "bitcast i64 {} to double",
 }
@@ -102,6 +121,8 @@ def definitions(program: Program) -> dict[str, str]:
 
 def _table(table: Table) -> str:
     kind = _TYPES[table.element]
+    if table.filled_in:
+        return f"@{table.symbol} = global [{len(table.numbers)} x {kind}] zeroinitializer"
     numbers = ", ".join(f"{kind} {_literal(table.element, number)}" for number in table.numbers)
     # An array without elements has no address of its own.
     numbers = numbers or f"{kind} {_literal(table.element, 0)}"
@@ -181,7 +202,9 @@ class _FunctionText:
         if name is None:  # the first use of a variable; a temporary is named where it is computed
             assert isinstance(operand, Local), "a value is used where it is not valid"
             name = self._names[operand] = f"%x{len(self._slots) + 1}"
-            self._slots.append(f"  {name} = alloca {self._type(operand.kind)}")
+            kind = self._type(operand.kind)
+            kind = kind if operand.count == 1 else f"[{operand.count} x {kind}]"
+            self._slots.append(f"  {name} = alloca {kind}")
         return name
 
     def _new(self, temporary: Temporary, text: str) -> str:
@@ -317,7 +340,8 @@ class _FunctionText:
     def _call(self, call: Call) -> None:
         arguments = ", ".join(f"{self._typed(given)} {self._operand(given)}" for given in call.arguments)
         result = self._result([result.kind for result in call.results])
-        text = f"call {result} @{call.symbol}({arguments})"
+        name = f"@{call.function}" if isinstance(call.function, str) else self._operand(call.function)
+        text = f"call {result} {name}({arguments})"
         if not call.results:
             self._line(text)
         elif len(call.results) == 1:
@@ -331,7 +355,7 @@ class _FunctionText:
         self._lines.append(f"  {text}")
 
     def _operation(self, operation: Operation, operands: Sequence[Operand]) -> str:
-        kind = operands[0].kind if not isinstance(operands[0], Table) else Kind.ADDRESS
+        kind = Kind.ADDRESS if isinstance(operands[0], Local | Table) else operands[0].kind
         texts = [self._operand(operand) for operand in operands]
         if operation is Operation.SELECT:
             chosen = self._typed(operands[1])

@@ -22,16 +22,20 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Concatenate, Generic, ParamSpec, TypeVar, cast, get_args
 
 from armblocks.routines import tree
 from armblocks.routines.lanes import LaneArray, Lanes, Mask
 from armblocks.routines.tree import Constant, Jump, Kind, Local, Mark, Operand, Statement, Table, Temporary
 from armblocks.routines.values import (
+    Address,
+    Addresses,
+    AddressVariable,
     Array,
     Boolean,
     BooleanVariable,
+    Int32,
     Integer,
     Integers,
     IntegerVariable,
@@ -53,17 +57,12 @@ UNROLL = 8
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_KINDS: dict[type, Kind] = {
-    Real: Kind.REAL,
-    Integer: Kind.INTEGER,
-    Boolean: Kind.BOOLEAN,
-    Reals: Kind.ADDRESS,
-    Integers: Kind.ADDRESS,
-    Lanes: Kind.LANES,
-    Mask: Kind.MASK,
-    LaneArray: Kind.ADDRESS,
-}
-_BY_NAME: dict[str, type[Value]] = {kind.__name__: kind for kind in _KINDS}
+_TYPES: tuple[type[Value], ...] = (
+    *(Real, Integer, Boolean, Reals, Integers),
+    *(Lanes, Mask, LaneArray),
+    *(Int32, Address, Addresses),
+)
+_BY_NAME: dict[str, type[Value]] = {kind.__name__: kind for kind in _TYPES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +72,11 @@ class Function(Generic[P, R]):
     symbol: str
     write: Callable[Concatenate[Routine, P], R]
     results: tuple[type[Value], ...]
+    address: Operand | None = None
+
+    def at(self, address: Address) -> Function[P, R]:
+        """The function at an address, with this one's parameters and results."""
+        return replace(self, address=address.operand)
 
 
 def external(write: Callable[Concatenate[Routine, P], R], symbol: str = "") -> Function[P, R]:
@@ -110,11 +114,11 @@ class Program:
             if write.__code__.co_flags & inspect.CO_VARARGS:
                 _, kind = types.popitem()
                 types |= dict.fromkeys(rest, kind)
-            parameters = {name: Temporary(_KINDS[kind], name) for name, kind in types.items()}
+            parameters = {name: Temporary(kind.kind, name) for name, kind in types.items()}
             function = tree.Function(
                 symbol,
                 tuple(parameters.values()),
-                tuple(_KINDS[kind] for kind in _results(write)),
+                tuple(kind.kind for kind in _results(write)),
                 public=public,
                 inlined=inlined,
                 distinct=distinct,
@@ -134,6 +138,10 @@ class Program:
     def reals(self, symbol: str, numbers: Sequence[float]) -> Table:
         """A table of constant doubles."""
         return self._table(Table(symbol, tuple(numbers), Kind.REAL))
+
+    def filled_in(self, symbol: str, count: int) -> Table:
+        """A table of addresses, null until whoever loads the program writes them there."""
+        return self._table(Table(symbol, (None,) * count, Kind.ADDRESS, filled_in=True))
 
     def _table(self, table: Table) -> Table:
         self.parts.setdefault(table.symbol, table)
@@ -207,6 +215,16 @@ class Routine(Writer):
         variable.value = initial
         return variable
 
+    def address(self, initial: Address) -> AddressVariable:
+        """A variable address. It gets its initial value here, at every passage."""
+        variable = AddressVariable(self, Local(Kind.ADDRESS))
+        variable.value = initial
+        return variable
+
+    def integer_room(self, count: int) -> Integers:
+        """Room for integers, one after the other, as long as the function runs."""
+        return Integers(self, Local(Kind.INTEGER, count))
+
     def constant(self, value: float) -> Real:
         """A constant double, for where a Python number does not do."""
         return Real(self, real_operand(value))
@@ -226,6 +244,15 @@ class Routine(Writer):
     def integers(self, symbol: str, numbers: Sequence[int]) -> Integers:
         """A table of integer constants of the program."""
         return Integers(self, self.program.integers(symbol, numbers))
+
+    def filled_in(self, symbol: str, count: int) -> Addresses:
+        """A table of addresses of the program: see :meth:`Program.filled_in`."""
+        return Addresses(self, self.program.filled_in(symbol, count))
+
+    @property
+    def null(self) -> Address:
+        """The address that points nowhere."""
+        return Address(self, Constant(Kind.ADDRESS, None))
 
     @property
     def nowhere(self) -> Reals:
@@ -321,8 +348,9 @@ class Routine(Writer):
             bound = inspect.signature(function.write).bind(self, *args, **kwargs)
             values = tuple(bound.arguments.values())[1:]
         operands = tuple(self._argument(value) for value in values)
-        found = tuple(Temporary(_KINDS[kind]) for kind in function.results)
-        self.statements.append(tree.Call(found, function.symbol, operands))
+        found = tuple(Temporary(kind.kind) for kind in function.results)
+        called = function.symbol if function.address is None else function.address
+        self.statements.append(tree.Call(found, called, operands))
         results = tuple(kind(self, operand) for kind, operand in zip(function.results, found))
         return cast("R", results if len(results) > 1 else results[0] if results else None)
 

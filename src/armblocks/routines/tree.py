@@ -13,7 +13,7 @@ from enum import Enum
 
 
 class Kind(Enum):
-    """Type of a value; ``ADDRESS`` points to doubles or to integers, as the operation that uses it says."""
+    """Type of a value; what an ``ADDRESS`` points to is said by the operation that uses it."""
 
     REAL = "real"
     """An IEEE double."""
@@ -21,6 +21,10 @@ class Kind(Enum):
     """A 64-bit signed integer; sums and products wrap around."""
     BOOLEAN = "boolean"
     ADDRESS = "address"
+    INT32 = "int32"
+    """A 32-bit signed integer: in memory, and between functions."""
+    BYTE = "byte"
+    """In memory alone: addresses count by bytes."""
     LANES = "lanes"
     """A double in each lane: so many as the program has."""
     MASK = "mask"
@@ -68,7 +72,9 @@ class Operation(Enum):
     TO_REAL = "to real"
     """An integer as a double."""
     TO_INTEGER = "to integer"
-    """A double cut to an integer, a Boolean as 0 or 1."""
+    """A double cut to an integer, a 32-bit integer, a Boolean as 0 or 1."""
+    TO_INT32 = "to int32"
+    """The lower half of an integer."""
     BITS = "bits"
     """The bits of a double as an integer."""
     FROM_BITS = "from bits"
@@ -85,9 +91,10 @@ class Temporary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Local:
-    """A variable of a function; as an operand it is the address of the variable."""
+    """A variable of a function, or so many one after the other; as an operand it is their address."""
 
     kind: Kind
+    count: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +107,15 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Constants of the program under a symbol; as an operand it is their address."""
+    """Constants of the program under a symbol; as an operand it is their address.
+
+    ``filled_in``: not constants, but values that whoever loads the program writes there.
+    """
 
     symbol: str
-    numbers: tuple[float, ...] | tuple[int, ...]
+    numbers: tuple[float, ...] | tuple[int, ...] | tuple[None, ...]
     element: Kind
+    filled_in: bool = False
 
 
 Operand = Temporary | Local | Constant | Table
@@ -172,10 +183,10 @@ class Copy:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Call a function of the program, or one that the program only names."""
+    """Call a function of the program, one that the program only names, or the one at an address."""
 
     results: tuple[Temporary, ...]
-    symbol: str
+    function: str | Operand
     arguments: tuple[Operand, ...]
 
 

@@ -65,6 +65,7 @@ class Value:
     """A value of a routine, at the place where it was computed."""
 
     __slots__ = ("operand", "writer")
+    kind: ClassVar[Kind]
 
     def __init__(self, writer: Writer, operand: Operand) -> None:
         self.writer = writer
@@ -83,7 +84,6 @@ class Condition(Value):
     """A condition of a routine, or one in each lane."""
 
     __slots__ = ()
-    kind: ClassVar[Kind]
 
     def __and__(self, other: Self) -> Self:
         return self._with(Operation.AND, other)
@@ -118,7 +118,6 @@ class Number(Value, Generic[ConditionT]):
     ``!=``."""
 
     __slots__ = ()
-    kind: ClassVar[Kind]
     condition: ClassVar[type[Condition]]
     """What comparisons give."""
 
@@ -223,6 +222,9 @@ class Integer(Value):
     """A 64-bit signed integer. Sums and products wrap around; ``//`` cuts toward zero, and ``>>`` keeps the
     sign."""
 
+    __slots__ = ()
+    kind = Kind.INTEGER
+
     def __add__(self, other: Integer | int) -> Integer:
         return self._integer(Operation.ADD, self, other)
 
@@ -288,6 +290,10 @@ class Integer(Value):
         """As a double, to nearest."""
         return Real(self.writer, self.writer.compute(Kind.REAL, Operation.TO_REAL, self.operand))
 
+    def to_int32(self) -> Int32:
+        """The lower half."""
+        return Int32(self.writer, self.writer.compute(Kind.INT32, Operation.TO_INT32, self.operand))
+
     def from_bits(self) -> Real:
         """The double that has these bits."""
         return Real(self.writer, self.writer.compute(Kind.REAL, Operation.FROM_BITS, self.operand))
@@ -301,6 +307,69 @@ class Integer(Value):
         return Boolean(self.writer, found)
 
 
+class Int32(Value):
+    """A 32-bit signed integer, as functions written in C take and give it."""
+
+    __slots__ = ()
+    kind = Kind.INT32
+
+    def to_integer(self) -> Integer:
+        """As 64 bits."""
+        return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
+
+
+class Address(Value):
+    """An address, such as that of a structure, whose fields are read by their offsets in bytes."""
+
+    __slots__ = ()
+    kind = Kind.ADDRESS
+
+    def __eq__(self, other: Address) -> Boolean:  # type: ignore[override]
+        return self._compare(Operation.EQUAL, other)
+
+    def __ne__(self, other: Address) -> Boolean:  # type: ignore[override]
+        return self._compare(Operation.NOT_EQUAL, other)
+
+    def __le__(self, other: Address) -> Boolean:
+        return self._compare(Operation.LESS_EQUAL, other)
+
+    __hash__ = object.__hash__
+
+    @property
+    def is_null(self) -> Boolean:
+        """Whether it points nowhere."""
+        return self == Address(self.writer, Constant(Kind.ADDRESS, None))
+
+    def after(self, offset: int) -> Address:
+        """The address so many bytes further."""
+        place = self.writer.locate(self.operand, Constant(Kind.INTEGER, offset), Kind.BYTE)
+        return Address(self.writer, place)
+
+    def address(self, offset: int) -> Address:
+        """The address in a field."""
+        return Address(self.writer, self._field(offset, Kind.ADDRESS))
+
+    def int32(self, offset: int) -> Integer:
+        """The 32-bit integer in a field."""
+        return Int32(self.writer, self._field(offset, Kind.INT32)).to_integer()
+
+    @property
+    def reals(self) -> Reals:
+        """Doubles from here on."""
+        return Reals(self.writer, self.operand)
+
+    @property
+    def integers(self) -> Integers:
+        """Integers from here on."""
+        return Integers(self.writer, self.operand)
+
+    def _field(self, offset: int, kind: Kind) -> Temporary:
+        return self.writer.load(self.after(offset).operand, kind)
+
+    def _compare(self, operation: Operation, other: Address) -> Boolean:
+        return Boolean(self.writer, self.writer.compute(Kind.BOOLEAN, operation, self.operand, other.operand))
+
+
 class Array(Value):
     """Numbers of one kind that follow one another in memory, from an address on.
 
@@ -309,7 +378,8 @@ class Array(Value):
     """
 
     __slots__ = ("first",)
-    element: Kind
+    kind = Kind.ADDRESS
+    element: ClassVar[Kind]
 
     def __init__(self, writer: Writer, operand: Operand, first: int = 0) -> None:
         super().__init__(writer, operand)
@@ -325,6 +395,11 @@ class Array(Value):
         else:
             place = integer_operand(index + self.first if self.first else index)
         return self.writer.locate(self.operand, place, self.element)
+
+    @property
+    def start(self) -> Address:
+        """Address of the first element."""
+        return Address(self.writer, self.address(0))
 
 
 class NumberArray(Array, Generic[NumberT]):
@@ -385,6 +460,20 @@ class Integers(Array):
     def acquire(self, index: Integer | int) -> Integer:
         """Read an element that other threads write; all that they wrote before it is seen from here on."""
         return Integer(self.writer, self.writer.load(self.address(index), Kind.INTEGER, acquiring=True))
+
+
+class Addresses(Array):
+    """Addresses in memory; ``v[i]`` reads one. No bounds are checked."""
+
+    __slots__ = ()
+    element = Kind.ADDRESS
+
+    def __getitem__(self, index: Integer | int) -> Address:
+        return Address(self.writer, self.writer.load(self.address(index), Kind.ADDRESS))
+
+    def after(self, index: int) -> Addresses:
+        """The addresses from an element on."""
+        return Addresses(self.writer, self.operand, self.first + index)
 
 
 class Variable:
@@ -456,6 +545,21 @@ class BooleanVariable(Variable):
     @value.setter
     def value(self, value: Boolean | bool) -> None:
         self.writer.store(boolean_operand(value), self.local)
+
+
+class AddressVariable(Variable):
+    """A variable address."""
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> Address:
+        """The value that was written last."""
+        return Address(self.writer, self.writer.load(self.local, Kind.ADDRESS))
+
+    @value.setter
+    def value(self, value: Address) -> None:
+        self.writer.store(value.operand, self.local)
 
 
 def real_operand(value: Real | float) -> Operand:

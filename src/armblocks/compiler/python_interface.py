@@ -1,0 +1,83 @@
+"""Functions of CPython and NumPy that the builtin of a kernel calls.
+
+The process gives the address of each under its name in :data:`~armblocks.compiler.entry.PLACES`. Objects are
+addresses.
+"""
+
+from __future__ import annotations
+
+from armblocks.routines.routine import Routine, external
+from armblocks.routines.values import Address, Addresses, Int32, Integer, Integers
+
+
+@external
+def reference(r: Routine, item: Address) -> None:
+    """``Py_IncRef``: take another reference, unless the address is null."""
+
+
+@external
+def release(r: Routine, item: Address) -> None:
+    """``Py_DecRef``: give a reference back, unless the address is null."""
+
+
+@external
+def new_array(
+    r: Routine,
+    kind: Address,
+    descr: Address,
+    axes: Int32,
+    dimensions: Integers,
+    strides: Address,
+    data: Address,
+    flags: Int32,
+    base: Address,
+) -> Address:
+    """``PyArray_NewFromDescr``; it takes over a reference to ``descr``. Null with an error set."""
+    raise NotImplementedError
+
+
+@external
+def new_scalar(r: Routine, data: Address, descr: Address, base: Address) -> Address:
+    """``PyArray_Scalar``: the NumPy number at an address. Null with an error set."""
+    raise NotImplementedError
+
+
+@external
+def new_tuple(r: Routine, length: Integer) -> Address:
+    """``PyTuple_New``. Null with an error set."""
+    raise NotImplementedError
+
+
+@external
+def set_item(r: Routine, items: Address, index: Integer, item: Address) -> Int32:
+    """``PyTuple_SetItem``; it takes over the reference to the item."""
+    raise NotImplementedError
+
+
+@external
+def tuple_size(r: Routine, items: Address) -> Integer:
+    """``PyTuple_Size``."""
+    raise NotImplementedError
+
+
+@external
+def tuple_item(r: Routine, items: Address, index: Integer) -> Address:
+    """``PyTuple_GetItem``, without a reference of its own."""
+    raise NotImplementedError
+
+
+@external
+def vectorcall(r: Routine, function: Address, values: Addresses, count: Integer, names: Address) -> Address:
+    """``PyObject_Vectorcall``. Null with an error set."""
+    raise NotImplementedError
+
+
+@external
+def save_thread(r: Routine) -> Address:
+    """``PyEval_SaveThread``: let other threads of Python run."""
+    raise NotImplementedError
+
+
+@external
+def restore_thread(r: Routine, state: Address) -> None:
+    """``PyEval_RestoreThread``: go on in the interpreter."""
