@@ -153,7 +153,8 @@ def without_single_rows(found: Signals, wanted: Signals, beside: Signals) -> dic
         wrong = rows_of(rows, values) > 1e-6 * (1.0 + np.abs(values).max(initial=0.0))
         for k in np.flatnonzero(wrong):
             alone = not wrong[max(k - 1, 0) : k].any() and not wrong[k + 1 : k + 2].any()
-            near = beside[name][2 * k : 2 * k + 2]
+            # What the signal is just before and after, and at this very instant alone.
+            near = np.concatenate([beside[name][2 * k : 2 * k + 2], values[k : k + 1]])
             margin = 1e-5 * (1.0 + np.abs(near).max(initial=0.0))
             within = (rows[k] >= near.min(axis=0) - margin) & (rows[k] <= near.max(axis=0) + margin)
             if alone and within.all():
