@@ -11,8 +11,9 @@ from armblocks.compiler.native import load_code
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.linear_equations import LinearEquations, LinearSpace
 from armblocks.routines.llvm import definitions
+from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Integer, Real, Reals
+from armblocks.routines.values import Integer, Real
 
 GAMMA, H = 0.25, 0.1
 

@@ -26,8 +26,9 @@ from armblocks.routines.arithmetic import (
 )
 from armblocks.routines.lanes import LaneArray, Lanes
 from armblocks.routines.llvm import definitions
+from armblocks.routines.memory import Address, Integers, Reals
 from armblocks.routines.routine import UNROLL, Program, Routine, external
-from armblocks.routines.values import Address, Boolean, Int32, Integer, Integers, Real, Reals
+from armblocks.routines.values import Boolean, Int32, Integer, Real
 
 CTYPES = {float: ctypes.c_double, int: ctypes.c_int64, list: ctypes.c_void_p, None: None}
 
@@ -337,7 +338,7 @@ def test_fields_of_structures_are_read_by_their_offsets() -> None:
         r.copy(room, out, 3)
         numbers = r.address(r.null)
         with r.when(numbers.value.is_null):
-            numbers.value = structure.address(0)
+            numbers.value = structure.pointer(0)
         second = numbers.value.after(8)
         same = second == numbers.value.reals.after(1).start
         choice = select(same & (numbers.value <= second), numbers.value, r.null)

@@ -10,8 +10,9 @@ from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
 from armblocks.routines.arithmetic import select
+from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine, external
-from armblocks.routines.values import Boolean, Integer, Integers, Reals
+from armblocks.routines.values import Boolean, Integer
 
 __all__ = ["BatchLayout", "Layout", "emit_batch", "emit_shares"]
 

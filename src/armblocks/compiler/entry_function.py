@@ -30,16 +30,9 @@ from armblocks.compiler.program_text import add_program
 from armblocks.compiler.result_memory import LARGE
 from armblocks.equations import Shape, Signature
 from armblocks.routines.arithmetic import select
+from armblocks.routines.memory import Address, Addresses, AddressVariable, Integers, Reals
 from armblocks.routines.routine import Function, Part, Program, Routine, external
-from armblocks.routines.values import (
-    Address,
-    Addresses,
-    AddressVariable,
-    Boolean,
-    Integer,
-    Integers,
-    Reals,
-)
+from armblocks.routines.values import Boolean, Integer
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -63,7 +56,7 @@ def emit_entry(module: Module, inputs: Signature, outputs: Signature, evaluate: 
             call = _Call(_PythonObjects(r, served), values, names, evaluate)
             call.serve(count, [slot.shape for slot in inputs], [slot.shape for slot in outputs])
         function = _known_function(r, python.vectorcall)
-        return r.call(function, owner.address(OWNER_CALL), values, count, names)
+        return r.call(function, owner.pointer(OWNER_CALL), values, count, names)
 
     program = Program()
     program.define(entry, ENTRY, public=True)
@@ -100,8 +93,8 @@ class _PythonObjects:
 
     def require_array(self, value: Address, flags: int) -> None:
         """Go on only for a plain array of float64 that has all of the flags."""
-        self.require(value.address(OBJECT_TYPE) == self.known("array_type"))
-        numbers = value.address(ARRAY_DESCR) == self.known("float64")
+        self.require(value.pointer(OBJECT_TYPE) == self.known("array_type"))
+        numbers = value.pointer(ARRAY_DESCR) == self.known("float64")
         self.require(numbers & ((value.int32(ARRAY_FLAGS) & flags) == flags))
 
     def require_extents(self, dimensions: Integers, shape: Shape) -> None:
@@ -178,10 +171,10 @@ class _Call:
         axes = value.int32(ARRAY_NDIM) - len(shape)
         batched = axes == 1
         self.require(batched | (axes == 0))
-        dimensions = value.address(ARRAY_DIMENSIONS).integers
+        dimensions = value.pointer(ARRAY_DIMENSIONS).integers
         self.objects.require_extents(dimensions.after(axes), shape)
         return _Argument(
-            data=value.address(ARRAY_DATA).reals,
+            data=value.pointer(ARRAY_DATA).reals,
             samples=select(batched, dimensions[0], _NO_SAMPLES),
             size=math.prod(shape),
         )
@@ -190,12 +183,12 @@ class _Call:
         """A float, or an array of one number for each sample."""
         r, objects = self.r, self.objects
         data, samples = r.address(value.after(FLOAT_VALUE)), r.integer(_NO_SAMPLES)
-        kind = value.address(OBJECT_TYPE)
+        kind = value.pointer(OBJECT_TYPE)
         with r.unless((kind == objects.known("float_type")) | (kind == objects.known("numpy_float_type"))):
             objects.require_array(value, C_CONTIGUOUS_AND_ALIGNED)
             self.require(value.int32(ARRAY_NDIM) == 1)
-            data.value = value.address(ARRAY_DATA)
-            samples.value = value.address(ARRAY_DIMENSIONS).integers[0]
+            data.value = value.pointer(ARRAY_DATA)
+            samples.value = value.pointer(ARRAY_DIMENSIONS).integers[0]
         return _Argument(data=data.value.reals, samples=samples.value, size=1)
 
     def common_samples(self, arguments: Sequence[_Argument]) -> Integer:
@@ -267,7 +260,7 @@ class _Call:
         )
         self.succeed(array)
         result.made.value = array
-        result.target.value = array.address(ARRAY_DATA)
+        result.target.value = array.pointer(ARRAY_DATA)
 
     def given_or_new(
         self,
@@ -289,7 +282,7 @@ class _Call:
             self._require_as_new(out, shape, samples, batched, arguments)
             self.objects.call(python.reference, out)
             result.made.value = out
-            result.target.value = out.address(ARRAY_DATA)
+            result.target.value = out.pointer(ARRAY_DATA)
         self.owned.append(result.made)
         return result
 
@@ -306,12 +299,12 @@ class _Call:
         objects.require_array(out, C_CONTIGUOUS_AND_ALIGNED | WRITEABLE)
         own = batched.count()
         self.require(out.int32(ARRAY_NDIM) == own + len(shape))
-        dimensions = out.address(ARRAY_DIMENSIONS).integers
+        dimensions = out.pointer(ARRAY_DIMENSIONS).integers
         if shape:
             objects.require_extents(dimensions.after(own), shape)
         with r.when(batched):
             self.require(dimensions[0] == samples)
-        data = out.address(ARRAY_DATA).reals
+        data = out.pointer(ARRAY_DATA).reals
         end = data.after(select(batched, samples, 1) * math.prod(shape))
         for argument in arguments:
             count = select(argument.samples == _NO_SAMPLES, 1, argument.samples)

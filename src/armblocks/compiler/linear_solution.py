@@ -18,8 +18,9 @@ from armblocks.compiler.tape import Tape
 from armblocks.routines.arithmetic import select
 from armblocks.routines.full_matrix import FullMatrix
 from armblocks.routines.lanes import LaneArray, Lanes, Mask
+from armblocks.routines.memory import NumberArray
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Integer, NumberArray
+from armblocks.routines.values import Integer
 
 SHORTEST_BLOCK = 8
 """From so many neighbours on, inputs are copied in one go: LLVM compares loads and stores pair by pair."""

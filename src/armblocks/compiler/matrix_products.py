@@ -18,8 +18,9 @@ from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Operation, Tape
 from armblocks.routines.arithmetic import fma, in_all_lanes
 from armblocks.routines.lanes import LaneArray
+from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Integer, Reals
+from armblocks.routines.values import Integer
 
 SHORTEST_ROW = 8
 """Fewer products of a row stay as they are."""

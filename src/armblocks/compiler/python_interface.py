@@ -6,8 +6,9 @@ addresses.
 
 from __future__ import annotations
 
+from armblocks.routines.memory import Address, Addresses, Integers
 from armblocks.routines.routine import Routine, external
-from armblocks.routines.values import Address, Addresses, Int32, Integer, Integers
+from armblocks.routines.values import Int32, Integer
 
 
 @external

@@ -10,7 +10,8 @@ from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.frame import SAME_ABOVE, Frame
 from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.routines.arithmetic import select
-from armblocks.routines.values import Boolean, Real, RealVariable
+from armblocks.routines.memory import RealVariable
+from armblocks.routines.values import Boolean, Real
 
 
 class Clocks:

@@ -17,8 +17,9 @@ import sys
 from armblocks.integration import system_functions
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Workspace
 from armblocks.routines.arithmetic import fma, select
+from armblocks.routines.memory import Integers, Reals, RealVariable
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals, RealVariable
+from armblocks.routines.values import Boolean, Integer, Real
 
 SAME_ABOVE = 1.0 + 2.0**-50
 MOST_PIECES = 256

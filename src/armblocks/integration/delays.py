@@ -10,7 +10,8 @@ from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.workspace import Count, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
-from armblocks.routines.values import Boolean, Real, RealVariable
+from armblocks.routines.memory import RealVariable
+from armblocks.routines.values import Boolean, Real
 
 HIGH_ORDER = 7
 """From this order on, steps are too long for one quintic of the history."""

@@ -7,7 +7,7 @@ from armblocks.integration.delay_history import DelayHistory
 from armblocks.integration.frame import Frame
 from armblocks.integration.implicit_equations import define_solve
 from armblocks.integration.linear_equations import LinearSpace
-from armblocks.routines.values import Reals
+from armblocks.routines.memory import Reals
 
 
 class Evaluation:

@@ -16,7 +16,8 @@ from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.workspace import Count, Scalar, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
-from armblocks.routines.values import Boolean, Integer, IntegerVariable, Real, Reals, RealVariable
+from armblocks.routines.memory import IntegerVariable, Reals, RealVariable
+from armblocks.routines.values import Boolean, Integer, Real
 
 TURNS_TOGETHER, MOST_TURNS = 8, 32
 """Modes are changed together in so many turns, and one for each mode; in all, so many turns for each mode."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Status, Workspace
+from armblocks.routines.memory import Integers, Reals, RealVariable
 from armblocks.routines.routine import Part, Routine
-from armblocks.routines.values import Boolean, Integer, Integers, Reals, RealVariable
+from armblocks.routines.values import Boolean, Integer
 
 SAME_ABOVE, SAME_BELOW = 1.0 + 2.0**-50, 1.0 - 2.0**-50
 """Two times within these factors of one another are the same instant."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from armblocks.integration import system_functions
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Workspace
 from armblocks.routines.arithmetic import fma, maximum, minimum, select, sign
+from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
+from armblocks.routines.values import Boolean, Integer, Real
 
 MOST_AT_ONCE = 1000
 """Events that may follow one another closely, at distances that do not shrink."""

@@ -14,8 +14,9 @@ from armblocks.integration.pivoted_elimination import PivotedElimination
 from armblocks.integration.system_functions import residual, residual_jacobian
 from armblocks.integration.workspace import Workspace
 from armblocks.routines.arithmetic import fma, select
+from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Function, Program, Routine
-from armblocks.routines.values import Real, Reals
+from armblocks.routines.values import Real
 
 ITERATIONS = 50
 HALVINGS = 12

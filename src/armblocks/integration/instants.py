@@ -29,8 +29,9 @@ from armblocks.integration.records import Records
 from armblocks.integration.segments import choose_first_step
 from armblocks.integration.workspace import Count, Scalar, Stage, Status
 from armblocks.routines.arithmetic import fma, maximum, minimum, select
+from armblocks.routines.memory import RealVariable
 from armblocks.routines.routine import Part, Stages
-from armblocks.routines.values import Boolean, Real, RealVariable
+from armblocks.routines.values import Boolean, Real
 
 
 class Instants(Course):

@@ -15,8 +15,9 @@ from collections.abc import Generator, Sequence
 from armblocks.integration.elimination_plan import Elimination, JacobianPattern, plan_elimination
 from armblocks.integration.pivoted_elimination import PivotedElimination
 from armblocks.routines.arithmetic import fma, maximum, select, square_root
+from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Function, Program, Routine
-from armblocks.routines.values import Boolean, Integer, Integers, Real, Reals
+from armblocks.routines.values import Boolean, Integer, Real
 
 SMALL = 8
 """Up to this size the whole matrix is eliminated with pivoting: nothing else is faster."""

@@ -29,8 +29,9 @@ from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.segments import Segments
 from armblocks.integration.step_control import Steps
 from armblocks.integration.workspace import Count, LoopSizes, Stage, Status, Workspace
+from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Integer, Integers, Reals
+from armblocks.routines.values import Integer
 
 POINTERS = 12
 """Arrays among the arguments of the loop; the number of steps comes after them."""

@@ -23,7 +23,8 @@ from armblocks.routines.arithmetic import (
     select,
     square_root,
 )
-from armblocks.routines.values import Boolean, Integer, Real, Reals
+from armblocks.routines.memory import Reals
+from armblocks.routines.values import Boolean, Integer, Real
 
 Index = Integer | int
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from armblocks.routines.arithmetic import select
 from armblocks.routines.full_matrix import FullMatrix
+from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Routine
-from armblocks.routines.values import Integer, Integers, Real, Reals
+from armblocks.routines.values import Integer, Real
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,8 @@ from armblocks.integration.frame import Frame, copy
 from armblocks.integration.method import Method
 from armblocks.integration.workspace import Count, Stage
 from armblocks.routines.arithmetic import select
-from armblocks.routines.values import Boolean, Integer, Real, Reals
+from armblocks.routines.memory import Reals
+from armblocks.routines.values import Boolean, Integer, Real
 
 
 class Records:

@@ -18,7 +18,8 @@ from armblocks.integration.method import Index, Method
 from armblocks.integration.rosenbrock_tableau import RosenbrockTableau
 from armblocks.integration.workspace import Count
 from armblocks.routines.arithmetic import fma, maximum, select
-from armblocks.routines.values import Real, Reals
+from armblocks.routines.memory import Reals
+from armblocks.routines.values import Real
 
 STABLE_BELOW, STABLE_CHECKS = 2.0, 16
 """A step that times the fastest rate is less than this is one that an explicit method could take as well; so

@@ -7,8 +7,8 @@ results.
 
 from __future__ import annotations
 
+from armblocks.routines.memory import Reals
 from armblocks.routines.routine import Routine, external
-from armblocks.routines.values import Reals
 
 
 @external

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import overload
 
 from armblocks.routines.lanes import Lanes, Mask
+from armblocks.routines.memory import Address
 from armblocks.routines.tree import Constant, Operation
-from armblocks.routines.values import Address, Boolean, Integer, NumberT, Real, Value
+from armblocks.routines.values import Boolean, Integer, NumberT, Real, Value
 
 
 def square_root(a: NumberT) -> NumberT:

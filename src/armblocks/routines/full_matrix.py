@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Generic
 
 from armblocks.routines.arithmetic import fma
+from armblocks.routines.memory import NumberArray
 from armblocks.routines.routine import Routine
-from armblocks.routines.values import Integer, NumberArray, NumberT
+from armblocks.routines.values import Integer, NumberT
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,8 +6,9 @@ the control flow are common to all lanes. What is to differ between them is chos
 
 from __future__ import annotations
 
+from armblocks.routines.memory import NumberArray
 from armblocks.routines.tree import Kind, Operation
-from armblocks.routines.values import Boolean, Condition, Number, NumberArray
+from armblocks.routines.values import Boolean, Condition, Number
 
 
 class Mask(Condition):

@@ -27,23 +27,25 @@ from typing import Concatenate, Generic, ParamSpec, TypeVar, cast, get_args
 
 from armblocks.routines import tree
 from armblocks.routines.lanes import LaneArray, Lanes, Mask
-from armblocks.routines.tree import Constant, Jump, Kind, Local, Mark, Operand, Statement, Table, Temporary
-from armblocks.routines.values import (
+from armblocks.routines.memory import (
     Address,
     Addresses,
     AddressVariable,
     Array,
-    Boolean,
     BooleanVariable,
-    Int32,
-    Integer,
     Integers,
     IntegerVariable,
-    NumberT,
     NumberVariable,
-    Real,
     Reals,
     RealVariable,
+)
+from armblocks.routines.tree import Constant, Jump, Kind, Local, Mark, Operand, Statement, Table, Temporary
+from armblocks.routines.values import (
+    Boolean,
+    Int32,
+    Integer,
+    NumberT,
+    Real,
     Value,
     Writer,
     boolean_operand,
