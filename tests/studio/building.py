@@ -77,6 +77,22 @@ def wait_until(page: Page, true: Callable[[], bool]) -> None:
     raise AssertionError("it did not come")
 
 
+def copied_text(page: Page, part: str) -> str:
+    """Wait until the clipboard holds a text with this part; the text.
+
+    Playwright's ``wait_for_function`` awaits no promise, and ``readText`` gives one.
+    """
+    text = ""
+
+    def is_there() -> bool:
+        nonlocal text
+        text = page.evaluate("navigator.clipboard.readText()")
+        return part in text
+
+    wait_until(page, is_there)
+    return text
+
+
 def expect_focus_inside(found: Locator) -> None:
     """Wait until the keys go to a dialog: it takes the focus shortly after it is shown."""
     expect(found.locator(":focus")).to_have_count(1)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from firefox_bidi import firefox_path
-from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
 from interruptible import start_interruptible
 
@@ -32,6 +32,12 @@ FLAGS = [
 ]
 TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
 """Nobody is shown around; pages that are no page of the studio (about:blank) have nothing to keep that in."""
+NOT_DRAWN = """
+for (const draw of ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawElementsInstanced'])
+    WebGL2RenderingContext.prototype[draw] = () => {}
+"""
+"""Three-dimensional scenes are set up and not drawn: to fill pixels in software takes longer than all the rest.
+Shaders are compiled as always, and an error in one is reported on the console."""
 PATIENCE_MS = 180_000
 """A busy machine may take long; nothing here waits when it need not."""
 expect.set_options(timeout=PATIENCE_MS)
@@ -91,34 +97,66 @@ class Studio:
             self.process.stdout.close()
 
 
+class SharedBrowser:
+    """One browser for all journeys of a process: a start takes seconds."""
+
+    def __init__(self) -> None:
+        self._browser: Browser | None = None
+        self._stack = ExitStack()
+
+    def opened(self) -> Browser:
+        """The browser, started where it is not running."""
+        if self._browser is None:
+            path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+            assert path is not None, f"install one of {', '.join(BROWSERS)} (apt-get install chromium)"
+            playwright = self._stack.enter_context(sync_playwright())
+            self._browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
+            self._stack.callback(self._browser.close)
+        return self._browser
+
+    def close(self) -> None:
+        """End it and its event loop."""
+        self._browser = None
+        self._stack.close()
+
+
+SHARED_BROWSER = SharedBrowser()
+
+
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for each module: while it is there, its event loop keeps other tests from running one of theirs."""
-    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    assert path is not None, f"no browser: install one of {', '.join(BROWSERS)} (apt-get install chromium)"
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=FLAGS)
-        yield browser
-        browser.close()
+def browser() -> Browser:
+    """Each test or file makes contexts of its own in it."""
+    return SHARED_BROWSER.opened()
 
 
-@pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Studio]:
-    started = Studio(tmp_path)
-    yield started
-    started.stop()
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Generator[None]:
+    """Close the browser before a file that needs none: where Playwright's event loop runs, no other can."""
+    try:
+        return (yield)
+    finally:
+        fixtures = getattr(nextitem, "fixturenames", ())
+        if nextitem is None or (nextitem.path != item.path and "browser" not in fixtures):
+            SHARED_BROWSER.close()
+
+
+def new_context(browser: Browser) -> BrowserContext:
+    """Pages that share nothing with others."""
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
+    )
+    context.set_default_timeout(PATIENCE_MS)
+    for script in (TOUR_SEEN, NOT_DRAWN):
+        context.add_init_script(script)
+    return context
 
 
 @contextmanager
 def watched(browser: Browser, link: str) -> Generator[Page]:
     """A page, logged in, that must say no error on its console; it shows the first example."""
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
-    )
+    context = new_context(browser)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
-    context.add_init_script(TOUR_SEEN)
     page = context.new_page()
-    page.set_default_timeout(PATIENCE_MS)
     faults: list[str] = []
 
     def hear(message: ConsoleMessage) -> None:
@@ -132,13 +170,6 @@ def watched(browser: Browser, link: str) -> Generator[Page]:
     yield page
     context.close()
     assert not faults
-
-
-@pytest.fixture
-def page(browser: Browser, studio: Studio) -> Iterator[Page]:
-    """The page of a studio of its own."""
-    with watched(browser, studio.link) as page:
-        yield page
 
 
 @pytest.fixture(scope="module")
@@ -155,6 +186,12 @@ def open_studio(browser: Browser) -> Iterator[Callable[..., Page]]:
             return stack.enter_context(watched(browser, started.link))
 
         yield opened
+
+
+@pytest.hookimpl(trylast=True)  # after the fixtures of a run that was broken off
+def pytest_sessionfinish() -> None:
+    """Leave no browser behind, wherever the tests ended."""
+    SHARED_BROWSER.close()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

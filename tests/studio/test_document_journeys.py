@@ -12,7 +12,7 @@ from accessibility import axe
 from building import wait_until
 from playwright.sync_api import Browser, BrowserContext, Page, WebSocketRoute, expect
 
-from conftest import PATIENCE_MS, TOUR_SEEN, Studio
+from conftest import Studio, new_context
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +26,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[Studio]]:
 
 @pytest.fixture(scope="module")
 def context(browser: Browser, server: list[Studio]) -> Iterator[BrowserContext]:
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="light")
-    context.set_default_timeout(PATIENCE_MS)
-    context.add_init_script(TOUR_SEEN)
+    context = new_context(browser)
     first = context.new_page()
     first.goto(server[0].link)
     first.locator(".react-flow__node").first.wait_for()

@@ -143,6 +143,7 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
             if role == "textbox":
                 page.keyboard.press("Control+a")
             page.keyboard.type(text)
+            expect(field).to_have_value(text)
         tab_to(page, dialog.get_by_role("button", name="OK", exact=True))
         page.keyboard.press("Enter")
         expect(dialog).to_be_hidden()

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
-from conftest import PATIENCE_MS, TOUR_SEEN, Studio
+from conftest import Studio, new_context
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP is of POSIX")
 GONE_MS = 1000 * float(os.environ.get("ARMBLOCKS_LINE_GONE", "0"))
@@ -26,11 +26,7 @@ class Session:
     def __init__(self, browser: Browser, folder: Path) -> None:
         self.folder = folder
         self.studio = Studio(folder, "van_der_pol_pid")  # an arm drawn in software takes long
-        self.context = browser.new_context(
-            viewport={"width": 1280, "height": 720}, color_scheme="light", reduced_motion="reduce"
-        )
-        self.context.set_default_timeout(PATIENCE_MS)
-        self.context.add_init_script(TOUR_SEEN)
+        self.context = new_context(browser)
         self.page = self.context.new_page()
         self.faults: list[str] = []
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import base64
+import io
 import sys
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from building import wait_until
+from matplotlib.image import imread
 from playwright.sync_api import Browser, ConsoleMessage, FrameLocator, Page, Route, expect
 
 import armblocks as ab
 from armblocks.errors import InputError
-from conftest import PATIENCE_MS
+from conftest import NOT_DRAWN, PATIENCE_MS
 
 ORIGIN = "http://notebook.test/"
 SHOW = """async ([esm, states]) => {
@@ -40,7 +43,7 @@ SHOW = """async ([esm, states]) => {
 SYNCED = ("title", "height", "time", "_page", "_shown", "_frame")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def notebook(browser: Browser) -> Iterator[Page]:
     """An empty page whose every request but the first fails, and that must say no error."""
     page = browser.new_page(viewport={"width": 1280, "height": 1100}, color_scheme="light")
@@ -78,11 +81,17 @@ def show(page: Page, *widgets: object) -> list[FrameLocator]:
     return [page.frame_locator("iframe").nth(k) for k in range(len(widgets))]
 
 
+def picture(data: bytes) -> np.ndarray:
+    """The colours of all pixels of a PNG file, (N, 4)."""
+    return imread(io.BytesIO(data), format="png").reshape(-1, 4)
+
+
 def said(point: np.ndarray) -> str:
     return "   ".join(f"{axis} {value:.3f}" for axis, value in zip("xyz", point, strict=True)) + " m"
 
 
 def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None:
+    notebook.add_init_script(NOT_DRAWN)
     diagram = ab.load_diagram("kr180model")
     result = ab.simulate(diagram)
     tool = result["plot/poses"][:, -1, :3, 3]
@@ -115,7 +124,10 @@ def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
     (arm,) = show(notebook, ab.robot_widget(puma, q))
     expect(arm.get_by_label("Position of the tool")).to_have_text(said(puma.fkine(q)[:3, 3]))
     expect(arm.get_by_role("slider", name="Time")).to_have_count(0)
-    expect(arm.locator(".robot canvas")).to_be_visible()
+    canvas = arm.locator(".robot canvas")
+    expect(canvas).to_be_visible()
+    # Journeys through the studio do not draw the arm (NOT_DRAWN); here it is drawn, in many shades.
+    wait_until(notebook, lambda: len(np.unique(picture(canvas.screenshot()), axis=0)) > 500)
     page = arm.locator("html")
     notebook.emulate_media(color_scheme="dark")
     expect(page).to_have_attribute("data-mantine-color-scheme", "dark")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from accessibility import axe
-from building import wait_until
+from building import copied_text, wait_until
 from playwright.sync_api import Locator, Page, expect
 
 from armblocks.blocks import BLOCKS
@@ -176,7 +176,7 @@ def test_copies_keep_led_wires_and_what_is_inside(sheet: Page) -> None:
     sheet.keyboard.press("Control+g")
     expect(block(sheet, "Subsystem")).to_have_class(re.compile("selected"))
     sheet.keyboard.press("Control+c")
-    sheet.wait_for_function("navigator.clipboard.readText().then((text) => text.includes('\"diagram\"'))")
+    copied_text(sheet, '"diagram"')
     sheet.keyboard.press("Control+v")
     expect(block(sheet, "Subsystem 2")).to_have_class(re.compile("selected"))
     sheet.keyboard.press("Enter")

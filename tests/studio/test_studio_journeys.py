@@ -10,7 +10,7 @@ from typing import Literal
 
 import pytest
 from accessibility import axe
-from building import add, block, drag_from_library, new_diagram, play_slowly, run, wire
+from building import add, block, copied_text, drag_from_library, new_diagram, play_slowly, run, wire
 from playwright.sync_api import Page, expect
 
 import armblocks as ab
@@ -172,8 +172,7 @@ def test_two_pages_show_the_same_document(open_studio: Callable[..., Page], tmp_
 def test_copied_blocks_travel_as_text(page: Page) -> None:
     block(page, "PID").click()
     page.keyboard.press("Control+c")
-    page.wait_for_function("navigator.clipboard.readText().then((text) => text.includes('\"blocks\"'))")
-    assert list(json.loads(page.evaluate("navigator.clipboard.readText()"))["blocks"]) == ["PID"]
+    assert list(json.loads(copied_text(page, '"blocks"'))["blocks"]) == ["PID"]
     page.keyboard.press("Control+v")
     expect(block(page, "PID 2")).to_be_visible()
 
