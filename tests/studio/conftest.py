@@ -36,7 +36,7 @@ NOT_DRAWN = """
 for (const draw of ['drawArrays', 'drawElements', 'drawArraysInstanced', 'drawElementsInstanced'])
     WebGL2RenderingContext.prototype[draw] = () => {}
 """
-"""Three-dimensional scenes are set up and not drawn: to fill pixels in software takes longer than all the rest.
+"""Three-dimensional scenes are set up and not drawn: to fill pixels in software takes longer than the rest.
 Shaders are compiled as always, and an error in one is reported on the console."""
 PATIENCE_MS = 180_000
 """A busy machine may take long; nothing here waits when it need not."""
