@@ -1,9 +1,10 @@
 """LLVM IR as text: a module that collects definitions, and the body of one function over one or more lanes.
 
-Text is written directly, because building IR objects costs many times the work of printing them. A
-:class:`Body` hides the number of lanes: ``body.add(a, b)`` is ``fadd double`` or ``fadd <8 x double>``. No
-fast-math flag is ever set and ``fma`` only stands where it was asked for, so the same operations give the
-same bits at every number of lanes.
+A body is straight-line code; what loops or branches is a routine (:mod:`armblocks.routines`). Text is written
+directly, because building IR objects costs many times the work of printing them. A :class:`Body` hides the
+number of lanes: ``body.add(a, b)`` is ``fadd double`` or ``fadd <8 x double>``. No fast-math flag is ever set
+and ``fma`` only stands where it was asked for, so the same operations give the same bits at every number of
+lanes.
 """
 
 from __future__ import annotations
