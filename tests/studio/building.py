@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 from playwright.sync_api import Locator, Page, expect
 
 from conftest import PATIENCE_MS
 
-MOST_PANS = 50
+UPPERMOST = """(element) => {
+    const { x, y, width, height } = element.getBoundingClientRect()
+    return document.elementFromPoint(x + width / 2, y + height / 2) === element
+}"""
 
 
 def block(page: Page, name: str) -> Locator:
@@ -57,13 +61,25 @@ def wire(page: Page, source: str, target: str) -> None:
         assert box is not None
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
-    page.mouse.move(*middle(source))
+    def is_free(port: str) -> bool:
+        """Whether the mouse would meet the handle: it lies on the sheet and nothing lies on it."""
+        return handle(port).evaluate(UPPERMOST)
+
+    if not (is_free(source) and is_free(target)):  # the sheet has panned while earlier wires were drawn
+        page.get_by_role("button", name="Fit View").click()
+        wait_until(page, lambda: is_free(source) and is_free(target))
+    x, y = middle(source)
+    page.mouse.move(x, y)
     page.mouse.down()
+    page.mouse.move(x + 4, y, steps=2)
+    expect(handle(source)).to_have_class(re.compile(r"\bconnectingfrom\b"))
     reached = handle(target).and_(page.locator(".connectingto"))
-    for _ in range(MOST_PANS):
+
+    def reach() -> bool:
         page.mouse.move(*middle(target), steps=5)
-        if reached.count():
-            break
+        return reached.count() == 1
+
+    wait_until(page, reach)
     page.mouse.up()
 
 
@@ -96,6 +112,16 @@ def copied_text(page: Page, part: str) -> str:
 def expect_focus_inside(found: Locator) -> None:
     """Wait until the keys go to a dialog: it takes the focus shortly after it is shown."""
     expect(found.locator(":focus")).to_have_count(1)
+
+
+def expect_no_faults(page: Page) -> None:
+    """Wait until the check of the drawing finds nothing; the error says what it finds."""
+    faults = page.locator(".block .fault")
+    try:
+        expect(faults).to_have_count(0)
+    except AssertionError as error:
+        found = faults.evaluate_all("(icons) => icons.map((icon) => icon.ariaLabel)")
+        raise AssertionError(f"faults are shown: {found}") from error
 
 
 def play_slowly(page: Page) -> None:

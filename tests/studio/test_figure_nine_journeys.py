@@ -8,7 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from building import add, block, drag_from_library, expect_focus_inside, new_diagram, run, wire
+from building import (
+    add,
+    block,
+    drag_from_library,
+    expect_focus_inside,
+    expect_no_faults,
+    new_diagram,
+    run,
+    wire,
+)
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
@@ -105,7 +114,7 @@ def test_with_the_mouse(page: Page, folder: Path) -> None:
     for count, (source, target) in enumerate(WIRES, 1):
         wire(page, source, target)
         expect(page.locator(".react-flow__edge")).to_have_count(count)
-    expect(page.locator(".block .fault")).to_have_count(0)
+    expect_no_faults(page)
     run(page)
     save_and_compare(page, folder / "by mouse.json")
 
@@ -164,6 +173,6 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
         tab_to(page, page.get_by_role("button", name="Connect", exact=True))
         page.keyboard.press("Enter")
         expect(page.locator(".react-flow__edge")).to_have_count(count)
-    expect(page.locator(".block .fault")).to_have_count(0)
+    expect_no_faults(page)
     run(page)
     save_and_compare(page, folder / "by keyboard.json")
