@@ -1,4 +1,7 @@
-"""Linear systems against laws, closed forms and python-control."""
+"""Linear systems against laws, closed forms and python-control.
+
+Tests import python-control when they run: that takes seconds, and every process of the tests reads this file.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -93,6 +95,8 @@ def test_at_a_zero_the_system_matrix_loses_rank(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_zeros_without_a_direct_way_are_the_finite_ones_of_python_control(seed: int) -> None:
+    import control
+
     system = random_system(seed, 6, 2, 2)
     strict = LinearSystem(system.A, system.B, system.C, np.zeros((2, 2)))
     assert len(strict.zeros()) == 4  # C B is invertible
@@ -181,6 +185,8 @@ LOOPS = {
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_margins_are_those_of_python_control(name: str) -> None:
+    import control
+
     loop = LOOPS[name]
     found = loop.margins()
     peer = control.stability_margins(loop.to_control(), returnall=True)
@@ -228,6 +234,8 @@ def test_a_step_response_is_the_closed_form() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("dt", [0.0, 0.05])
 def test_responses_are_those_of_python_control(seed: int, dt: float) -> None:
+    import control
+
     system = random_system(seed, dt=dt)
     step = system.step_response(4.0)
     peer = control.step_response(system.to_control(), step.time)

@@ -39,7 +39,9 @@ ROBOT = Robot(
     ),
 )
 
-pytestmark = pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+KINDS = list(BLOCKS.values())
+each_kind = pytest.mark.parametrize("kind", KINDS, ids=BLOCKS)
+"""For laws that take long; those that take next to no time go through all blocks in one test."""
 
 
 def make(kind: type[Block], **values: object) -> Block:
@@ -95,52 +97,59 @@ def numbers(
     return [np.asarray(value) for value in function.call([np.asarray(point) for point in points])]
 
 
-def test_it_says_what_it_is(kind: type[Block]) -> None:
-    assert kind.summary().endswith((".", "…"))
-    assert "\n" not in kind.summary()
-    assert kind.family
-    assert kind.title
-    assert BLOCKS[kind.type_name()] is kind
+def test_it_says_what_it_is() -> None:
+    for kind in KINDS:
+        assert kind.summary().endswith((".", "…")), kind
+        assert "\n" not in kind.summary(), kind
+        assert kind.family, kind
+        assert kind.title, kind
+        assert BLOCKS[kind.type_name()] is kind
 
 
-def test_it_is_imported_by_its_name(kind: type[Block]) -> None:
-    assert kind.type_name() in blocks.__all__
-    assert getattr(blocks, kind.type_name()) is kind
+def test_it_is_imported_by_its_name() -> None:
+    for kind in KINDS:
+        assert kind.type_name() in blocks.__all__
+        assert getattr(blocks, kind.type_name()) is kind
 
 
-def test_it_is_final_and_frozen(kind: type[Block]) -> None:
+def test_it_is_final_and_frozen() -> None:
     # Between a kind and Block stands at most what several kinds of one file have in common.
-    (base,) = kind.__bases__
-    assert base is Block or (base.__bases__ == (Block,) and base not in BLOCKS.values())
-    assert kind.__subclasses__() == []
-    block = make(kind)
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        block.anything = 1  # pyright: ignore[reportAttributeAccessIssue]
+    for kind in KINDS:
+        (base,) = kind.__bases__
+        assert base is Block or (base.__bases__ == (Block,) and base not in KINDS), kind
+        assert kind.__subclasses__() == []
+        block = make(kind)
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            block.anything = 1  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def test_it_is_a_value(kind: type[Block]) -> None:
-    one, other = make(kind), make(kind)
-    assert one == other
-    assert hash(one) == hash(other)
-    assert dataclasses.replace(one) == one
+def test_it_is_a_value() -> None:
+    for kind in KINDS:
+        one, other = make(kind), make(kind)
+        assert one == other
+        assert hash(one) == hash(other)
+        assert dataclasses.replace(one) == one
 
 
-def test_its_ports_and_parameters_are_documented(kind: type[Block]) -> None:
-    block = make(kind)
-    for ports in (block.input_ports(), (*block.output_ports(), *block.record_ports())):
-        names = [port.name for port in ports]
-        assert len(names) == len(set(names))
-        assert all(port.doc and not set(port.name) & set("/. ") for port in ports)
-    assert all(rule.doc for rule in kind.parameters())
-    assert all(port.shape is not None for port in block.record_ports())
+def test_its_ports_and_parameters_are_documented() -> None:
+    for kind in KINDS:
+        block = make(kind)
+        for ports in (block.input_ports(), (*block.output_ports(), *block.record_ports())):
+            names = [port.name for port in ports]
+            assert len(names) == len(set(names)), kind
+            assert all(port.doc and not set(port.name) & set("/. ") for port in ports), kind
+        assert all(rule.doc for rule in kind.parameters()), kind
+        assert all(port.shape is not None for port in block.record_ports()), kind
 
 
-def test_its_parameters_survive_being_read_and_given_again(kind: type[Block]) -> None:
-    block = make(kind)
-    values = {rule.name: block.parameter_value(rule.name) for rule in kind.parameters()}
-    assert kind(**values) == block
+def test_its_parameters_survive_being_read_and_given_again() -> None:
+    for kind in KINDS:
+        block = make(kind)
+        values = {rule.name: block.parameter_value(rule.name) for rule in kind.parameters()}
+        assert kind(**values) == block
 
 
+@each_kind
 def test_its_equations_have_the_shapes_that_it_infers(kind: type[Block]) -> None:
     block = make(kind)
     tried = list(fitting_shapes(block))
@@ -162,6 +171,7 @@ def test_its_equations_have_the_shapes_that_it_infers(kind: type[Block]) -> None
         assert traced == {name: inferred[name] for name in inferred if name not in block.time_derivatives}
 
 
+@each_kind
 def test_its_equations_are_pure_and_read_tunable_parameters_from_p_only(kind: type[Block]) -> None:
     block = make(kind)
     other = make(
@@ -181,6 +191,7 @@ def test_its_equations_are_pure_and_read_tunable_parameters_from_p_only(kind: ty
                 assert np.array_equal(one, two, equal_nan=True)
 
 
+@each_kind
 def test_its_start_values_fit_its_states(kind: type[Block]) -> None:
     block = make(kind)
     slots = list(tunable_slots(block))
@@ -194,6 +205,7 @@ def test_its_start_values_fit_its_states(kind: type[Block]) -> None:
             assert state.doc
 
 
+@each_kind
 def test_every_choice_has_equations(kind: type[Block]) -> None:
     for rule in kind.parameters():
         for choice in rule.choices:
@@ -204,15 +216,16 @@ def test_every_choice_has_equations(kind: type[Block]) -> None:
                 assert any(all(np.isfinite(value).all() for value in values) for values in tried)
 
 
-def test_its_views_show_signals_that_exist(kind: type[Block]) -> None:
-    block = make(kind)
-    known = {port.name for port in (*block.input_ports(), *block.output_ports(), *block.record_ports())}
-    for view in block.views():
-        assert view.signals
-        assert set(view.signals) <= known
-        assert not view.labels or len(view.labels) == len(view.signals)
+def test_its_views_show_signals_that_exist() -> None:
+    for block in map(make, KINDS):
+        ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
+        for view in block.views():
+            assert view.signals, block
+            assert set(view.signals) <= {port.name for port in ports}, block
+            assert not view.labels or len(view.labels) == len(view.signals), block
 
 
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind.output_rates])
 def test_outputs_that_are_said_to_be_rates_are_rates(
     kind: type[Block], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,7 +247,7 @@ def test_outputs_that_are_said_to_be_rates_are_rates(
         assert signals["derivative/y"] == pytest.approx(signals[f"block/{rate}"], rel=1e-13)
 
 
-def test_the_shape_of_a_default_is_the_shape_of_its_symbol(kind: type[Block]) -> None:
-    block = make(kind)
-    for slot in tunable_slots(block):
-        assert slot.shape == shape_of(block.parameter_value(slot.name))
+def test_the_shape_of_a_default_is_the_shape_of_its_symbol() -> None:
+    for block in map(make, KINDS):
+        for slot in tunable_slots(block):
+            assert slot.shape == shape_of(block.parameter_value(slot.name)), block

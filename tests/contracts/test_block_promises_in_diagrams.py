@@ -19,10 +19,8 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.block_examples import example_block
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
 
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning"),
-    pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS),
-]
+pytestmark = pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
+each_kind = pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
 
 STOP_TIME = 2.0
 SI_UNIT = re.compile(
@@ -40,13 +38,15 @@ def changed(rule: Parameter, value: object) -> np.ndarray:
     )
 
 
-def test_its_units_are_those_of_si(kind: type[Block]) -> None:
-    block = example_block(kind)
-    ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
-    for unit in (*(port.unit for port in ports), *(rule.unit for rule in kind.parameters())):
-        assert not unit or SI_UNIT.fullmatch(unit), unit
+def test_its_units_are_those_of_si() -> None:
+    for kind in BLOCKS.values():
+        block = example_block(kind)
+        ports = (*block.input_ports(), *block.output_ports(), *block.record_ports())
+        for unit in (*(port.unit for port in ports), *(rule.unit for rule in kind.parameters())):
+            assert not unit or SI_UNIT.fullmatch(unit), (kind, unit)
 
 
+@each_kind
 def test_its_example_survives_a_file(kind: type[Block]) -> None:
     diagram = ab.block_example(kind)
     data = diagram_to_bytes(diagram, load_robot)
@@ -55,6 +55,7 @@ def test_its_example_survives_a_file(kind: type[Block]) -> None:
     assert diagram_to_bytes(again, load_robot) == data
 
 
+@each_kind
 def test_a_retuned_run_is_that_of_the_diagram_built_with_the_values(kind: type[Block]) -> None:
     diagram = ab.block_example(kind)
     block = diagram.blocks[diagram.name]
@@ -107,6 +108,7 @@ def wrong_values(rule: Parameter) -> Iterator[object]:
         yield 1
 
 
+@each_kind
 def test_a_wrong_value_is_refused_by_the_parameters_name(kind: type[Block]) -> None:
     block = example_block(kind)
     for rule in kind.parameters():
