@@ -10,12 +10,27 @@ import pytest
 from hybrid_systems import bouncing_ball, loop_of_cosine, relay_oscillator, sampled_loop, stick_slip
 from small_systems import oscillator, van_der_pol_pid
 
+from armblocks.blocks import Constant, EnabledSubsystem, Outport, SecondOrderIntegrator
+from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, InputError
 from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import RunState, simulate
 
+
+def event_right_after_the_start() -> Diagram:
+    """A mass is pushed until its height, at first 0, is above 0: then a subsystem takes the push away."""
+    inside = DiagramBuilder("inside")
+    inside.add("push", Outport(port=1, initial=1.0), inside.add("none", Constant(value=0.0)))
+    builder = DiagramBuilder("pushed")
+    mass = builder.add("mass", SecondOrderIntegrator())
+    switch = builder.add("switch", EnabledSubsystem(diagram=inside.build()), mass["x"])
+    builder.connect(switch, mass["u"])
+    return builder.build()
+
+
 SYSTEMS = {
+    "pushed": compile_system(trace_diagram(event_right_after_the_start())),
     "van_der_pol": compile_system(van_der_pol_pid()),
     "ball": compile_system(bouncing_ball(0.9)),
     "sampled": compile_system(sampled_loop(0.3)),

@@ -107,6 +107,7 @@ class NativeIntegrator:
         checkpoint: Checkpoint | None = None,
         watch_stiffness: bool = False,
         stop: float | None = None,
+        span: float | None = None,
     ) -> Integration:
         """A run from ``start`` to ``stop``, ready for its first step.
 
@@ -117,7 +118,8 @@ class NativeIntegrator:
         method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
         ``checkpoint`` the run goes on from there, as the run that left it would have. With
         ``watch_stiffness`` it pauses, :attr:`Integration.wants_other`, where a method for stiff systems, or
-        an explicit one again, does better. Nothing is checked.
+        an explicit one again, does better. ``span`` s: about how long the run is, beside which events near the
+        time 0 are told apart (default: ``stop``). Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -139,7 +141,7 @@ class NativeIntegrator:
         run.reals[Scalar.RTOL] = rtol
         run.reals[Scalar.ATOL] = atol
         run.reals[Scalar.MAX_STEP] = max_step
-        run.reals[Scalar.SPAN] = stop
+        run.reals[Scalar.SPAN] = stop if span is None else span
         run.reals[Scalar.PAUSE] = np.inf
         run.reals[Scalar.HALT] = np.inf
         run.watch(max(1, int(run.counts[Count.WATCHING])) if watch_stiffness else 0)

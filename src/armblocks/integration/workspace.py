@@ -48,7 +48,7 @@ class Scalar(IntEnum):
     LAST_EVENT = 7
     """When the last event was, of whatever guard."""
     SPAN = 8
-    """Events are told apart beside ``max(time, 1e-6 SPAN)``: the time at which the run ends."""
+    """Events are told apart beside ``max(time, 1e-6 SPAN)``: about the length of the run."""
     SCAN = 9
     """How far apart the guards are evaluated next, at most; as far as they have proved to be smooth."""
     PAUSE = 10

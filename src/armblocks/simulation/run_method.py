@@ -14,7 +14,7 @@ from armblocks.integration.native_integrator import Checkpoint, Integration, Nat
 from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.first_guess import first_guess
-from armblocks.simulation.plan import Plan
+from armblocks.simulation.plan import DEFAULT_INSTANTS, Plan
 from armblocks.simulation.run_state import RunState, settings_text
 
 Array = NDArray[np.float64]
@@ -87,6 +87,8 @@ class RunMethod:
             checkpoint=checkpoint,
             watch_stiffness=plan.stiff is not None,
             stop=plan.instants.stop,
+            # Not the stop time: what a shorter run ends with is the same to the bit.
+            span=DEFAULT_INSTANTS * plan.instants.sample_time,
         )
 
     def change(self, integration: Integration) -> Integration:
