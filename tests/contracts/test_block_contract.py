@@ -23,6 +23,8 @@ from armblocks.diagram import (
 from armblocks.diagram.block_equations import SlotKind, natural, spread, tunable_slots
 from armblocks.equations import Slot
 from armblocks.errors import InputError
+from armblocks.face.block_examples import block_example
+from armblocks.integration.system import compile_system
 from armblocks.robot import Robot, serial_chain, standard_dh
 from armblocks.spatial import Transform
 
@@ -251,3 +253,24 @@ def test_the_shape_of_a_default_is_the_shape_of_its_symbol() -> None:
     for block in map(make, KINDS):
         for slot in tunable_slots(block):
             assert slot.shape == shape_of(block.parameter_value(slot.name)), block
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in BLOCKS.values() if kind.breakpoints is not Block.breakpoints]
+)
+def test_at_a_breakpoint_signals_are_what_they_are_just_after(kind: type[Block]) -> None:
+    """The instant and the condition of the outputs are one number, whatever the parameters are rounded to.
+
+    A run goes on from a breakpoint with the values there, and a sensitivity takes the jump from them.
+    """
+    system = compile_system(trace_diagram(block_example(kind)))
+    random, near = np.random.default_rng(3), 2.0**-46
+    x, z, w = (np.zeros((4, slots.size)) for slots in (system.states, system.discrete, system.algebraic))
+    for _ in range(40):
+        p = system.parameter_values * random.uniform(0.9, 1.1, system.parameter_values.shape)
+        instants = system.breakpoints(p)
+        for t in instants[np.isfinite(instants) & (instants > 0.0)]:
+            times = np.array([np.nextafter(t, 0.0), t * (1.0 - near), t, t * (1.0 + near)])
+            before, earlier, at, after = system.evaluate_signals(times, x, z, w, p).T
+            np.testing.assert_allclose(before, earlier, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(at, after, rtol=1e-9, atol=1e-9)

@@ -69,12 +69,12 @@ class Trapezoidal(Block):
         return dict.fromkeys(("q", "qd", "qdd"), parameters_shape(self, "q0", "qf"))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        T, speed = p["tmax"], p["cruise"] / p["tmax"]
-        ramp = T - 1.0 / speed
+        ramp, end, T = self.breakpoints(p)
         now = fmin(fmax(t, 0.0), T)
         left = T - now
+        speed = p["cruise"] / T
         rise, way = speed / ramp, p["qf"] - p["q0"]
-        first, last = now < ramp, left < ramp
+        first, last = now < ramp, now >= end
         share = if_else(first, rise * now * now / 2.0, speed * (now - ramp / 2.0))
         share = if_else(last, 1.0 - rise * left * left / 2.0, share)
         moving = logic_and(t >= 0.0, t < T)
@@ -86,8 +86,8 @@ class Trapezoidal(Block):
         }
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
-        ramp = p["tmax"] * (1.0 - 1.0 / p["cruise"])
-        return ramp, p["tmax"] - ramp, p["tmax"]
+        end = p["tmax"] / p["cruise"]
+        return p["tmax"] - end, end, p["tmax"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,9 +146,11 @@ class MultiSegment(Block):
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        points, blend, corners = p["points"], p["blend"], self._corners(p)
-        now = fmin(t, corners[-1] + blend / 2.0)
-        ramps = [_rounded_ramp(now, corner, blend) for corner in corners]
+        points, blend, instants = p["points"], p["blend"], self.breakpoints(p)
+        now = fmin(t, instants[-1])
+        ramps = [
+            _rounded_ramp(now, begin, end, blend) for begin, end in zip(instants[::2], instants[1::2])
+        ]
         n = points.shape[1]
         q, qd, qdd = points[0, :].T, SX.zeros(n), SX.zeros(n)
         for k in range(points.shape[0] - 1):
@@ -159,14 +161,10 @@ class MultiSegment(Block):
         return {"q": q, "qd": qd, "qdd": qdd}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
-        half = p["blend"] / 2.0
-        return tuple(instant for corner in self._corners(p) for instant in (corner - half, corner + half))
-
-    def _corners(self, p: Signals) -> list[SX]:
-        corners = [p["blend"] / 2.0]
+        starts = [SX(0.0)]
         for k in range(p["durations"].numel()):
-            corners.append(corners[-1] + p["durations"][k])
-        return corners
+            starts.append(starts[-1] + p["durations"][k])
+        return tuple(instant for start in starts for instant in (start, start + p["blend"]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,8 +205,7 @@ class CTraj(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self.profile == "lspb":
-            steady = {"q0": SX(0.0), "qf": SX(1.0), "tmax": p["tmax"], "cruise": SX(1.5)}
-            s = Trapezoidal().outputs(t, {}, {}, steady)["q"]
+            s = Trapezoidal().outputs(t, {}, {}, self._way(p))["q"]
         else:
             s = Quintic(q0=SX(0.0), qf=SX(1.0), tmax=p["tmax"]).at(t).q
         T0, T1 = u["T0"], u["T1"]
@@ -217,8 +214,12 @@ class CTraj(Block):
         return {"T": pose(R, T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3])), "s": s}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
-        ramps = (p["tmax"] / 3.0, 2.0 * p["tmax"] / 3.0) if self.profile == "lspb" else ()
-        return *ramps, p["tmax"]
+        return Trapezoidal().breakpoints(self._way(p)) if self.profile == "lspb" else (p["tmax"],)
+
+    @staticmethod
+    def _way(p: Signals) -> Signals:
+        """The parameters of s as a trapezoidal profile."""
+        return {"q0": SX(0.0), "qf": SX(1.0), "tmax": p["tmax"], "cruise": SX(1.5)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,10 +255,9 @@ class CirclePath(Block):
         return {"y": p["centre"] + p["radius"] * vertcat(cos(angle), sin(angle), 0.0)}
 
 
-def _rounded_ramp(t: SX, corner: SX, blend: SX) -> tuple[SX, SX, SX]:
-    """A ramp from ``corner`` on whose slope rises from 0 to 1 within blend / 2 of it; its two derivatives."""
-    since = t - corner
-    rising = fmin(fmax(since + blend / 2.0, 0.0), blend)
-    within = logic_and(since >= -blend / 2.0, since < blend / 2.0)
-    value = rising * rising / (2.0 * blend) + fmax(since - blend / 2.0, 0.0)
+def _rounded_ramp(t: SX, begin: SX, end: SX, blend: SX) -> tuple[SX, SX, SX]:
+    """A ramp whose slope rises from 0 to 1 between two instants, ``blend`` apart; its two derivatives."""
+    rising = fmin(fmax(t - begin, 0.0), blend)
+    within = logic_and(t >= begin, t < end)
+    value = rising * rising / (2.0 * blend) + fmax(t - end, 0.0)
     return value, rising / blend, if_else(within, 1.0 / blend, 0.0)
