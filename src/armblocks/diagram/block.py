@@ -378,7 +378,11 @@ class Block(ABC):
         return {}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
-        """Instants (s) at which an output or a derivative of it jumps, as far as parameters tell."""
+        """Instants (s) at which an output or a derivative of it jumps, as far as parameters tell.
+
+        At such an instant ``outputs`` gives what follows: its condition ``t >= instant`` has the expression
+        that stands here, because another one may be rounded to another time.
+        """
         return ()
 
 
