@@ -49,8 +49,8 @@ from armblocks.diagram import Diagram
 __all__ = ["EndlessEventsError", "Network", "ReferenceRun", "UnsupportedError", "run_reference"]
 
 MOST_TURNS = 100
-JUST_AFTER = 1e-10
-"""s"""
+JUST_AFTER = 1e-12
+"""s; the error of the first stage of a step is so long times its derivative."""
 SAME = 2.0**-50
 """Times within this relative distance are one instant."""
 
