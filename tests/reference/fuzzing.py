@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 import re
+import signal
 import time
 import traceback
 from collections import Counter
@@ -56,7 +57,7 @@ def judged(recipe: Recipe, laws: Sequence[str]) -> Found:
 
 
 class Judge:
-    """A process that judges diagrams, started again where one takes longer than ``seconds``."""
+    """A process that judges diagrams, started anew where one takes ``seconds`` of processor time."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
@@ -77,23 +78,27 @@ class Judge:
     def judge(self, recipe: Recipe, laws: Sequence[str]) -> Found:
         if self.process is None:
             context = multiprocessing.get_context("fork")
-            self.ours, theirs = context.Pipe()
-            self.process = context.Process(target=_judging, args=(theirs,), daemon=True)
+            self.ours, self.theirs = context.Pipe()
+            self.process = context.Process(target=_judging, args=(self.theirs, self.seconds), daemon=True)
             self.process.start()
         self.ours.send((recipe, laws))
+        self.theirs.close()  # the process alone has this end: where it dies, nothing is left to wait for
         try:
-            if self.ours.poll(self.seconds):
-                return self.ours.recv()
+            return self.ours.recv()
         except EOFError:
+            self.process.join()
+            code = self.process.exitcode
             self.end()
-            return {"crash": ["the process died"]}
-        self.end()
-        return {"hangs": [f"no end within {self.seconds:g} s"]}
+        if code == -signal.SIGPROF:
+            return {"hangs": [f"no end within {self.seconds:g} s of processor time"]}
+        return {"crash": [f"the process died with exit code {code}"]}
 
 
-def _judging(pipe: Connection) -> None:
+def _judging(pipe: Connection, seconds: float) -> None:
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)  # ends the process, whatever it does
     while True:
         recipe, laws = pipe.recv()
+        signal.setitimer(signal.ITIMER_PROF, seconds)
         pipe.send(judged(recipe, laws))
 
 
