@@ -148,9 +148,7 @@ class MultiSegment(Block):
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         points, blend, instants = p["points"], p["blend"], self.breakpoints(p)
         now = fmin(t, instants[-1])
-        ramps = [
-            _rounded_ramp(now, begin, end, blend) for begin, end in zip(instants[::2], instants[1::2])
-        ]
+        ramps = [_rounded_ramp(now, begin, end, blend) for begin, end in zip(instants[::2], instants[1::2])]
         n = points.shape[1]
         q, qd, qdd = points[0, :].T, SX.zeros(n), SX.zeros(n)
         for k in range(points.shape[0] - 1):

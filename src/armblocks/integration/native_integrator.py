@@ -118,8 +118,8 @@ class NativeIntegrator:
         method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
         ``checkpoint`` the run goes on from there, as the run that left it would have. With
         ``watch_stiffness`` it pauses, :attr:`Integration.wants_other`, where a method for stiff systems, or
-        an explicit one again, does better. ``span`` s: about how long the run is, beside which events near the
-        time 0 are told apart (default: ``stop``). Nothing is checked.
+        an explicit one again, does better. ``span`` s: the length of the run, more or less; events
+        near the time 0 are told apart beside it (default: ``stop``). Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
