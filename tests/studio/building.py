@@ -20,6 +20,11 @@ def block(page: Page, name: str) -> Locator:
     return page.locator(f'.react-flow__node[data-id="{name}"]')
 
 
+def keep_view(page: Page) -> None:
+    """Let the sheet stay where it is: until somebody touches it, it fits itself into its panel."""
+    page.locator(".canvas").dispatch_event("wheel")
+
+
 def new_diagram(page: Page) -> None:
     """Begin with an empty sheet."""
     page.get_by_role("button", name="Menu").click()
@@ -51,6 +56,8 @@ def wire(page: Page, source: str, target: str) -> None:
     The sheet pans while the mouse is near its edge: the mouse follows the target until the sheet shows that
     a wire would end there.
     """
+
+    keep_view(page)
 
     def handle(port: str) -> Locator:
         name, _, end = port.partition("/")

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from building import keep_view
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from conftest import Studio, new_context
@@ -99,6 +100,7 @@ def place(page: Page, name: str) -> tuple[float, float]:
 
 def take(page: Page, name: str) -> tuple[float, float]:
     """Press the mouse on a block and drag it a little way; where it is held."""
+    keep_view(page)
     box = block(page, name).bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

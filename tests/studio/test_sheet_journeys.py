@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from accessibility import axe
-from building import copied_text, wait_until
+from building import copied_text, keep_view, wait_until
 from playwright.sync_api import Locator, Page, expect
 
 from armblocks.blocks import BLOCKS
@@ -34,6 +34,7 @@ def sheet(shared: Page) -> Iterator[Page]:
     menu(page, re.compile("^van_der_pol_pid a van der Pol"))
     expect(page.locator(".title")).to_have_text("van_der_pol_pid")
     expect(block(page, "PID")).to_be_visible()
+    keep_view(page)
     yield page
 
 
