@@ -64,10 +64,8 @@ def test_a_product_has_the_bits_of_its_terms_one_after_the_other(m: int, n: int)
     np.testing.assert_allclose(twice, np.outer(plain.sum(axis=1), A.sum(axis=1)), rtol=1e-9, atol=1e-9)
     every = (plain, added, bent, twice)
     single = [np.array(results) for results in zip(*(kernel(x[k], p, c[k]) for k in range(samples)))]
-    others = [single]
-    if m == n:  # a matrix of each sample's own, which is written out and takes long to compile
-        others += [kernel(x, np.tile(p, (samples, 1)), c), [part.T for part in kernel.columns(x, p, c)]]
-    for other in others:
+    own = np.tile(p, (samples, 1))
+    for other in (single, kernel(x, own, c), [part.T for part in kernel.columns(x, p, c)]):
         for results, known in zip(other, every):
             np.testing.assert_array_equal(results, known)
     read = interpret(kernel.tape, [x, p, c])

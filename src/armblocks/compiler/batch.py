@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from armblocks.compiler.ir_text import Body, Module
-from armblocks.compiler.lane_memory import load_rows, store_rows
+from armblocks.compiler.lane_memory import Line, load_rows, store_rows
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.program_text import add_program
@@ -119,9 +119,7 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     declared += [(f"ptr noalias{' readonly' if p[0] == 'i' else ''}", f"%{p}") for p in _pointers(tape)]
     body = Body(module, lanes)
     if is_long(tape):
-        calls = emit_pieces(module, tape, name, lanes, declared, stores, inputs_of, store)
-        body.lines += [calls.room, *calls.lines]
-        doubtful = calls.doubtful
+        doubtful = emit_pieces(body, tape, name, declared, stores, inputs_of, store)
     else:
         registers = emit_operations(body, tape, inputs_of(body))
         for k in stores:
@@ -179,31 +177,19 @@ def _inputs(body: Body, tape: Tape, layout: BatchLayout, sample: str) -> Inputs:
             loaded.setdefault(start + first + k, value)
         return loaded[register]
 
-    def load_entry(first: int, behind: str) -> str:
-        slot, place = tape.input_place(first)
-        kind, size = layout.inputs[slot], tape.input_sizes[slot]
-
-        def address(entry: str, lane: int) -> str:
-            there = body.let(f"add nsw i64 {entry}, {place}")
-            if kind is not Layout.SHARED:
-                own = body.let(f"add nsw i64 {sample}, {lane}")
-                line, across = (there, "%columns") if kind is Layout.COLUMNS else (own, str(size))
-                begin = body.let(f"mul nsw i64 {line}, {across}")
-                there = body.let(f"add nsw i64 {begin}, {own if kind is Layout.COLUMNS else there}")
-            return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {there}")
-
-        return body.gather(address, behind)
-
-    def block(register: int) -> str | None:
+    def line(register: int) -> Line:
         slot, place = tape.input_place(register)
-        kind, size = layout.inputs[slot], tape.input_sizes[slot]
-        if kind is Layout.COLUMNS or (kind is Layout.ROWS and body.lanes > 1):
-            return None
-        begin = "0" if kind is Layout.SHARED else _row(body, sample, size)
-        there = body.let(f"add nsw i64 {begin}, {place}")
-        return body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {there}")
+        kind, size, step, apart = layout.inputs[slot], tape.input_sizes[slot], "1", "0"
+        if kind is Layout.COLUMNS:
+            begin, step, apart = _column(body, f"%i{slot}", place, sample), "%columns", "1"
+        else:
+            first = "0" if kind is Layout.SHARED else _row(body, sample, size)
+            there = body.let(f"add nsw i64 {first}, {place}")
+            begin = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {there}")
+            apart = "0" if kind is Layout.SHARED else str(size)
+        return Line(address=begin, step=step, apart=apart)
 
-    return Inputs(load, load_entry, block)
+    return Inputs(load, line)
 
 
 def _row(body: Body, sample: str, size: int) -> str:

@@ -7,8 +7,64 @@ transposed in registers by log2(lanes) rounds of shuffles: much less work than o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body
+from armblocks.compiler.program_text import add_program
+from armblocks.routines.memory import Reals
+from armblocks.routines.routine import Program, Routine
+from armblocks.routines.values import Integer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """Where an input register and those behind it in its slot lie in memory.
+
+    The first is at ``address``, the following each ``step`` doubles further; ``apart`` lie between those of
+    neighbouring lanes. Both are texts of i64.
+    """
+
+    address: str
+    step: str = "1"
+    apart: str = "0"
+
+    def is_plain_array(self, lanes: int) -> bool:
+        """Whether the numbers follow one another, and are the same for all of so many lanes."""
+        return self.step == "1" and (lanes == 1 or self.apart == "0")
+
+    def read(self, body: Body, behind: str) -> str:
+        """The number so many registers behind the first, an integer in each lane."""
+
+        def address(entry: str, lane: int) -> str:
+            place = body.let(f"mul nsw i64 {entry}, {self.step}")
+            if lane > 0 and self.apart != "0":
+                across = body.let(f"mul nsw i64 {self.apart}, {lane}")
+                place = body.let(f"add nsw i64 {place}, {across}")
+            return body.let(f"getelementptr inbounds double, ptr {self.address}, i64 {place}")
+
+        return body.gather(address, behind)
+
+    def copy(self, body: Body, target: str, length: int) -> None:
+        """So many numbers from the first on to ``target``, a row of all lanes after the other."""
+        if body.lanes == 1 and self.step == "1":
+            body.module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
+            ends = f"ptr align 8 {target}, ptr align 8 {self.address}"
+            body.do(f"call void @llvm.memcpy.p0.p0.i64({ends}, i64 {8 * length}, i1 false)")
+            return
+        lanes = body.lanes
+
+        def copied(
+            r: Routine, target: Reals, source: Reals, count: Integer, step: Integer, apart: Integer
+        ) -> None:
+            for k in r.range(0, count):
+                for lane in range(lanes):
+                    target[k * lanes + lane] = source[k * step + apart * lane]
+
+        program = Program()
+        symbol = program.define(copied, f"copied.{lanes}", inlined=False).symbol
+        add_program(body.module, program)
+        steps = f"i64 {length}, i64 {self.step}, i64 {self.apart}"
+        body.do(f"call void @{symbol}(ptr {target}, ptr {self.address}, {steps})")
 
 
 def load_rows(body: Body, pointer: str, size: int, first: int) -> list[str]:

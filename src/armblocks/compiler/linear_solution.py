@@ -12,9 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.lane_memory import Line
 from armblocks.compiler.opcodes import solution_length
 from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Tape
+from armblocks.compiler.work_space import WorkSpace
 from armblocks.routines.arithmetic import select
 from armblocks.routines.full_matrix import FullMatrix
 from armblocks.routines.lanes import LaneArray, Lanes, Mask
@@ -22,8 +24,9 @@ from armblocks.routines.memory import NumberArray
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
-SHORTEST_BLOCK = 8
-"""From so many neighbours on, inputs are copied in one go: LLVM compares loads and stores pair by pair."""
+SHORTEST_BLOCK, SHORTEST_BLOCK_OF_LANES = 8, 256
+"""From so many neighbours on, inputs are copied in one go: LLVM compares loads and stores pair by pair. Over
+several lanes, fewer are read faster as whole registers."""
 
 
 def emit_linear_solution(
@@ -31,37 +34,27 @@ def emit_linear_solution(
     tape: Tape,
     operands: Sequence[int],
     number: Callable[[int], str],
-    address: Callable[[int], str | None],
+    line: Callable[[int], Line],
 ) -> list[str]:
     """The values of the members of a ``SOLVE``.
 
-    ``number(register)`` gives a register's value, ``address`` where an input lies with those after it.
+    ``number(register)`` gives a register's value, ``line`` where an input and those behind it lie.
     """
     n, module = solution_length(len(operands)), body.module
     symbol = f"linear_solution.{n}.{body.lanes}"
     _define(module, symbol, n, body.lanes)
-    module.declare("ptr", "llvm.stacksave.p0")
-    module.declare("void", "llvm.stackrestore.p0", "ptr")
-    stack = body.let("call ptr @llvm.stacksave.p0()")
-    align = 8 * body.lanes
-    memory = body.let(f"alloca {body.real}, i64 {_Solver.length(n)}, align {align}")
-
-    def place(index: int) -> str:
-        return body.let(f"getelementptr inbounds {body.real}, ptr {memory}, i64 {index}")
-
+    space = WorkSpace(body, _Solver.length(n))
+    shortest = SHORTEST_BLOCK if body.lanes == 1 else SHORTEST_BLOCK_OF_LANES
     for index, length in _blocks(tape, operands):
-        source = address(operands[index]) if body.lanes == 1 and length >= SHORTEST_BLOCK else None
-        if source is not None:
-            module.declare("void", "llvm.memcpy.p0.p0.i64", "ptr", "ptr", "i64", "i1")
-            ends = f"ptr align 8 {place(index)}, ptr align 8 {source}"
-            body.do(f"call void @llvm.memcpy.p0.p0.i64({ends}, i64 {8 * length}, i1 false)")
+        if length >= shortest:
+            line(operands[index]).copy(body, space.row(index), length)
             continue
         for k in range(index, index + length):
-            body.do(f"store {body.real} {number(operands[k])}, ptr {place(k)}, align {align}")
-    body.do(f"call void @{symbol}(ptr {memory})")
+            space.write(k, number(operands[k]))
+    body.do(f"call void @{symbol}(ptr {space.address})")
     start = n * (n + 1)
-    solution = [body.let(f"load {body.real}, ptr {place(start + k)}, align {align}") for k in range(n)]
-    body.do(f"call void @llvm.stackrestore.p0(ptr {stack})")
+    solution = [space.read(start + k) for k in range(n)]
+    space.free()
     return solution
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.lane_memory import Line
 from armblocks.compiler.pieces import emit_pieces, is_long
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
@@ -52,13 +53,10 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
         def load(register: int) -> str:
             return body.let(f"load double, ptr {address(register)}, align 8")
 
-        def load_entry(first: int, behind: str) -> str:
-            slot, place = tape.input_place(first)
-            entry = body.let(f"add nsw i64 {behind}, {place}")
-            address = body.let(f"getelementptr inbounds double, ptr %i{slot}, i64 {entry}")
-            return body.let(f"load double, ptr {address}, align 8")
+        def line(register: int) -> Line:
+            return Line(address=address(register))
 
-        return Inputs(load, load_entry, address)
+        return Inputs(load, line)
 
     def write() -> str:
         body = Body(module)
@@ -76,8 +74,7 @@ def emit_function(module: Module, tape: Tape, name: str, *, linkage: str = "inte
 
         if is_long(tape):
             groups = {register: (register,) for register in outputs}
-            calls = emit_pieces(module, tape, name, 1, pointers, groups, inputs_of, store)
-            body.lines += [calls.room, *calls.lines]
+            emit_pieces(body, tape, name, pointers, groups, inputs_of, store)
         else:
             # Each result is stored as soon as it is known: thousands that wait for the end would be spilled
             # and loaded again, and the compiler takes time in proportion to the square of their count.

@@ -13,14 +13,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from armblocks.compiler.ir_text import Body
+from armblocks.compiler.lane_memory import Line
 from armblocks.compiler.opcodes import Opcode
 from armblocks.compiler.program_text import add_program
 from armblocks.compiler.tape import Operation, Tape
+from armblocks.compiler.work_space import WorkSpace
 from armblocks.routines.arithmetic import fma, in_all_lanes
-from armblocks.routines.lanes import LaneArray
-from armblocks.routines.memory import Reals
+from armblocks.routines.lanes import LaneArray, Lanes
+from armblocks.routines.memory import NumberArray, Reals
 from armblocks.routines.routine import Program, Routine
-from armblocks.routines.values import Integer
+from armblocks.routines.values import Integer, NumberT
 
 SHORTEST_ROW = 8
 """Fewer products of a row stay as they are."""
@@ -198,39 +200,34 @@ def emit_matrix_product(
     tape: Tape,
     operands: Sequence[int],
     number: Callable[[int], str],
-    address: Callable[[int], str | None],
+    line: Callable[[int], Line],
 ) -> list[str]:
     """The values of the members of a ``PRODUCT``.
 
-    ``number(register)`` gives a register's value, ``address`` where an input lies with those after it.
+    ``number(register)`` gives a register's value, ``line`` where an input and those behind it lie.
     """
     first = operands[0]
     m, n = product_shape(tape, operands)
     vector, starts = operands[3 : 3 + n], operands[3 + n :]
-    matrix = address(first)
-    if matrix is None:  # a matrix of which every sample of a batch has its own
-        sums = [number(register) for register in starts]
-        for j, x in enumerate(vector):
-            for i in range(m):
-                sums[i] = body.fma(number(first + i * n + j), number(x), sums[i])
-        return sums
-    module, align = body.module, 8 * body.lanes
+    matrix = line(first)
+    plain = matrix.is_plain_array(body.lanes)
     program = Program(body.lanes)
-    symbol = program.define(matrix_product, f"matrix_product.{body.lanes}", inlined=False).symbol
-    add_program(module, program)
-    module.declare("ptr", "llvm.stacksave.p0")
-    module.declare("void", "llvm.stackrestore.p0", "ptr")
-    stack = body.let("call ptr @llvm.stacksave.p0()")
-    memory = body.let(f"alloca {body.real}, i64 {m + n}, align {align}")
-
-    def place(index: int) -> str:
-        return body.let(f"getelementptr inbounds {body.real}, ptr {memory}, i64 {index}")
-
+    if plain:
+        symbol = program.define(matrix_product, f"matrix_product.{body.lanes}", inlined=False).symbol
+    else:
+        name = f"matrix_product_in_each_lane.{body.lanes}"
+        symbol = program.define(matrix_product_in_each_lane, name, inlined=False).symbol
+    add_program(body.module, program)
+    space = WorkSpace(body, m + n if plain else m + n + m * n)
+    address = matrix.address if plain else space.row(m + n)
+    if not plain:  # every sample of a batch has its own
+        matrix.copy(body, address, m * n)
     for k, register in enumerate([*starts, *vector]):
-        body.do(f"store {body.real} {number(register)}, ptr {place(k)}, align {align}")
-    body.do(f"call void @{symbol}(ptr {matrix}, ptr {place(m)}, ptr {memory}, i64 {m}, i64 {n})")
-    sums = [body.let(f"load {body.real}, ptr {place(i)}, align {align}") for i in range(m)]
-    body.do(f"call void @llvm.stackrestore.p0(ptr {stack})")
+        space.write(k, number(register))
+    ends = f"ptr {address}, ptr {space.row(m)}, ptr {space.address}"
+    body.do(f"call void @{symbol}({ends}, i64 {m}, i64 {n})")
+    sums = [space.read(i) for i in range(m)]
+    space.free()
     return sums
 
 
@@ -242,6 +239,25 @@ def product_shape(tape: Tape, operands: Sequence[int]) -> tuple[int, int]:
 
 def matrix_product(r: Routine, A: Reals, x: LaneArray, y: LaneArray, m: Integer, n: Integer) -> None:
     """``y += A x`` in every lane, for ``A`` (m, n), row by row in memory; each sum from the left."""
+    _add_product(r, A, in_all_lanes, x, y, m, n)
+
+
+def matrix_product_in_each_lane(
+    r: Routine, A: LaneArray, x: LaneArray, y: LaneArray, m: Integer, n: Integer
+) -> None:
+    """:func:`matrix_product` with a matrix for each lane."""
+    _add_product(r, A, lambda entry: entry, x, y, m, n)
+
+
+def _add_product(
+    r: Routine,
+    A: NumberArray[NumberT],
+    in_lanes: Callable[[NumberT], Lanes],
+    x: LaneArray,
+    y: LaneArray,
+    m: Integer,
+    n: Integer,
+) -> None:
     row = r.integer(0)
 
     def add_rows(count: int) -> None:
@@ -251,7 +267,7 @@ def matrix_product(r: Routine, A: Reals, x: LaneArray, y: LaneArray, m: Integer,
         for j in r.range(0, n):
             factor = x[j]
             for line, total in zip(lines, sums):
-                total.value = fma(in_all_lanes(line[j]), factor, total.value)
+                total.value = fma(in_lanes(line[j]), factor, total.value)
         for k, total in enumerate(sums):
             y[start + k] = total.value
         row.value = start + count

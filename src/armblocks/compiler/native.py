@@ -130,7 +130,8 @@ def _provide_runtime() -> None:
     """Name the few C functions that LLVM may call where it does not find them by itself.
 
     Processors without fused multiply-add or rounding instructions (x86-64 before 2013) need ``fma`` and
-    ``floor``, both exact in any C library; Windows checks large stack frames.
+    ``floor``, both exact in any C library; long work spaces come from ``malloc``; Windows checks large stack
+    frames.
     """
     from llvmlite import binding as llvm
 
@@ -140,7 +141,7 @@ def _provide_runtime() -> None:
         libraries, names = ("ucrtbase", "vcruntime140", "ntdll"), ("__chkstk",)
     else:
         libraries, names = (None,), ()  # what the process has loaded holds the C library
-    for name in ("fma", "floor", "ceil", "memcpy", "memmove", "memset", *names):
+    for name in ("fma", "floor", "ceil", "memcpy", "memmove", "memset", "malloc", "free", *names):
         for library in libraries if llvm.address_of_symbol(name) is None else ():
             with contextlib.suppress(OSError, AttributeError):
                 function = getattr(ctypes.CDLL(library), name)

@@ -12,10 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from armblocks.compiler.ir_text import Body, Module
+from armblocks.compiler.ir_text import Body
 from armblocks.compiler.opcodes import ELEMENTARY, VECTORS, Opcode
 from armblocks.compiler.tape import Tape
 from armblocks.compiler.tape_operations import Inputs, Registers, emit_operations
+from armblocks.compiler.work_space import WorkSpace
 
 LONGEST = 2600
 """Weight of a function that is left in one piece."""
@@ -49,16 +50,6 @@ def is_long(tape: Tape) -> bool:
     read = {r for opcode, operands in tape.operations if opcode not in VECTORS for r in operands}
     accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
     return len(tape.operations) + ACCESS_WEIGHT * accesses > LONGEST
-
-
-@dataclass(frozen=True, kw_only=True)
-class Calls:
-    """Text that evaluates a tape in pieces: its memory (to be made once), the calls, and in which lanes a
-    function was undecided, as bits (``None``: always decided)."""
-
-    room: str
-    lines: tuple[str, ...]
-    doubtful: str | None
 
 
 Stores = Mapping[int, Sequence[int]]
@@ -130,48 +121,43 @@ def _with_places(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
 
 
 def emit_pieces(
-    module: Module,
+    caller: Body,
     tape: Tape,
     name: str,
-    lanes: int,
     arguments: Sequence[tuple[str, str]],
     stores: Stores,
     inputs_of: Callable[[Body], Inputs],
     storing: Callable[[Body, Registers, int], None],
-) -> Calls:
-    """Add the functions of a tape's pieces.
+) -> str | None:
+    """Add the functions of a tape's pieces, and to ``caller`` the calls of all of them.
 
-    ``arguments`` are the types and names of what all of them get; ``inputs_of(body)`` gives how a body reads
-    the inputs, ``storing(body, registers, k)`` writes group ``k`` of ``stores``.
+    ``arguments`` are the types and names of what ``caller`` gets and passes on; ``inputs_of(body)`` gives how
+    a body reads the inputs, ``storing(body, registers, k)`` writes group ``k`` of ``stores``. The result says
+    in which lanes a function was undecided, as bits; ``None``: always decided.
     """
+    module, lanes = caller.module, caller.lanes
     done = cut(tape, stores)
+    kept = WorkSpace(caller, done.room)
     declared = ", ".join([f"{kind} {argument}" for kind, argument in arguments] + ["ptr noalias %kept"])
-    passed = ", ".join([f"{kind.split()[0]} {argument}" for kind, argument in arguments] + ["ptr %kept"])
+    passed = [f"{kind.split()[0]} {argument}" for kind, argument in arguments] + [f"ptr {kept.address}"]
     bits = f"i{lanes}"
-    calls: list[str] = []
-    doubts: list[str] = []
+    doubtful: str | None = None
     for number, piece in enumerate(done.pieces):
         body = Body(module, lanes)
         _emit_piece(body, tape, done, piece, inputs_of(body), storing)
-        result = "void"
+        symbol, result = f"{name}.{number}", "void" if body.undecided is None else bits
+        call = f"call {result} @{symbol}({', '.join(passed)})"
         if body.undecided is None:
             body.do("ret void")
+            caller.do(call)
         else:
-            result = bits
             body.do(f"ret {bits} {body.let(f'bitcast {body.bit} {body.undecided} to {bits}')}")
-            doubts.append(f"%doubt{number}")
-        symbol = f"{name}.{number}"
+            doubt = caller.let(call)
+            doubtful = doubt if doubtful is None else caller.let(f"or {bits} {doubt}, {doubtful}")
         head = f"define internal {result} @{symbol}({declared}) nounwind noinline {{\nentry:\n"
         module.add(symbol, head + "\n".join(body.lines) + "\n}")
-        target = "" if result == "void" else f"%doubt{number} = "
-        calls.append(f"  {target}call {result} @{symbol}({passed})")
-    total: str | None = None
-    for doubt in doubts:
-        joined = f"{doubt}.all"
-        calls.append(f"  {joined} = or {bits} {doubt}, {total or 0}")
-        total = joined
-    room = f"  %kept = alloca double, i64 {max(1, done.room * lanes)}, align {8 * lanes}"
-    return Calls(room=room, lines=tuple(calls), doubtful=total)
+    kept.free()
+    return doubtful
 
 
 def _emit_piece(
@@ -191,9 +177,7 @@ def _emit_piece(
             return inputs.load(register)
         return body.let(f"load {body.real}, ptr {address(register)}, align {8 * body.lanes}")
 
-    registers = emit_operations(
-        body, tape, Inputs(load, inputs.load_entry, inputs.address), some=range(piece.first, piece.last)
-    )
+    registers = emit_operations(body, tape, Inputs(load, inputs.line), some=range(piece.first, piece.last))
     for store in piece.stores:
         storing(body, registers, store)
     for register in range(tape.first_operation + piece.first, tape.first_operation + piece.last):

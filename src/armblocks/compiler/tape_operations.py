@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from armblocks.compiler.ir_text import Body
+from armblocks.compiler.lane_memory import Line
 from armblocks.compiler.linear_solution import emit_linear_solution
 from armblocks.compiler.matrix_products import emit_matrix_product
 from armblocks.compiler.opcodes import COMPARISONS, Opcode
@@ -13,11 +14,8 @@ from armblocks.compiler.tape import Tape
 
 LoadInput = Callable[[int], str]
 """Gives the value of a register that is not written here, in all lanes."""
-LoadEntry = Callable[[int, str], str]
-"""Gives the value of the input register that lies so many (an integer in each lane) behind another."""
-BlockAddress = Callable[[int], "str | None"]
-"""Gives the address from which an input register and those after it in its slot follow one another as plain
-doubles, the same for all lanes; ``None`` where they do not."""
+InputLine = Callable[[int], Line]
+"""Gives where an input register and those behind it lie."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +23,7 @@ class Inputs:
     """How a body reads what it does not work out itself."""
 
     load: LoadInput
-    load_entry: LoadEntry
-    address: BlockAddress
+    line: InputLine
 
 
 class Registers:
@@ -107,12 +104,12 @@ def emit_operations(
             first, count, index = operands
             size = int(tape.constants[count - tape.first_constant])
             behind = body.held_index(registers.number(index), size)
-            registers.set_number(target, inputs.load_entry(first, behind))
+            registers.set_number(target, inputs.line(first).read(body, behind))
         elif opcode is Opcode.SOLVE:
-            members = emit_linear_solution(body, tape, operands, registers.number, inputs.address)
+            members = emit_linear_solution(body, tape, operands, registers.number, inputs.line)
             registers.vectors[target] = members
         elif opcode is Opcode.PRODUCT:
-            members = emit_matrix_product(body, tape, operands, registers.number, inputs.address)
+            members = emit_matrix_product(body, tape, operands, registers.number, inputs.line)
             registers.vectors[target] = members
         elif opcode is Opcode.MEMBER:
             vector, place = operands
