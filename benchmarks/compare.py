@@ -27,9 +27,9 @@ TURN_SECONDS = 0.02
 def works() -> dict[str, Callable[[], object]]:
     """What is measured, by name; all of it compiled."""
     import numpy as np
+    from simulations import FIXED, five_blocks
 
     import armblocks as ab
-    from simulations import FIXED, five_blocks
 
     def run_of(diagram: ab.Diagram, **options: Any) -> Callable[[], object]:
         return lambda: ab.simulate(diagram, **options)
