@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
 
 from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
+
+FULL_EFFORT = ("compiler", "dynamics", "integration", "simulation")
+"""Folders of tests that compile as users do."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -31,6 +35,19 @@ def puma560() -> Robot:
 def kr180() -> Robot:
     """The paper's arm, written out in Python."""
     return build_kr180()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def effort(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Most tests compile what they then run for milliseconds: they need little effort of the compiler.
+
+    That the bits are the same is shown by laws of their own. With ``ARMBLOCKS_EFFORT=full`` all tests compile
+    as users do.
+    """
+    asked = os.environ.get("ARMBLOCKS_EFFORT", "little")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ARMBLOCKS_EFFORT", "full" if request.path.parent.name in FULL_EFFORT else asked)
+        yield
 
 
 @pytest.fixture(autouse=True, scope="session")

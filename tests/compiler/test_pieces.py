@@ -14,9 +14,11 @@ from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.interpret import interpret
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
-from armblocks.compiler.native import Effort, load_code
+from armblocks.compiler.native import Effort, compile_object, load_code
 from armblocks.compiler.pieces import ACCESS_WEIGHT, LENGTH, cut, is_long
+from armblocks.compiler.target import Target
 from armblocks.equations import TracedFunction, signature
+from armblocks.errors import InputError
 
 
 def long_function(count: int) -> TracedFunction:
@@ -117,6 +119,26 @@ def test_code_for_a_few_calls_gives_the_bits_of_code_for_many() -> None:
     told = interpret(tape, vectors[: len(tape.input_sizes)])
     for given, expected in zip(found[0][len(tape.input_sizes) :], told):
         np.testing.assert_allclose(np.frombuffer(given), expected, rtol=1e-12, atol=1e-13)
+
+
+def test_the_effort_is_limited_by_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Effort] = []
+
+    def compiled(text: str, target: Target, *, effort: Effort) -> bytes:
+        made.append(effort)
+        return compile_object(text, target, effort=effort)
+
+    monkeypatch.setattr(native, "compile_object", compiled)
+    monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
+    for asked, given in (("", "FULL"), ("full", "FULL"), ("little", "LITTLE")):
+        monkeypatch.setenv("ARMBLOCKS_EFFORT", asked)
+        load_code(("empty",), lambda: "")
+        load_code(("empty",), lambda: "", Effort.LITTLE)
+        assert made == [Effort[given], Effort.LITTLE]
+        made.clear()
+    monkeypatch.setenv("ARMBLOCKS_EFFORT", "much")
+    with pytest.raises(InputError, match=r"'much' is no effort.*'little', 'full'.*remove the variable"):
+        load_code(("empty",), lambda: "")
 
 
 def test_length_of_the_longest_uncut_function_is_above_that_of_a_piece() -> None:

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pytest
 from block_formulas import BORDER, broken_formulas
 from random_diagrams import RECORD, Node, Recipe
 from reference_block import BlockNumbers
@@ -275,7 +276,8 @@ def agrees_with_fixed_steps(case: Case) -> Iterator[str]:
 
 
 def repeats(case: Case) -> Iterator[str]:
-    """The same diagram gives the same bits again, also saved and loaded, or exported to Python."""
+    """The same diagram gives the same bits again, also saved and loaded, exported to Python, or compiled with
+    more or less effort."""
     yield from same_bits("again", case.signals(case.diagram), case.run)
     loaded = diagram_from_bytes(diagram_to_bytes(case.diagram, load_robot), "fuzz", BLOCKS, load_robot)
     if loaded != case.diagram:
@@ -285,6 +287,10 @@ def repeats(case: Case) -> Iterator[str]:
     scope: dict[str, Any] = {}
     exec(text[: text.index("result = ")], scope)  # noqa: S102 - what the product has written itself
     yield from same_bits("exported", case.signals(scope["diagram"]), case.run)
+    for effort in ("little", "full"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("ARMBLOCKS_EFFORT", effort)
+            yield from same_bits(f"compiled with {effort} effort", case.signals(case.diagram), case.run)
 
 
 def same_bits(what: str, found: Signals, wanted: Signals) -> Iterator[str]:

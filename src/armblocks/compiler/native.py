@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
 import sys
 import threading
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from armblocks.compiler import cache
 from armblocks.compiler.target import Target, host_target
+from armblocks.errors import InputError
 
 if TYPE_CHECKING:
     from llvmlite import binding as llvm
@@ -41,7 +43,7 @@ class NativeCode:
 
 
 class Effort(Enum):
-    """How much work of LLVM goes into a module."""
+    """How much work of LLVM goes into a module: it changes how fast the code is, and no bit of a result."""
 
     LITTLE = 0
     """For code that runs a few times: no passes, and registers given out as they come."""
@@ -49,14 +51,31 @@ class Effort(Enum):
     """For code that runs often: all that pays for itself, by the length of the module."""
 
 
+def allowed_effort() -> Effort:
+    """The most effort that ``$ARMBLOCKS_EFFORT`` allows: ``little`` or ``full`` (where it says nothing).
+
+    Raises ``InputError`` for another word.
+    """
+    asked = os.environ.get("ARMBLOCKS_EFFORT") or Effort.FULL.name.lower()
+    for effort in Effort:
+        if effort.name.lower() == asked:
+            return effort
+    raise InputError(
+        f"'{asked}' is no effort",
+        where="the environment variable ARMBLOCKS_EFFORT",
+        allowed=", ".join(f"'{effort.name.lower()}'" for effort in Effort),
+        fix="set one of these, or remove the variable for fast code",
+    )
+
+
 def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Effort.FULL) -> NativeCode:
     """Machine code of the module whose IR text ``write()`` gives.
 
     ``key`` says which module it is (a variant's name, tape digests, options: all that the text depends on);
-    target and versions are added here. If the disk cache knows the key, ``write`` is not called. The
-    ``effort`` changes no bit of what the code works out.
+    target and versions are added here. If the disk cache knows the key, ``write`` is not called. With
+    ``ARMBLOCKS_EFFORT=little`` no code gets more effort. Raises ``InputError`` for another word there.
     """
-    target = host_target()
+    target, effort = host_target(), Effort(min(effort.value, allowed_effort().value))
     name = cache.object_name((*key, effort.name, target.key))
     code = cache.load(name)
     if code is not None:
