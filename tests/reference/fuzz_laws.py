@@ -48,6 +48,7 @@ class Case:
         self.diagram = recipe.diagram()
         self.settings: dict[str, Any] = {"stop_time": recipe.stop, "sample_time": RECORD}
         self.run = self.signals(self.diagram)
+        self.result_of_run = self.result
         for name, values in self.run.items():
             if not np.isfinite(values).all():
                 raise InconclusiveError(f"'{name}' is not finite")
@@ -166,8 +167,8 @@ def without_single_rows(found: Signals, wanted: Signals, beside: Signals) -> dic
 
 def obeys_formulas(case: Case) -> Iterator[str]:
     """At every recorded time a block that switches gives its formula of its inputs."""
-    case.signals(case.diagram)
-    for name, (row, found, wanted) in broken_formulas(case.diagram, case.result, case.times).items():
+    broken = broken_formulas(case.diagram, case.result_of_run, case.times)
+    for name, (row, found, wanted) in broken.items():
         yield f"'{name}' gives {found:.17g} at row {row}; its formula gives {wanted:.17g}"
 
 
@@ -176,7 +177,6 @@ def obeys_equations(case: Case) -> Iterator[str]:
 
     Its modes are worked out from these inputs alone, so that a loop without a solution is noticed, too.
     """
-    case.signals(case.diagram)
     flat = flat_diagram(case.diagram)
     shapes = infer_shapes(flat)
     for name, block in flat.blocks.items():
@@ -197,9 +197,9 @@ def obeys_equations(case: Case) -> Iterator[str]:
 def contradicted_rows(case: Case, numbers: BlockNumbers) -> Iterator[str]:
     """The first row of each output that no input within ``BORDER`` of the recorded one explains."""
     ports = list(numbers.shapes)
-    recorded = {port: np.asarray(case.result[f"{numbers.name}/{port}"]) for port in ports}
+    recorded = {port: np.asarray(case.result_of_run[f"{numbers.name}/{port}"]) for port in ports}
     for port in numbers.outputs:
-        given = np.asarray(case.result[f"{numbers.name}/{port}"])
+        given = np.asarray(case.result_of_run[f"{numbers.name}/{port}"])
         streak = 0
         for row, t in enumerate(case.times):
             inputs = {p: np.ravel(recorded[p][row]) for p in ports}

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from casadi import SX, Function, densify, depends_on, fabs, fmax, if_else, jtimes, vertcat
+from casadi import SX, Function, densify, fabs, fmax, if_else, jtimes, symvar, vertcat
 from reference_history import History
 
 from armblocks.blocks import FromFile
@@ -31,6 +31,16 @@ def column(value: Any, shape: Shape) -> SX:
     """The flat column of a value; a scalar is spread over the shape."""
     value = SX(value)
     return SX.ones(math.prod(shape)) * value if value.numel() == 1 else flatten(value, shape)
+
+
+def read_symbols(expression: SX, symbols: Mapping[str, SX]) -> set[str]:
+    """Keys of the symbols that an expression reads an element of."""
+    read = {element.element_hash() for element in symvar(expression)}
+    return {
+        key
+        for key, symbol in symbols.items()
+        if any(symbol[k].element_hash() in read for k in range(symbol.numel()))
+    }
 
 
 def own_modes(block: Block, x: Mapping[str, SX], u: Mapping[str, SX], p: Mapping[str, SX]) -> dict[str, SX]:
@@ -141,9 +151,7 @@ class BlockNumbers:
     def needs(self, kind: str, name: str) -> set[str]:
         """The arrays that an equation reads."""
         if (kind, name) not in self._needs:
-            expression = self.expressions[kind, name]
-            ends = self.symbols.items()
-            self._needs[kind, name] = {k for k, s in ends if s.numel() and depends_on(expression, s)}
+            self._needs[kind, name] = read_symbols(self.expressions[kind, name], self.symbols)
         return self._needs[kind, name]
 
     def value(self, kind: str, name: str) -> np.ndarray:
@@ -172,7 +180,8 @@ class BlockNumbers:
         self, expression: SX, more: Mapping[str, tuple[SX, np.ndarray]] | None = None
     ) -> tuple[Callable[[], None], np.ndarray]:
         ends = {key: (symbol, self.arrays[key]) for key, symbol in self.symbols.items()} | dict(more or {})
-        used = [(s, a) for s, a in ends.values() if s.numel() and depends_on(expression, s)]
+        read = read_symbols(expression, {key: symbol for key, (symbol, _) in ends.items()})
+        used = [end for key, end in ends.items() if key in read]
         function = Function("f", [symbol for symbol, _ in used], [densify(expression)])
         result = np.zeros(expression.numel())
         buffer, run = function.buffer()
@@ -218,7 +227,7 @@ class BlockNumbers:
             again = False
             for mode in self.modes:
                 new, array = self.value("mode", mode.name), self.arrays[f"x:{mode.name}"]
-                if not np.array_equal(new, array):
+                if new.tolist() != array.tolist():  # for a few numbers faster than NumPy's comparison
                     array[:] = new
                     again = True
             if not again:
@@ -231,6 +240,6 @@ class BlockNumbers:
     def modes_differ(self) -> bool:
         """Whether the signals ask for other modes than those that hold."""
         return any(
-            not np.array_equal(self.value("mode", mode.name), self.arrays[f"x:{mode.name}"])
+            self.value("mode", mode.name).tolist() != self.arrays[f"x:{mode.name}"].tolist()
             for mode in self.modes
         )

@@ -14,6 +14,8 @@ from reference_order import EvaluationOrder, Node, assign_clocks
 from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
 
 MOST_PASSES = 30
+Link = tuple[np.ndarray, np.ndarray]
+"""The array of an input, and the array of the signal that drives it."""
 
 
 class Network:
@@ -23,9 +25,11 @@ class Network:
         self.diagram = flat = flat_diagram(diagram)
         shapes = infer_shapes(flat)
         self.blocks: dict[str, Any] = {}
+        self.time = np.zeros(1)
         for name, block in flat.blocks.items():
             kind = CONTROLS.get(type(block), BlockNumbers)
             self.blocks[name] = kind(name, block, shapes.inputs[name], shapes.outputs[name])
+            self.blocks[name].arrays["t"] = self.time
         self.drivers: dict[tuple[str, str], PortRef] = {
             (name, port.name): flat.drivers[PortRef(name, port.name)]
             for name, block in flat.blocks.items()
@@ -39,7 +43,8 @@ class Network:
         self._place_states()
         self.clocks = assign_clocks(flat, self.blocks, self.drivers)
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
-        self.fed_by: dict[Node, list[str]] = {}
+        self.links = {b.name: [self._link(b, port) for port in b.fed] for b in self.blocks.values()}
+        self.links_of_node: dict[Node, list[Link]] = {}
         self._start()
 
     # -- structure -----------------------------------------------------------------------------------------
@@ -94,14 +99,16 @@ class Network:
             for port, array in block.outputs.items()
         }
 
-    def evaluate(self, t: float, frozen: bool = False) -> None:
-        """All signals at a time; modes follow them, unless they are ``frozen`` as they are."""
+    def evaluate(self, t: float, frozen: bool = False, flowing: bool = False) -> None:
+        """All signals at a time; modes follow them, unless they are ``frozen`` as they are.
+
+        ``flowing``: only signals that states, modes, guards and delays depend on.
+        """
         self.t, self.frozen = t, frozen
-        for block in self.blocks.values():
-            block.arrays["t"][0] = t
+        self.time[0] = t
         for _ in range(MOST_PASSES):
             changed = False
-            for loop in self.order.groups:
+            for loop in self.order.flowing if flowing else self.order.groups:
                 if loop in self.order.loops:
                     self._solve(loop)
                 else:
@@ -110,17 +117,18 @@ class Network:
                 return
         raise UnsupportedError(f"modes and signals have no consistent values at {t}")
 
-    def _feed(self, block: Any, port: str) -> None:
+    def _link(self, block: Any, port: str) -> Link:
+        """The array of an input (with a prime: of its derivative), and the array that it is copied from."""
+        ref = self.drivers[block.name, port.removesuffix("'")]
+        source = self.blocks[ref.block]
         if port.endswith("'"):
-            ref = self.drivers[block.name, port[:-1]]
-            block.arrays[f"u:{port}"][:] = self.blocks[ref.block].rates[ref.port]
-        else:
-            ref = self.drivers[block.name, port]
-            block.arrays[f"u:{port}"][:] = self.blocks[ref.block].outputs[ref.port]
+            rate = source.rates.setdefault(ref.port, np.zeros_like(source.outputs[ref.port]))
+            return block.arrays[f"u:{port}"], rate
+        return block.arrays[f"u:{port}"], source.outputs[ref.port]
 
     def _feed_all(self, block: Any) -> None:
-        for port in block.fed:
-            self._feed(block, port)
+        for target, source in self.links[block.name]:
+            target[:] = source
 
     def _work_out(self, node: Node) -> bool:
         """Evaluate one node; whether a mode has changed."""
@@ -150,22 +158,19 @@ class Network:
         return False
 
     def _feed_some(self, block: Any, node: Node) -> None:
-        for port in self._fed(node):
-            self._feed(block, port)
-
-    def _fed(self, node: Node) -> list[str]:
-        if node not in self.fed_by:
-            kind, name, port = node
-            block = self.blocks[name]
+        if node not in self.links_of_node:
+            kind, _, port = node
             keys: set[str] = set()
             for entry in [m.name for m in block.modes] if kind == "modes" else [port]:
                 keys |= block.needs("mode" if kind == "modes" else kind, entry)
-            self.fed_by[node] = sorted(key[2:] for key in keys if key.startswith("u:"))
-        return self.fed_by[node]
+            ports = sorted(key[2:] for key in keys if key.startswith("u:"))
+            self.links_of_node[node] = [self._link(block, port) for port in ports]
+        for target, source in self.links_of_node[node]:
+            target[:] = source
 
     def _rate(self, block: Any, port: str) -> None:
         if block.block.sampled or not isinstance(block, BlockNumbers):
-            block.rates[port] = np.zeros_like(block.outputs[port])
+            block.rates.setdefault(port, np.zeros_like(block.outputs[port]))[:] = 0.0
             return
         rates: dict[str, np.ndarray] = {}
         for key in sorted(block.needs("out", port)):
@@ -177,7 +182,7 @@ class Network:
             elif letter == "x" and f"x:{entry}" in block.rates:
                 rates[key] = block.rates.setdefault(f"of {key}", np.zeros_like(block.arrays[key]))
                 rates[key][:] = block.rates[f"x:{entry}"]
-        block.rates[port] = block.rate(port, rates).copy()
+        block.rates.setdefault(port, np.zeros_like(block.outputs[port]))[:] = block.rate(port, rates)
 
     def _solve(self, loop: tuple[Node, ...]) -> None:
         """An algebraic loop, by Newton's method with differences on all its signals."""
@@ -224,7 +229,8 @@ class Network:
             needed = block.needs("delay", line.name)
             for key in needed:
                 if key.startswith("u:"):
-                    self._feed(block, key[2:])
+                    target, source = self._link(block, key[2:])
+                    target[:] = source
             when = self.t - float(block.value("delay", line.name)[0])
             history = block.history[line.name]
             block.arrays[f"x:{line.name}"][:] = history.at(when, history.segment if self.frozen else None)
@@ -233,7 +239,7 @@ class Network:
 
     def derivative(self, t: float) -> np.ndarray:
         """dx/dt with the modes of the start of the step."""
-        self.evaluate(t, frozen=True)
+        self.evaluate(t, frozen=True, flowing=True)
         for block, name, here in self.places:
             if not block.on:
                 self.xdot[here] = 0.0
@@ -388,20 +394,22 @@ class Network:
                 self.signs[name, guard] = np.sign(self.blocks[name].value("guard", guard))
         self.was_on = {name: self.blocks[name].on for name in self.was_on}
 
+    @property
+    def delays(self) -> bool:
+        """Whether a block delays a signal."""
+        return any(block.lines for block in self.blocks.values())
+
     def note(self, x: Mapping[float, np.ndarray], t: float, h: float) -> None:
         """Keep the inputs of delays during a step, by the states at four places of it (0, 1/3, 2/3, 1)."""
         lines = [(block, line) for block in self.blocks.values() for line in block.lines]
-        if not lines:
-            return
         found: dict[int, list[np.ndarray]] = {k: [] for k in range(len(lines))}
         end = self.x.copy()
         for place, state in x.items():
             self.x[:] = state
             time = t + place * h
-            self.evaluate(time if place < 1.0 else float(np.nextafter(time, 0.0)), frozen=True)
+            self.evaluate(time if place < 1.0 else float(np.nextafter(time, 0.0)), True, flowing=True)
             for k, (block, line) in enumerate(lines):
-                self._feed(block, line.input)
-                wide = np.zeros(math.prod(line.shape)) + block.arrays[f"u:{line.input}"]
+                wide = np.zeros(math.prod(line.shape)) + self._link(block, line.input)[1]
                 found[k].append(wide)
         self.x[:] = end
         for k, (block, line) in enumerate(lines):

@@ -66,8 +66,9 @@ class EvaluationOrder:
     """In which order the nodes of a network are evaluated: what is needed comes first.
 
     ``groups``: nodes that are evaluated together, one by itself or the several of an algebraic loop.
-    ``loops``: those groups that are loops. ``late``: whether a mode is used before it is evaluated, so that a
-    second pass is needed.
+    ``flowing``: those groups that states, modes, guards, delays and gates depend on, and all loops, whose
+    solutions are followed; between instants nothing else is read. ``loops``: those groups that are loops.
+    ``late``: whether a mode is used before it is evaluated, so that a second pass is needed.
     """
 
     def __init__(
@@ -106,6 +107,18 @@ class EvaluationOrder:
                 self.late = self.late or bool(soft[node] - done - set(loop)) or bool(soft[node] & set(loop))
             done |= set(loop)
         self.groups = order
+        read = self._read_between_instants() | {node for loop in self.loops for node in loop}
+        read |= {node for start in read for node in _closure_of(start, both)}
+        self.flowing = [loop for loop in order if not read.isdisjoint(loop)]
+
+    def _read_between_instants(self) -> set[Node]:
+        """The signals at the inputs of blocks that change or watch something during a step, and all gates."""
+        found = {("out", ref.block, ref.port) for gate in self.gates.values() for ref in gate.values()}
+        for block in self.blocks.values():
+            if block.states or block.modes or block.guards or block.lines:
+                ports = {*block.fed, *(line.input for line in block.lines)}
+                found |= self._inputs_of(block, {f"u:{port}" for port in ports})
+        return found
 
     def needs(self, node: Node) -> tuple[set[Node], set[Node]]:
         """What a node must wait for, and what it waits for where that is possible (its modes, a restart)."""
@@ -163,14 +176,16 @@ class EvaluationOrder:
 
 def _closure(graph: Mapping[Node, set[Node]]) -> dict[Node, set[Node]]:
     """Everything that each node leads to, by one or more steps."""
-    found: dict[Node, set[Node]] = {}
-    for node in graph:
-        reached: set[Node] = set()
-        pending = list(graph[node])
-        while pending:
-            entry = pending.pop()
-            if entry not in reached:
-                reached.add(entry)
-                pending += graph[entry]
-        found[node] = reached
-    return found
+    return {node: _closure_of(node, graph) for node in graph}
+
+
+def _closure_of(node: Node, graph: Mapping[Node, set[Node]]) -> set[Node]:
+    """Everything that a node leads to, by one or more steps."""
+    reached: set[Node] = set()
+    pending = list(graph[node])
+    while pending:
+        entry = pending.pop()
+        if entry not in reached:
+            reached.add(entry)
+            pending += graph[entry]
+    return reached

@@ -138,11 +138,12 @@ class ReferenceRun:
                     high = (low + high) / 2
             h = high
             self.stepped(x, h, latest)
-        network.note(self.thirds(x, h), self.t, h)
+        if network.delays:
+            network.note(self.thirds(x, h), self.t, h)
         reached = end if h >= end - self.t else self.t + h
         self.t = reached
         if calm:
-            network.evaluate(min(self.t, latest), frozen=True)
+            network.evaluate(min(self.t, latest), frozen=True, flowing=True)
             network.take_signs()
             return
         # Bounces may get shorter and shorter: no step leaps over one.
@@ -173,7 +174,7 @@ class ReferenceRun:
         d = rate(h, h * c)
         network.x[:] = start + h / 6 * (a + 2 * b + 2 * c + d)
         self.slopes = a, d
-        network.evaluate(min(t + h, latest), frozen=True)
+        network.evaluate(min(t + h, latest), frozen=True, flowing=True)
         return calm and not network.modes_differ() and not network.fired()
 
     def thirds(self, start: np.ndarray, h: float) -> dict[float, np.ndarray]:
