@@ -11,6 +11,7 @@ import pytest
 from small_functions import traced
 
 from armblocks.compiler import Kernel, cache, compile_function, recall
+from armblocks.compiler.cache import _prune_now_and_then
 from armblocks.compiler.tape import Tape
 from armblocks.equations import TracedFunction
 
@@ -196,6 +197,16 @@ def test_what_was_used_least_recently_is_pruned_first(folder: Path) -> None:
     cache.prune(folder, limit=6000)
     kept = {path.stem for path in files(folder)}
     assert kept == set(names[-4:])  # four of 1050 bytes fit into three quarters of 6000
+
+
+def test_the_first_of_every_64_stored_files_prunes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pruned: list[Path] = []
+    monkeypatch.setattr(cache, "_prune_now_and_then", _prune_now_and_then)  # the tests go without it
+    monkeypatch.setattr(cache, "_stores", 0)
+    monkeypatch.setattr(cache, "prune", pruned.append)
+    for k in range(65):
+        cache.store(f"{k:064x}", b"content")
+    assert pruned == [folder, folder]
 
 
 def test_use_keeps_a_file_young(folder: Path) -> None:
