@@ -23,10 +23,10 @@ from armblocks.diagram import (
 from armblocks.diagram.block_equations import SlotKind, natural, spread, tunable_slots
 from armblocks.equations import Slot
 from armblocks.errors import InputError
-from armblocks.face.block_examples import block_example
-from armblocks.integration.system import compile_system
+from armblocks.face.model import compile_diagram
 from armblocks.robot import Robot, serial_chain, standard_dh
 from armblocks.spatial import Transform
+from worked_examples import worked_example
 
 ROBOT = Robot(
     name="pair",
@@ -263,7 +263,7 @@ def test_at_a_breakpoint_signals_are_what_they_are_just_after(kind: type[Block])
 
     A run goes on from a breakpoint with the values there, and a sensitivity takes the jump from them.
     """
-    system = compile_system(trace_diagram(block_example(kind)))
+    system = compile_diagram(worked_example(kind)).compiled
     random, near = np.random.default_rng(3), 2.0**-46
     x, z, w = (np.zeros((4, slots.size)) for slots in (system.states, system.discrete, system.algebraic))
     for _ in range(40):

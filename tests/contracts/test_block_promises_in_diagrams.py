@@ -18,6 +18,7 @@ from armblocks.diagram import Block, Diagram, Parameter, ParameterKind
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.block_examples import example_block
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
+from worked_examples import worked_example
 
 pytestmark = pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
 each_kind = pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
@@ -48,7 +49,7 @@ def test_its_units_are_those_of_si() -> None:
 
 @each_kind
 def test_its_example_survives_a_file(kind: type[Block]) -> None:
-    diagram = ab.block_example(kind)
+    diagram = worked_example(kind)
     data = diagram_to_bytes(diagram, load_robot)
     again = diagram_from_bytes(data, "example", BLOCKS, load_robot)
     assert again == diagram
@@ -57,7 +58,7 @@ def test_its_example_survives_a_file(kind: type[Block]) -> None:
 
 @each_kind
 def test_a_retuned_run_is_that_of_the_diagram_built_with_the_values(kind: type[Block]) -> None:
-    diagram = ab.block_example(kind)
+    diagram = worked_example(kind)
     block = diagram.blocks[diagram.name]
     values = {
         f"{diagram.name}.{rule.name}": changed(rule, block.parameter_value(rule.name))

@@ -13,6 +13,7 @@ from armblocks.diagram import Block, diagram_views
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.face.block_examples import caption
 from armblocks.formats import diagram_to_python
+from worked_examples import worked_example
 
 
 def run_as_typed(code: str) -> dict[str, object]:
@@ -25,7 +26,7 @@ def run_as_typed(code: str) -> dict[str, object]:
 @pytest.mark.filterwarnings("ignore::armblocks.errors.LimitWarning")
 @pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
 def test_the_worked_example_runs_and_its_python_is_the_same_diagram(kind: type[Block]) -> None:
-    diagram = ab.block_example(kind)
+    diagram = worked_example(kind)
     assert kind in map(type, diagram.blocks.values())
     assert diagram_views(diagram) or kind.type_name() == "Terminator", "something is to be seen"
     assert caption(kind).endswith((".", "…"))

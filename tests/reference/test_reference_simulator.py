@@ -14,6 +14,7 @@ import armblocks as ab
 from armblocks import blocks as bl
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, DiagramBuilder
+from worked_examples import worked_example
 
 TIMES = np.arange(41) * 0.05
 
@@ -129,7 +130,7 @@ shortest for what is stiff, as a robot with a stiff controller."""
 @pytest.mark.parametrize("kind", [name for name in BLOCKS if name not in NOT_COVERED])
 def test_a_native_run_is_what_the_reference_gives(kind: str) -> None:
     """The block's worked example, natively with rtol 1e-9."""
-    diagram = ab.block_example(kind)
+    diagram = worked_example(BLOCKS[kind])
     times = np.arange(11) * 0.1
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a limit of a robot that is passed is not the subject here
@@ -153,6 +154,6 @@ def distance(found: np.ndarray, wanted: np.ndarray) -> float:
 @pytest.mark.parametrize("kind", FORMULAS)
 def test_a_block_gives_its_formula(kind: str) -> None:
     """At every recorded time of its worked example."""
-    diagram = ab.block_example(kind)
+    diagram = worked_example(BLOCKS[kind])
     found = ab.simulate(diagram, stop_time=10.0, sample_time=0.05)
     assert broken_formulas(diagram, found, found.time) == {}
