@@ -23,7 +23,7 @@ from reference_controls import CONTROLS
 from reference_simulator import EndlessEventsError, UnsupportedError, run_reference
 
 import armblocks as ab
-from armblocks.blocks import BLOCKS
+from armblocks.blocks import BLOCKS, DirectLookup
 from armblocks.diagram import Diagram, flat_diagram, infer_shapes
 from armblocks.diagram.controls import EnableControl, TriggerControl
 from armblocks.errors import ArmblocksError, SimulationError
@@ -56,6 +56,12 @@ class Case:
                 raise InconclusiveError(f"'{name}' is larger than {TOO_LARGE:g}")
             if name.endswith("/angle") and not self.run.get(name[:-5] + "r", np.ones(1)).all():
                 raise InconclusiveError(f"'{name}' is the angle of the origin: the signs of zeros decide")
+
+        for name, block in flat_diagram(self.diagram).blocks.items():
+            for port in block.input_ports() if isinstance(block, DirectLookup) else ():
+                index = self.result[f"{name}/{port.name}"]
+                if (np.abs(index - np.rint(index)) < 1e-9)[index != np.rint(index)].any():
+                    raise InconclusiveError(f"rounding decides the entry that '{name}' reads")
 
     def signals(self, diagram: Diagram, **settings: Any) -> dict[str, np.ndarray]:
         """All signals that are compared, by path: not those inside conditional subsystems."""
