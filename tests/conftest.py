@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import pytest
 
-from armblocks.compiler import cache
 from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
 
@@ -56,12 +55,4 @@ def state_of_nobody(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What the studio keeps for its user lies in a folder of the tests, never in the user's own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-        yield
-
-
-@pytest.fixture(autouse=True, scope="session")
-def cache_that_only_grows() -> Iterator[None]:
-    """The tests compile so many diagrams that looking through the cache every 64 files would take long."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cache, "_prune_now_and_then", lambda root: None)
         yield

@@ -11,7 +11,6 @@ import pytest
 from small_functions import traced
 
 from armblocks.compiler import Kernel, cache, compile_function, recall
-from armblocks.compiler.cache import _prune_now_and_then
 from armblocks.compiler.tape import Tape
 from armblocks.equations import TracedFunction
 
@@ -199,14 +198,20 @@ def test_what_was_used_least_recently_is_pruned_first(folder: Path) -> None:
     assert kept == set(names[-4:])  # four of 1050 bytes fit into three quarters of 6000
 
 
-def test_the_first_of_every_64_stored_files_prunes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folder_is_pruned_after_a_while(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pruned: list[Path] = []
-    monkeypatch.setattr(cache, "_prune_now_and_then", _prune_now_and_then)  # the tests go without it
-    monkeypatch.setattr(cache, "_stores", 0)
     monkeypatch.setattr(cache, "prune", pruned.append)
-    for k in range(65):
-        cache.store(f"{k:064x}", b"content")
-    assert pruned == [folder, folder]
+    for moment, times in (
+        (None, 1),
+        (time.time() - 500.0, 1),
+        (time.time() - 700.0, 2),
+        (time.time() + 1e5, 3),
+    ):
+        if moment is not None:
+            os.utime(folder / "pruned", (moment, moment))
+        for k in range(3):
+            cache.store(f"{k:064x}", b"content")
+        assert pruned == [folder] * times
 
 
 def test_use_keeps_a_file_young(folder: Path) -> None:

@@ -22,6 +22,8 @@ from pathlib import Path
 _MAGIC = b"armblocks cache 1\n"
 _SIZE_LIMIT = 256 * 1024 * 1024
 _DAY = 86400.0
+_PRUNE_EVERY = 600.0
+"""Seconds between two looks at all files: there may be tens of thousands."""
 _SUFFIX = ".bin"
 
 
@@ -139,14 +141,14 @@ def _path(root: Path, name: str) -> Path:
     return root / name[:2] / f"{name}{_SUFFIX}"
 
 
-_stores = 0
-
-
 def _prune_now_and_then(root: Path) -> None:
-    global _stores
-    _stores += 1
-    if _stores % 64 == 1:
-        prune(root)
+    """Prune where no process has done so lately: a file says when it was done last."""
+    last = root / "pruned"
+    with contextlib.suppress(OSError):
+        if 0.0 <= time.time() - last.stat().st_mtime < _PRUNE_EVERY:
+            return
+    last.touch()
+    prune(root)
 
 
 def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
@@ -154,14 +156,16 @@ def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
 
     Remains of writers that were killed are removed after a day.
     """
-    found: list[tuple[float, int, Path]] = []
-    for path in root.glob("??/*"):
-        with contextlib.suppress(OSError):
-            status = path.stat()
-            if path.suffix == ".tmp" and time.time() - status.st_mtime > _DAY:
-                path.unlink()
-            elif path.suffix == _SUFFIX:
-                found.append((status.st_mtime, status.st_size, path))
+    found: list[tuple[float, int, str]] = []
+    for shelf in root.glob("??"):
+        with contextlib.suppress(OSError), os.scandir(shelf) as files:
+            for file in files:
+                with contextlib.suppress(FileNotFoundError):  # another process prunes, too
+                    status = file.stat()
+                    if file.name.endswith(".tmp") and time.time() - status.st_mtime > _DAY:
+                        Path(file).unlink()
+                    elif file.name.endswith(_SUFFIX):
+                        found.append((status.st_mtime, status.st_size, file.path))
     total = sum(size for _, size, _ in found)
     if total <= limit:
         return
@@ -169,5 +173,5 @@ def prune(root: Path, limit: int = _SIZE_LIMIT) -> None:
         if total <= limit * 3 // 4:
             break
         with contextlib.suppress(OSError):
-            path.unlink()
+            Path(path).unlink()
             total -= size
