@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 
@@ -12,6 +13,17 @@ from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
 
 FULL_EFFORT = ("compiler", "dynamics", "integration", "simulation")
 """Folders of tests that compile as users do."""
+
+
+def pytest_sessionstart() -> None:
+    """Modules and tests that are collected stay: a search for garbage among them finds none."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """What has been collected is no garbage for the rest of the session."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
