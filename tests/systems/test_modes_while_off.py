@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -28,39 +29,47 @@ def inside(block: Block, end: str = "") -> ab.Diagram:
 
 
 def enabled(block: Block, source: Block, enable: Block, *, end: str = "", when: str = "held") -> ab.Diagram:
+    return all_enabled({"": block}, source, enable, end=end, when=when)
+
+
+def all_enabled(
+    blocks: Mapping[str, Block], source: Block, enable: Block, *, end: str = "", when: str = "held"
+) -> ab.Diagram:
+    """Each block in a subsystem of its own, ``sub k``, behind one source; its integral is ``total k``."""
     builder = ab.DiagramBuilder("enabled")
     fed = builder.add("source", source)
     control = builder.add("control", enable)
-    subsystem = bl.EnabledSubsystem(diagram=inside(block, end), states_when_enabling=when)
-    held = builder.add("sub", subsystem, fed, enable=control)
-    builder.add("total", bl.Integrator(), held)
+    for key, block in blocks.items():
+        subsystem = bl.EnabledSubsystem(diagram=inside(block, end), states_when_enabling=when)
+        held = builder.add(f"sub {key}".strip(), subsystem, fed, enable=control)
+        builder.add(f"total {key}".strip(), bl.Integrator(), held)
     return builder.build()
 
 
+SWITCHING: list[tuple[Block, float]] = [
+    (bl.Saturation(lower=-0.3, upper=0.3), 0.3),
+    (bl.DeadZone(), 0.5),
+    (bl.Relay(), 1.0),
+    (bl.Quantizer(interval=0.5), 1.0),
+    (bl.Abs(), 1.0),
+    (bl.Sign(), 1.0),
+    (bl.CompareToZero(relation=">"), 1.0),
+    (bl.CoulombFriction(offset=2.0, gain=3.0), 5.0),
+    (bl.LookupTable1D(positions=(-2.0, 0.0, 2.0), table=(4.0, 0.0, 1.0)), 0.5),
+]
+"""Blocks and their outputs for 1."""
+
+
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
-@pytest.mark.parametrize(
-    ("block", "expected"),
-    [
-        (bl.Saturation(lower=-0.3, upper=0.3), 0.3),
-        (bl.DeadZone(), 0.5),
-        (bl.Relay(), 1.0),
-        (bl.Quantizer(interval=0.5), 1.0),
-        (bl.Abs(), 1.0),
-        (bl.Sign(), 1.0),
-        (bl.CompareToZero(relation=">"), 1.0),
-        (bl.CoulombFriction(offset=2.0, gain=3.0), 5.0),
-        (bl.LookupTable1D(positions=(-2.0, 0.0, 2.0), table=(4.0, 0.0, 1.0)), 0.5),
-    ],
-    ids=lambda value: value.type_name() if isinstance(value, Block) else None,
-)
-def test_a_jump_before_a_subsystem_is_first_on_is_seen(
-    block: Block, expected: float, settings: dict[str, Any]
-) -> None:
-    """The input jumps from -1 to 1 after 0.2 s; the subsystem is on from 0.5 s."""
-    diagram = enabled(block, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
+def test_a_jump_before_a_subsystem_is_first_on_is_seen(settings: dict[str, Any]) -> None:
+    """The input jumps from -1 to 1 after 0.2 s; the subsystems are on from 0.5 s."""
+    blocks = {block.type_name(): block for block, _ in SWITCHING}
+    diagram = all_enabled(blocks, bl.Step(time=0.2, initial=-1.0), bl.Step(time=0.5))
     found = ab.simulate(diagram, stop_time=1.0, sample_time=0.1, **settings)
-    assert found["sub/o"].tolist() == pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
-    assert found["total"][-1] == pytest.approx(0.5 * expected, abs=1e-9)
+    for kind, (_, expected) in zip(blocks, SWITCHING):
+        wanted = pytest.approx([0.0] * 5 + [expected] * 6, abs=1e-12)
+        assert found[f"sub {kind}/o"].tolist() == wanted, kind
+        assert found[f"total {kind}"][-1] == pytest.approx(0.5 * expected, abs=1e-9), kind
 
 
 @pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
