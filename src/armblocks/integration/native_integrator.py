@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 from armblocks.compiler.ir_text import Module
 from armblocks.compiler.llvm_ir import emit_function
 from armblocks.compiler.native import load_code
-from armblocks.compiler.program_text import add_program
 from armblocks.integration.delay_history import ROWS_OF_A_STEP
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.explicit_method import STIFF_CHECKS
@@ -22,6 +22,7 @@ from armblocks.integration.loop import POINTERS, define_loop
 from armblocks.integration.rosenbrock_method import STABLE_CHECKS
 from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Stage, Status, Workspace
+from armblocks.routines.llvm import definitions
 from armblocks.routines.routine import Program
 
 if TYPE_CHECKING:
@@ -82,9 +83,8 @@ class NativeIntegrator:
             module = Module()
             for name in names:
                 emit_function(module, tape(name), name)
-            program = Program()
-            define_loop(program, "advance", tableau, self.workspace, sizes, self.space)
-            add_program(module, program)
+            for symbol, text in _loop_text(tableau, sizes, pattern).items():
+                module.add(symbol, text)
             return module.text
 
         # The code object must outlive every call into it.
@@ -172,6 +172,15 @@ class NativeIntegrator:
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
         """The native call. The interpreter's lock is released while it works."""
         return Status(self._advance(*addresses, max_steps))
+
+
+@lru_cache(maxsize=64)
+def _loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
+    """The functions of a loop, ``advance`` among them: the same for all systems of one shape."""
+    program = Program()
+    space = None if pattern is None else LinearSpace(pattern)
+    define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, space)
+    return definitions(program)
 
 
 def _checkpoint(run: Integration, reals: Vector, counts: Integers) -> Checkpoint:
