@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -61,14 +62,15 @@ def played(values: np.ndarray) -> RepeatingSequenceStair:
     return RepeatingSequenceStair(values=values, sample_time=T)
 
 
-def ticked(block: Block) -> dict[str, np.ndarray]:
-    """What the block gives at its ticks, fed with the courses above."""
+def ticked(*blocks: Block) -> list[dict[str, np.ndarray]]:
+    """What blocks, side by side in one diagram, give at their ticks, fed with the courses above."""
     builder = DiagramBuilder("d")
     courses = {"u": U, "reset": TRIGGER, "initial": START, "enable": ENABLE}
-    sources = {port.name: builder.add(port.name, played(courses[port.name])) for port in block.input_ports()}
-    handle = builder.add("block", block)
-    for name, source in sources.items():
-        builder.connect(source, handle[name])
+    sources = {name: builder.add(name, played(course)) for name, course in courses.items()}
+    for number, block in enumerate(blocks):
+        handle = builder.add(f"block {number}", block)
+        for port in block.input_ports():
+            builder.connect(sources[port.name], handle[port.name])
     system = trace_diagram(builder.build())
     p, update = system.parameter_values, system.update.casadi_function()
     z, rows = system.initial_discrete(p)[0], list[dict[str, np.ndarray]]()
@@ -76,27 +78,40 @@ def ticked(block: Block) -> dict[str, np.ndarray]:
         (after,) = update.call([np.array(value, dtype=float) for value in (k * T, (), z, (), p, [1.0])])
         z = np.asarray(after).ravel()
         rows.append(system.discrete.unpack(z))
-    return {port.name: np.array([row[f"block/{port.name}"] for row in rows]) for port in block.output_ports()}
+    return [
+        {
+            port.name: np.array([row[f"block {k}/{port.name}"] for row in rows])
+            for port in block.output_ports()
+        }
+        for k, block in enumerate(blocks)
+    ]
 
 
-@pytest.mark.parametrize("source", ["internal", "external", "external at resets"])
-@pytest.mark.parametrize("kind", EXTERNAL_RESETS)
 @pytest.mark.parametrize("method", ["forward_euler", "backward_euler", "trapezoidal"])
-def test_a_discrete_integrator_begins_anew_at_its_ticks(kind: str, source: str, method: str) -> None:
+def test_a_discrete_integrator_begins_anew_at_its_ticks(method: str) -> None:
+    cases = list(product(EXTERNAL_RESETS, ("internal", "external", "external at resets")))
+    blocks = [
+        DiscreteIntegrator(
+            method=method,
+            gain=2.0,
+            external_reset=kind,
+            initial_condition_source=source,
+            initial=0.3,
+            lower=-0.9,
+            upper=0.8,
+            state_port=True,
+            saturation_port=True,
+            sample_time=T,
+        )
+        for kind, source in cases
+    ]
+    for (kind, source), found in zip(cases, ticked(*blocks)):
+        check_discrete_integrator(found, kind, source, method)
+
+
+def check_discrete_integrator(found: dict[str, np.ndarray], kind: str, source: str, method: str) -> None:
+    """Against the recurrence, with the gain 2 and limits."""
     lower, upper = -0.9, 0.8
-    block = DiscreteIntegrator(
-        method=method,
-        gain=2.0,
-        external_reset=kind,
-        initial_condition_source=source,
-        initial=0.3,
-        lower=lower,
-        upper=upper,
-        state_port=True,
-        saturation_port=True,
-        sample_time=T,
-    )
-    found = ticked(block)
     share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]
     x = 0.3
     for k in range(COUNT):
@@ -109,20 +124,25 @@ def test_a_discrete_integrator_begins_anew_at_its_ticks(kind: str, source: str, 
         x = min(max(x + 2.0 * T * U[k], lower), upper)
 
 
-@pytest.mark.parametrize("enable", [False, True])
-@pytest.mark.parametrize("length", [1, 3])
-@pytest.mark.parametrize("source", ["internal", "external"])
-@pytest.mark.parametrize("kind", EXTERNAL_RESETS)
-def test_a_delay_begins_anew_at_its_ticks(kind: str, source: str, length: int, enable: bool) -> None:
-    block = ResettableDelay(
-        length=length,
-        external_reset=kind,
-        initial_condition_source=source,
-        initial=0.3,
-        enable_port=enable,
-        sample_time=T,
-    )
-    found = ticked(block)["y"]
+def test_a_delay_begins_anew_at_its_ticks() -> None:
+    cases = list(product(EXTERNAL_RESETS, ("internal", "external"), (1, 3), (False, True)))
+    blocks = [
+        ResettableDelay(
+            length=length,
+            external_reset=kind,
+            initial_condition_source=source,
+            initial=0.3,
+            enable_port=enable,
+            sample_time=T,
+        )
+        for kind, source, length, enable in cases
+    ]
+    for case, found in zip(cases, ticked(*blocks)):
+        check_delay(found["y"], *case)
+
+
+def check_delay(found: np.ndarray, kind: str, source: str, length: int, enable: bool) -> None:
+    """Against a list of what went in."""
     past, held, before, begun = [0.3] * length, 0.3, None, source == "internal"
     for k in range(COUNT):
         if not enable or ENABLE[k]:
@@ -134,11 +154,12 @@ def test_a_delay_begins_anew_at_its_ticks(kind: str, source: str, length: int, e
 
 
 def test_a_delay_without_a_reset_is_the_delay() -> None:
-    plain = ticked(Delay(length=3, initial=0.3, sample_time=T))["y"]
+    plain = Delay(length=3, initial=0.3, sample_time=T)
     block = ResettableDelay(
         length=3, external_reset="none", initial_condition_source="internal", initial=0.3, sample_time=T
     )
-    np.testing.assert_array_equal(ticked(block)["y"], plain)
+    found, expected = ticked(block, plain)
+    np.testing.assert_array_equal(found["y"], expected["y"])
 
 
 def test_a_delay_of_vectors_begins_anew_from_a_scalar() -> None:
