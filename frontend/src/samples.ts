@@ -1,3 +1,4 @@
+import { changed } from './frames'
 import type { Channel } from './protocol'
 
 /** Where the numbers of one signal lie among the columns of a frame. */
@@ -19,7 +20,7 @@ let versions = 0
 
 /**
  * The samples of one run, outside of React: frames arrive faster than a page may render.
- * Every view draws from here on its own animation frame and compares `version` with what it drew last.
+ * Every view draws from here in the animation frame after a change and compares `version` with what it drew last.
  */
 export class RunSamples {
   version = ++versions
@@ -66,6 +67,7 @@ export class RunSamples {
     }
     this.count = first + count
     this.version = ++versions
+    changed()
   }
 
   /** Only the first samples are still true: the run has gone back. */
@@ -73,6 +75,7 @@ export class RunSamples {
     this.count = Math.min(this.count, count)
     this.returns++
     this.version = ++versions
+    changed()
   }
 
   /** The run has ended: no more room than is needed. */
@@ -140,4 +143,5 @@ export let samples = new RunSamples('', [], {})
 
 export function showSamples(shown: RunSamples): void {
   samples = shown
+  changed()
 }

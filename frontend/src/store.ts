@@ -1,6 +1,7 @@
 import { create } from 'zustand'
 import { Connection, Refusal, type EventOf, type Line, type Request, type ServerEvent } from './connection'
 import { lastShown, remember } from './documents/last_shown'
+import { changed as viewsChanged } from './frames'
 import { newKey } from './keys'
 import type {
   BlockType,
@@ -104,6 +105,7 @@ export const useStudio = create<Studio>((set) => ({
   edit: (editing) => set({ editing }),
   dismiss: (id) => set((s) => ({ notices: s.notices.filter((notice) => notice.id !== id) })),
 }))
+useStudio.subscribe(viewsChanged)
 
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
 

@@ -10,7 +10,17 @@ from typing import Literal
 
 import pytest
 from accessibility import axe
-from building import add, block, copied_text, drag_from_library, new_diagram, play_slowly, run, wire
+from building import (
+    add,
+    block,
+    copied_text,
+    drag_from_library,
+    new_diagram,
+    play_slowly,
+    run,
+    wait_until,
+    wire,
+)
 from playwright.sync_api import Page, expect
 
 import armblocks as ab
@@ -47,6 +57,17 @@ def show_theme(page: Page, theme: Literal["light", "dark"]) -> None:
     expect(page.locator("html")).to_have_attribute("data-mantine-color-scheme", theme)
 
 
+FRAMES_REQUESTED = """async () => {
+    // How many animation frames the page requests while ten frames pass.
+    const request = window.requestAnimationFrame
+    let count = 0
+    window.requestAnimationFrame = (called) => (count++, request.call(window, called))
+    for (let k = 0; k < 10; k++) await new Promise((passed) => request.call(window, passed))
+    window.requestAnimationFrame = request
+    return count
+}"""
+
+
 def test_the_first_example_is_shown_run_and_scrubbed(shared: Page) -> None:
     page = shared
     expect(page.locator(".robot canvas")).to_be_visible()
@@ -61,6 +82,7 @@ def test_the_first_example_is_shown_run_and_scrubbed(shared: Page) -> None:
     page.get_by_role("button", name="Play the run").click()
     expect(page.get_by_role("button", name="Hold the playback")).to_be_visible()
     page.get_by_role("button", name="Hold the playback").click()
+    wait_until(page, lambda: page.evaluate(FRAMES_REQUESTED) == 0)  # a page that rests costs nothing
     for theme in ("dark", "light"):
         show_theme(page, theme)
         axe(page)

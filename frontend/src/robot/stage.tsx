@@ -2,6 +2,7 @@ import { useComputedColorScheme } from '@mantine/core'
 import { Environment, Grid, Lightformer } from '@react-three/drei'
 import { Canvas, useFrame, useThree } from '@react-three/fiber'
 import { memo, useEffect, useRef, useState } from 'react'
+import { watch } from '../frames'
 import { Arm, MATERIALS, useBodies } from './arm'
 import { ViewCamera, type CameraHandle } from './camera'
 import { Frames, JointAxes, Limits } from './overlays'
@@ -26,7 +27,7 @@ export interface Ghosts {
 interface StageProps {
   scene: RobotScene
   poses: () => Poses | undefined
-  /** Changes whenever the poses do: what is not changed is not drawn again. */
+  /** Changes whenever the poses do, with a call of `changed` in `frames.ts`: what is not changed is not drawn again. */
   state: () => string
   way?: () => Way | undefined
   ghosts?: Ghosts
@@ -220,17 +221,12 @@ function useDrawnWhenChanged(state: () => string): void {
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => {
     let seen = ''
-    let frame = 0
-    const look = () => {
+    return watch(() => {
       const now = state()
-      if (now !== seen) {
-        seen = now
-        invalidate()
-      }
-      frame = requestAnimationFrame(look)
-    }
-    frame = requestAnimationFrame(look)
-    return () => cancelAnimationFrame(frame)
+      if (now === seen) return
+      seen = now
+      invalidate()
+    })
   }, [state, invalidate])
 }
 
@@ -267,19 +263,14 @@ function Ground({ height, reach, colours }: { height: number; reach: number; col
 function Instant({ poses, rows, state }: { poses: () => Poses | undefined; rows: number; state: () => string }) {
   const text = useRef<HTMLOutputElement>(null)
   useEffect(() => {
-    let frame = 0
     let seen = ''
-    const look = () => {
+    return watch(() => {
       const key = state()
-      if (key !== seen && text.current) {
-        seen = key
-        const now = poses()
-        text.current.textContent = now ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m' : ''
-      }
-      frame = requestAnimationFrame(look)
-    }
-    frame = requestAnimationFrame(look)
-    return () => cancelAnimationFrame(frame)
+      if (key === seen || !text.current) return
+      seen = key
+      const now = poses()
+      text.current.textContent = now ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m' : ''
+    })
   }, [poses, rows, state])
   return <output ref={text} className="instant numbers" aria-label="Position of the tool" />
 }

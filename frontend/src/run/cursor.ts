@@ -1,4 +1,5 @@
 import { create } from 'zustand'
+import { changed, watch } from '../frames'
 import { samples } from '../samples'
 import { useStudio } from '../store'
 
@@ -20,21 +21,24 @@ export function shownTime(): number {
   return useCursor.getState().time ?? reached()
 }
 
-let last = 0
+/** The frame (ms) in which the playback was moved last; null while nothing is played. */
+let last: number | null = null
 
-function tick(now: number): void {
+/** Move the playback. It is watched before all views: they draw the new instant in the same frame. */
+function move(now: number): void {
   const { playing, loop, time, rate } = useCursor.getState()
-  if (playing && time !== null) {
+  if (playing && time !== null && last !== null) {
     const next = time + (rate * (now - last)) / 1000
     const end = reached()
     if (next < end) useCursor.setState({ time: next })
     else if (loop) useCursor.setState({ time: samples.time[0] ?? 0 })
     else useCursor.setState({ time: end, playing: false })
   }
-  last = now
-  requestAnimationFrame(tick)
+  last = playing ? now : null
+  if (playing) changed()
 }
-requestAnimationFrame(tick)
+watch(move)
+useCursor.subscribe(changed)
 
 /** Play the recorded run from the cursor, from the start where it stands at the end. */
 export function play(): void {

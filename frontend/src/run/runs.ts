@@ -1,5 +1,6 @@
 import { create } from 'zustand'
 import type { EventOf } from '../connection'
+import { changed } from '../frames'
 import type { ViewOf } from '../protocol'
 import { RunSamples, samples, showSamples } from '../samples'
 
@@ -50,6 +51,7 @@ export const useRuns = create<Runs>((set) => ({
   rename: (key, name) => set((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, name } : run)) })),
   remove: (key) => set((s) => ({ runs: s.runs.filter((run) => run.key !== key || run.samples === samples) })),
 }))
+useRuns.subscribe(changed)
 
 let counted = 0
 

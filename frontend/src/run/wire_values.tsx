@@ -6,6 +6,7 @@ import { createPortal } from 'react-dom'
 import { create } from 'zustand'
 import type { Point } from '../canvas/router'
 import type { WireEdgeType } from '../canvas/wire_edge'
+import { changed, watch } from '../frames'
 import type { PortSpot, SheetBlock } from '../protocol'
 import { samples } from '../samples'
 import { digits, reading, useUnits } from '../scopes/quantity'
@@ -96,23 +97,22 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   )
 }
 
-/** Write the values of the instant into their places, on animation frames and past React. */
+/** Write the values of the instant into their places, in the frame after a change and past React. */
 function useWriting(layer: React.RefObject<HTMLDivElement | null>): void {
-  useEffect(() => {
-    let handle = 0
-    const frame = () => {
-      handle = requestAnimationFrame(frame)
-      const time = shownTime()
-      layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((place) => {
-        const now = `${samples.version} ${time} ${place.dataset['path']} ${useUnits.getState().radians}`
-        if (place.dataset['seen'] === now) return
-        place.dataset['seen'] = now
-        place.textContent = valueAtInstant(place.dataset['path'] ?? '', time)
-      })
-    }
-    frame()
-    return () => cancelAnimationFrame(handle)
-  }, [layer])
+  useEffect(changed) // there may be other places
+  useEffect(
+    () =>
+      watch(() => {
+        const time = shownTime()
+        layer.current?.querySelectorAll<HTMLElement>('[data-path]').forEach((place) => {
+          const now = `${samples.version} ${time} ${place.dataset['path']} ${useUnits.getState().radians}`
+          if (place.dataset['seen'] === now) return
+          place.dataset['seen'] = now
+          place.textContent = valueAtInstant(place.dataset['path'] ?? '', time)
+        })
+      }),
+    [layer],
+  )
 }
 
 function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level: string; logged: string[]; pinned: ReadonlySet<string> }) {

@@ -2,6 +2,7 @@ import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
+import { changed, watch } from '../frames'
 import { shownTime, useCursor } from '../run/cursor'
 import { mayFollow } from '../run/pace'
 import { useRuns } from '../run/runs'
@@ -131,9 +132,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
     let whole = 0
     let shape = ''
     let lines = ''
-    let frameHandle = 0
     const frame = (at: number) => {
-      frameHandle = requestAnimationFrame(frame)
       if (!element.isConnected) return // behind another panel
       const [from, to] = shownWindow()
       const width = Math.max(Math.floor(plot.bbox.width / devicePixelRatio), 10)
@@ -148,7 +147,10 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
         plot.redraw(false, false)
         return
       }
-      if (same && marks === lines && live && !mayFollow(at)) return
+      if (same && marks === lines && live && !mayFollow(at)) {
+        changed()
+        return
+      }
       // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
       const before = same ? known : undefined
       const made = drawnOf(shown, from, to, width, before)
@@ -177,7 +179,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       })
       if (made.ends) growing.shows(drawn, made.ends)
     }
-    frame(performance.now())
+    leave.push(watch(frame))
     if (handle)
       handle.current = {
         figure: () => {
@@ -194,16 +196,19 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
           }
         },
       }
-    const sized = new ResizeObserver(() => plot.setSize({ width: Math.max(element.clientWidth, 60), height: Math.max(element.clientHeight, 60) }))
+    const sized = new ResizeObserver(() => {
+      plot.setSize({ width: Math.max(element.clientWidth, 60), height: Math.max(element.clientHeight, 60) })
+      changed()
+    })
     sized.observe(element)
     return () => {
-      cancelAnimationFrame(frameHandle)
       sized.disconnect()
       for (const one of leave) one()
       plot.destroy()
     }
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [identity, scheme, title, band])
+  useEffect(changed, [values])
   return <div ref={box} className="plot" role="img" aria-label={`${title}: ${shown.map(({ label }) => label).join(', ')}`} />
 }
 

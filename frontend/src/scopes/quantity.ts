@@ -1,4 +1,5 @@
 import { create } from 'zustand'
+import { changed } from '../frames'
 
 /** How people read a quantity: its number times `factor` has this unit. */
 export interface Reading {
@@ -26,6 +27,7 @@ const spell = (unit: string) =>
 
 /** Angles in degrees for people; radians on request. */
 export const useUnits = create<{ radians: boolean }>(() => ({ radians: false }))
+useUnits.subscribe(changed)
 
 /** Factor and unit in which magnitudes up to `largest` read well: degrees for angles, SI prefixes instead of long zeros. */
 export function reading(unit: string, largest: number, radians = useUnits.getState().radians): Reading {

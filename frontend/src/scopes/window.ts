@@ -1,4 +1,5 @@
 import { create } from 'zustand'
+import { changed } from '../frames'
 import { samples } from '../samples'
 import { useStudio } from '../store'
 
@@ -13,6 +14,7 @@ interface Window {
 
 /** Zoom and measuring cursors: the same for all time plots. */
 export const useWindow = create<Window>(() => ({ range: null, cursors: null, measuring: false }))
+useWindow.subscribe(changed)
 
 /** The whole run: to its stop time while it goes on, and to where it came when it has ended. */
 export function wholeRun(): [number, number] {

@@ -1,5 +1,6 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
+import { changed, watch } from '../frames'
 import { shownTime } from '../run/cursor'
 import { mayFollow } from '../run/pace'
 import { samples } from '../samples'
@@ -51,22 +52,28 @@ export function XyPlot({ traces, title, handle }: { traces: Trace[]; title: stri
     const box = element?.parentElement
     if (!element || !box) return
     let seen = ''
-    let frameHandle = 0
     const frame = (at: number) => {
-      frameHandle = requestAnimationFrame(frame)
       if (!box.isConnected) return // behind another panel
       const { clientWidth: width, clientHeight: height } = box
       const now = `${samples.version} ${shownTime()} ${width} ${height} ${useUnits.getState().radians}`
       if (now === seen || width < 40 || height < 40) return
-      if (useStudio.getState().run?.state === 'running' && !mayFollow(at)) return
+      if (useStudio.getState().run?.state === 'running' && !mayFollow(at)) {
+        changed()
+        return
+      }
       seen = now
       element.width = width * devicePixelRatio
       element.height = height * devicePixelRatio
       paint(figureOf(traces, '', width, height), element, devicePixelRatio)
     }
-    frame(performance.now())
+    const leave = watch(frame)
+    const sized = new ResizeObserver(changed)
+    sized.observe(box)
     handle.current = { figure: () => figureOf(traces, title, 520, 480) }
-    return () => cancelAnimationFrame(frameHandle)
+    return () => {
+      leave()
+      sized.disconnect()
+    }
   }, [traces, title, scheme, handle])
   return (
     <div className="plot xy" role="img" aria-label={`${title}: ${traces.map(({ label }) => label).join(' and ')}`}>

@@ -1,5 +1,6 @@
 import { useCallback, useEffect, useRef, useState } from 'react'
 import { Refusal } from '../../connection'
+import { changed } from '../../frames'
 import { ask, line } from '../../store'
 import { listed, type Poses, type RobotScene } from '../scene'
 import { Stage } from '../stage'
@@ -33,6 +34,7 @@ export default function ArmPanel() {
           if (!alive) break
           poses.current = listed(found)
           moves.current++
+          changed()
         } catch (error) {
           if (!(error instanceof Refusal)) throw error
         }

@@ -1,0 +1,24 @@
+/**
+ * Views that draw what changes outside of React's state: samples, the time cursor, sizes. Each view is called in the
+ * animation frame after a change, and compares there what it shows with what it drew last. While nothing changes the
+ * page requests no frames.
+ */
+type Look = (now: number) => void
+
+const looks = new Set<Look>()
+let requested = 0
+
+/** Call every view in the next animation frame. */
+export function changed(): void {
+  requested ||= requestAnimationFrame((now) => {
+    requested = 0 // a view may request the frame after this one
+    for (const look of looks) look(now)
+  })
+}
+
+/** Call `look` in the next animation frame and in the frame after every change; returns the function that ends this. */
+export function watch(look: Look): () => void {
+  looks.add(look)
+  changed()
+  return () => void looks.delete(look)
+}
