@@ -87,12 +87,17 @@ function arrange({ api }: DockviewReadyEvent): void {
   api.addPanel({ id: 'signals', component: 'signals', title: 'Signals', position: { referencePanel: 'scopes' }, inactive: true })
 }
 
+/** A component of its own: a dialog that opens or closes renders nothing else of the page. */
+function DialogsWhenWanted() {
+  const settled = useSettled()
+  const wanted = useWanted()
+  return (settled || wanted) && <Dialogs />
+}
+
 export function App() {
   const scheme = useComputedColorScheme('light')
   const editing = useDesk((s) => s.current !== null)
   useSettling()
-  const settled = useSettled()
-  const wanted = useWanted()
   return (
     <div className="studio">
       <div className={editing ? 'behind' : 'sheets'} inert={editing}>
@@ -107,7 +112,7 @@ export function App() {
         </main>
         <Timeline wires />
       </div>
-      {(settled || wanted) && <Dialogs />}
+      <DialogsWhenWanted />
       {editing && (
         <Suspense fallback={<p className="robot-editor empty">Loading the robot editor …</p>}>
           <RobotEditor />

@@ -1,4 +1,4 @@
-import { lazy, Suspense, useEffect, type ComponentType } from 'react'
+import { lazy, memo, Suspense, useEffect, type ComponentType } from 'react'
 import { create } from 'zustand'
 import { useDialogs, useTour } from './dialogs'
 import { useStudio } from './store'
@@ -13,11 +13,11 @@ const parts: (() => Promise<unknown>)[] = []
 export function later(load: () => Promise<ComponentType>, words = ''): ComponentType {
   const Part = lazy(() => load().then((part) => ({ default: part })))
   parts.push(load)
-  return () => (
+  return memo(() => (
     <Suspense fallback={words && <p className="empty">{words}</p>}>
       <Part />
     </Suspense>
-  )
+  ))
 }
 
 /** Whether the first picture of the page is there, so that what comes later may come. */

@@ -42,7 +42,7 @@ export function startOrResume(): void {
 }
 
 export function TopBar() {
-  const document = useStudio((s) => s.document)
+  const known = useStudio((s) => s.document !== null)
   const state = useStudio((s) => s.run?.state)
   const runKey = useStudio((s) => s.run?.run)
   const speed = useRuns((s) => s.speed)
@@ -69,14 +69,14 @@ export function TopBar() {
       <FileMenu />
       <DocumentTitle />
       <Group gap={2} role="group" aria-label="Edit">
-        <Tool label={document?.state.undo ? `Undo ${document.state.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!document?.state.undo} onClick={() => alter('undo')} />
-        <Tool label={document?.state.redo ? `Redo ${document.state.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!document?.state.redo} onClick={() => alter('redo')} />
-        <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!document} onClick={() => void save()} />
-        <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!document} onClick={() => show('insert')} />
-        <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!document} onClick={() => alter('arrange')} />
+        <Undo />
+        <Redo />
+        <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!known} onClick={() => void save()} />
+        <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!known} onClick={() => show('insert')} />
+        <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!known} onClick={() => alter('arrange')} />
       </Group>
       <Group gap={4} role="group" aria-label="Run" className="run-controls">
-        <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!document || state === 'running'} onClick={startOrResume}>
+        <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!known || state === 'running'} onClick={startOrResume}>
           {state === 'paused' ? 'Resume' : 'Run'}
         </Button>
         <Tool label={busy ? 'Step back' : 'One instant back'} icon={IconPlayerSkipBackFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? goBack() : stepCursor(-1))} />
@@ -97,11 +97,22 @@ export function TopBar() {
           }}
         />
       </Group>
-      <Tool label="Configuration parameters (Ctrl+E)" icon={IconSettings} disabled={!document} onClick={openConfiguration} />
+      <Tool label="Configuration parameters (Ctrl+E)" icon={IconSettings} disabled={!known} onClick={openConfiguration} />
       <RunState />
       <RunProgress />
     </header>
   )
+}
+
+/** Components of their own: an edit renders no other tool. */
+function Undo() {
+  const edit = useStudio((s) => s.document?.state.undo)
+  return <Tool label={edit ? `Undo ${edit} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!edit} onClick={() => alter('undo')} />
+}
+
+function Redo() {
+  const edit = useStudio((s) => s.document?.state.redo)
+  return <Tool label={edit ? `Redo ${edit} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!edit} onClick={() => alter('redo')} />
 }
 
 /** When the model stops, s: what is typed counts when the field is left. */
