@@ -12,6 +12,7 @@ import armblocks as ab
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block
 from armblocks.formats import diagram_to_python
+from worked_examples import worked_example
 
 Invoke = Callable[..., Result]
 
@@ -80,6 +81,6 @@ def test_every_block_is_shown_with_its_example(kind: type[Block], invoke: Invoke
     assert result.exit_code == 0, result.output
     assert kind.summary().split(":")[0] in " ".join(result.stdout.split())
     code = "".join(
-        f"    {line}".rstrip() + "\n" for line in diagram_to_python(ab.block_example(kind)).splitlines()
+        f"    {line}".rstrip() + "\n" for line in diagram_to_python(worked_example(kind)).splitlines()
     )
     assert code in result.stdout
