@@ -110,7 +110,7 @@ def hybrid(
 
 
 def bouncing_ball(restitution: float = 0.7, height: float = 1.0, speed: float = 0.0) -> HybridSystem:
-    """Counts its bounces and keeps the time of the last one."""
+    """Counts its bounces and keeps the time of the last one. The code is the same for every restitution."""
     return hybrid(
         "bouncing_ball",
         states=("ball/h", "ball/v"),
@@ -118,11 +118,13 @@ def bouncing_ball(restitution: float = 0.7, height: float = 1.0, speed: float = 
         signals=("ball/h", "ball/v", "ball/bounces", "ball/last"),
         x0=(height, speed),
         z0=(0.0, 0.0),
+        parameters=("ball.restitution",),
+        values=(restitution,),
         guards=(("ball", -1),),
         derivative=lambda t, x, z, w, p: column(x[1], -9.81),
         outputs=lambda t, x, z, w, p: column(x[0], x[1], z[0], z[1]),
         guard=lambda t, x, z, w, p: x[0],
-        reset=lambda t, x, z, w, p, e: (column(0.0, -restitution * x[1]), column(z[0] + 1, t)),
+        reset=lambda t, x, z, w, p, e: (column(0.0, -p[0] * x[1]), column(z[0] + 1, t)),
     )
 
 
