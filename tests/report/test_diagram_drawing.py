@@ -3,6 +3,8 @@
 import dataclasses
 import itertools
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from functools import partial
 
 import pytest
 
@@ -83,19 +85,21 @@ def many_kinds() -> Diagram:
     return builder.build()
 
 
-def diagrams() -> list[Diagram]:
-    shipped = [ab.load_diagram(name) for name in EXAMPLES]
-    bare = [dataclasses.replace(diagram, layout={}) for diagram in shipped]
-    return [*shipped, *bare, feedback_loop(), many_kinds()]
+def without_layout(name: str) -> Diagram:
+    return dataclasses.replace(ab.load_diagram(name), layout={})
 
 
-CASES = diagrams()
-IDS = [f"{diagram.name}-{'placed' if diagram.layout else 'layered'}" for diagram in CASES]
+CASES: dict[str, Callable[[], Diagram]] = {
+    **{f"{name}-placed": partial(ab.load_diagram, name) for name in EXAMPLES},
+    **{f"{name}-layered": partial(without_layout, name) for name in EXAMPLES},
+    "feedback loop": feedback_loop,
+    "many kinds": many_kinds,
+}
 
 
-@pytest.fixture(params=CASES, ids=IDS, scope="module")
+@pytest.fixture(params=CASES.values(), ids=list(CASES), scope="module")
 def diagram(request: pytest.FixtureRequest) -> Diagram:
-    return request.param
+    return request.param()
 
 
 def routed(
