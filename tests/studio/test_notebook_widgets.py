@@ -116,10 +116,17 @@ def test_the_widgets_of_a_result_share_their_time_cursor(notebook: Page) -> None
         return new Set(new Uint32Array(data.buffer)).size
     }"""
     assert scopes.locator(".chart canvas").first.evaluate(inked) > 8
+    pages = [frame.locator("html") for frame in (scopes, arm)]
+    notebook.emulate_media(color_scheme="dark")
+    for page in pages:
+        expect(page).to_have_attribute("data-mantine-color-scheme", "dark")
+    notebook.evaluate("document.body.dataset.jpThemeLight = 'true'")  # as JupyterLab says its theme
+    for page in pages:
+        expect(page).to_have_attribute("data-mantine-color-scheme", "light")
 
 
 def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
-    notebook.set_viewport_size({"width": 480, "height": 480})  # the arm is drawn in software
+    notebook.set_viewport_size({"width": 240, "height": 240})  # the arm is drawn in software
     puma = ab.load_robot("puma560")
     q = [0.1, 0.4, -2.0, 0.3, 0.5, 0.0]
     (arm,) = show(notebook, ab.robot_widget(puma, q))
@@ -129,11 +136,6 @@ def test_a_robot_stands_where_it_was_put(notebook: Page) -> None:
     expect(canvas).to_be_visible()
     # Journeys through the studio do not draw the arm (NOT_DRAWN); here it is drawn, in many shades.
     wait_until(notebook, lambda: colours(canvas.screenshot()) > 500)
-    page = arm.locator("html")
-    notebook.emulate_media(color_scheme="dark")
-    expect(page).to_have_attribute("data-mantine-color-scheme", "dark")
-    notebook.evaluate("document.body.dataset.jpThemeLight = 'true'")  # as JupyterLab says its theme
-    expect(page).to_have_attribute("data-mantine-color-scheme", "light")
 
 
 def test_what_cannot_be_shown_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
