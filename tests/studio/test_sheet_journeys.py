@@ -395,13 +395,19 @@ DROPS = """async () => {
 }"""
 OPENINGS = """async () => {
     // Each block is opened by a double click; what its dialog asks for is read, and the dialog closed again.
-    const until = async (found) => {
-        for (;;) {
-            const value = found()
-            if (value) return value
-            await new Promise(requestAnimationFrame)
-        }
-    }
+    // Nothing waits for a picture: to draw each dialog in software takes longer than to make it.
+    const until = (found) =>
+        new Promise((resolve) => {
+            const look = (_, watch) => {
+                const value = found()
+                if (!value) return false
+                watch.disconnect()
+                resolve(value)
+                return true
+            }
+            const watch = new MutationObserver(look)
+            if (!look([], watch)) watch.observe(document, { subtree: true, childList: true })
+        })
     const dialog = (name) => {
         const shown = document.querySelector('[role=dialog]')
         return shown?.querySelector('h2')?.textContent.startsWith(name) ? shown : null
