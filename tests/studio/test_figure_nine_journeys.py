@@ -166,7 +166,10 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
                 continue
             tab_to(page, box)
             page.keyboard.press("Control+a")
-            page.keyboard.type(port)
+            if count == 1:
+                page.keyboard.type(port)
+            else:  # the keys of a field are the same for every wire: one event brings the whole name
+                page.keyboard.insert_text(port)
             expect(page.locator(f'[role="option"][value="{port}"][data-combobox-selected]')).to_be_visible()
             page.keyboard.press("Enter")
             expect(box).to_have_value(port)
