@@ -31,6 +31,7 @@ from armblocks.diagram import (
 )
 from armblocks.errors import ArmblocksError
 from armblocks.robot import Robot
+from worked_examples import worked_example
 
 
 def line(*blocks: Block) -> Diagram:
@@ -82,7 +83,7 @@ def others(rule: Parameter, value: Any) -> Iterator[object]:
 
 @pytest.mark.parametrize("name", sorted(BLOCKS))
 def test_every_parameter_of_every_block_is_in_the_key(name: str) -> None:
-    diagram = ab.block_example(BLOCKS[name])
+    diagram = worked_example(BLOCKS[name])
     for place in [place for place, block in diagram.blocks.items() if type(block) is BLOCKS[name]][:1]:
         block = diagram.blocks[place]
         found: dict[Block, str | None] = {block: content_key(diagram)}
