@@ -7,6 +7,7 @@ settings or with an altered diagram; the alterations are those of SLforge and SL
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -151,20 +152,54 @@ def agrees_with_reference(case: Case) -> Iterator[str]:
         case.diagram, np.unique([0.0, *(case.times - 1e-7), *(case.times + 1e-7)]).clip(0.0)
     )
     found = list(different(without_single_rows(case.run, wanted, beside), wanted, 1e-6, case.uncertainty))
-    if found and (name := edge_at_rest(case)):
-        raise InconclusiveError(f"rounding decides whether '{name}' switches at the start")
+    if found:
+        expect_well_posed(case, case.run)
     yield from found
 
 
-def edge_at_rest(case: Case) -> str:
-    """A control of a subsystem whose signal begins at 0 and leaves it too flatly for its sign to be known."""
-    start = ab.simulate(case.diagram, stop_time=1e-3, sample_time=1e-4, rtol=1e-9, atol=1e-12)
-    for name, block in flat_diagram(case.diagram).blocks.items():
-        if isinstance(block, EnableControl | TriggerControl):
-            signal = start[f"{name}/u"]
-            if signal[0] == 0.0 and 0.0 < np.abs(signal).max() < 1e-9:
-                return name
-    return ""
+NUDGE, NEIGHBOURS = 1e-9, 8
+
+
+def expect_well_posed(case: Case, run: Signals) -> None:
+    """Raise where a run lies between those of diagrams that differ by next to nothing.
+
+    Where a signal rests at a border, or reaches it at the very instant of a tick, rounding decides what
+    happens. The neighbours have a number of the size of ``NUDGE`` added to the signal of every wire.
+    """
+    neighbours = [case.reference]
+    for seed in range(NEIGHBOURS):
+        nodes = nudged(case.recipe.nodes, np.random.default_rng(seed))
+        with contextlib.suppress(ArmblocksError, UnsupportedError, EndlessEventsError, np.linalg.LinAlgError):
+            diagram = replace(case.recipe, nodes=nodes).diagram()
+            neighbours.append(run_reference(diagram, case.times, 0.004, most_events=300))
+    for name in case.reference.keys() & run.keys():
+        values = np.stack([neighbour[name] for neighbour in neighbours])
+        near = 1e-5 * (1.0 + np.abs(values).max(initial=0.0))
+        outside = (run[name] < values.min(axis=0) - near) | (run[name] > values.max(axis=0) + near)
+        if outside.reshape(len(outside), -1).any(axis=1).sum() > 2:
+            return
+    raise InconclusiveError("a change by next to nothing changes these numbers")
+
+
+def nudged(nodes: tuple[Node, ...], random: np.random.Generator) -> tuple[Node, ...]:
+    """The diagram with a small number added on each wire, also inside of subsystems."""
+    found: list[Node] = []
+    for k, node in enumerate(nodes):
+        inputs = dict(node.inputs)
+        for port, source in node.inputs.items():
+            if not is_action(node, source):
+                name = f"nudge {k} {port}"
+                found.append(
+                    Node(name, "Bias", {"bias": float(random.choice((-NUDGE, NUDGE)))}, {"u": source})
+                )
+                inputs[port] = f"{name}/y"
+        found.append(replace(node, inputs=inputs, inside=nudged(node.inside, random)))
+    return tuple(found)
+
+
+def is_action(node: Node, source: str) -> bool:
+    """Whether a wire leads an action, or one of the signals that exclude one another, to a block."""
+    return node.kind in ("Merge", "ActionSubsystem") or source.split("/")[0].startswith("if ")
 
 
 def without_single_rows(found: Signals, wanted: Signals, beside: Signals) -> dict[str, np.ndarray]:
@@ -281,6 +316,7 @@ def converges(case: Case) -> Iterator[str]:
     for name, values in case.run.items():
         wrong = rows_beyond(loose[name], values, 2e-3)
         if wrong.sum() > max(2, len(wrong) // 10):
+            expect_well_posed(case, loose)
             row = int(np.argmax(wrong))
             yield f"'{name}' differs in {wrong.sum()} rows between tolerances, first at row {row}"
 
@@ -291,6 +327,7 @@ def agrees_with_fixed_steps(case: Case) -> Iterator[str]:
     for name, values in case.run.items():
         wrong = rows_beyond(fixed[name], values, 1e-3)
         if wrong.sum() > max(2, len(wrong) // 10):
+            expect_well_posed(case, fixed)
             row = int(np.argmax(wrong))
             yield f"'{name}' differs in {wrong.sum()} rows with fixed steps, first at row {row}"
 
@@ -401,8 +438,7 @@ def through(kind: str, parameters: Mapping[str, Any]) -> Change:
         for k, node in enumerate(recipe.nodes):
             inputs = dict(node.inputs)
             for port, source in node.inputs.items():
-                fixed = node.kind in ("Merge", "ActionSubsystem") or source.split("/")[0].startswith("if ")
-                if k % 2 == 0 and not fixed:
+                if k % 2 == 0 and not is_action(node, source):
                     name = f"through {k} {port}"
                     nodes.append(Node(name, kind, parameters, {"u": source}))
                     inputs[port] = f"{name}/y"

@@ -205,15 +205,7 @@ class Maker:
                 "RepeatingSequence",
                 {"times": (0.0, 0.25, 0.5, 0.75), "values": tuple(float(r.choice(LIMITS)) for _ in range(4))},
             ),
-            (
-                "SineWave",
-                {
-                    "amplitude": height,
-                    "frequency": float(r.choice([math.pi, 2 * math.pi, 2.0, r.uniform(0.5, 9.0)])),
-                    "phase": float(r.choice([0.0, math.pi / 2, r.uniform(0, 6)])),
-                    "bias": float(r.choice([0.0, 0.5, -0.5])),
-                },
-            ),
+            ("SineWave", self.sine(height)),
             ("SineWave", {"amplitude": (1.0, 0.5), "frequency": (3.0, float(r.uniform(1, 6))), "phase": 0.3}),
             (
                 "Ramp",
@@ -234,6 +226,20 @@ class Maker:
             ("CounterLimited", {"upper": 3, "sample_time": self.period()}),
         ]
         return choices[int(r.integers(len(choices)))]
+
+    def sine(self, amplitude: float) -> dict[str, Any]:
+        """Parameters of a sine that may touch a border, but that reaches none at the very instant of a tick:
+        there, rounding would decide what is sampled."""
+        r = self.random
+        frequency = float(r.choice([math.pi, 2 * math.pi, 2.0, r.uniform(0.5, 9.0)]))
+        phase = float(r.choice([0.0, math.pi / 2, r.uniform(0, 6)]))
+        anywhere = float(r.uniform(0, 6))
+        return {
+            "amplitude": amplitude,
+            "frequency": frequency,
+            "phase": anywhere if frequency % math.pi == 0.0 else phase,
+            "bias": float(r.choice([0.0, 0.5, -0.5])),
+        }
 
     def period(self) -> Any:
         return PERIODS[int(self.random.integers(len(PERIODS)))]
