@@ -25,6 +25,8 @@ LAST_PLACE = 2.0**-52
 """Of a double, beside its size."""
 FINEST = 2.0**-12
 """Guards are evaluated at distances no shorter than this part of a step."""
+NEAR_START = 2.0**-6
+"""Up to this part of a step, values between the steps are poor beside what has changed since its start."""
 
 
 class Events:
@@ -296,10 +298,34 @@ class Events:
             self.happened.value = 1
             self._bisect(low, high, time, h)
             with r.when(high.value < end):
-                self.method.interpolate(high.value, time, h, self.y)
+                # A step across the border of a mode has no stages of its own, and cannot be taken again.
+                taken = h > 2.0 * self.crossing(time)
+                with r.when((high.value - time < NEAR_START * h) & taken):
+                    self._step_again(high.value, time, h)
+                with r.otherwise():
+                    self.method.interpolate(high.value, time, h, self.y)
                 # An event that is one instant with a tick or breakpoint is at its time.
                 known = f.end.value
                 f.new_time.value = select(high.value * SAME_ABOVE >= known, known, high.value)
+
+    def _step_again(self, instant: Real, time: Real, h: Real) -> None:
+        """Make an instant near the start of the step its end, if a guard fires there then as well.
+
+        What leaves zero as a high power of the time has the wrong sign there between the steps, but not at
+        their ends: a mass at rest moves once its speed does, and does not pass zero.
+        """
+        f, r, end = self.frame, self.frame.r, self.frame.new_time.value
+        self._take_step(time, instant)
+        with r.when(self.watch(minimum(instant, f.clamp.value), self.y) == 0):
+            self._take_step(time, end)
+            self.records.extra_stages_once(time, h)
+            self.method.interpolate(instant, time, h, self.y)
+
+    def _take_step(self, time: Real, new_time: Real) -> None:
+        h = new_time - time
+        self.records.extra_done.value = 0
+        self.frame.h.value = h
+        self.method.stages(time, h, new_time)
 
     def _bisect(self, low: RealVariable, high: RealVariable, time: Real, h: Real) -> None:
         """Move ``high`` to the first instant, to the last place, at which a guard has fired.
@@ -323,14 +349,17 @@ class Events:
         """A length that is as good as nothing beside the time."""
         return 2.0**-46 * maximum(time, self.frame.reals[Scalar.SPAN])
 
+    def crossing(self, time: Real) -> Real:
+        """The length of the step of :meth:`cross`."""
+        return 8.0 * self.shortest(time)
+
     def cross(self, time: Real) -> None:
         """A step of next to no length along the old derivative, after which some guard must have fired.
 
         The equations of a mode may end where the mode does: a root of something that is about to be mirrored.
         """
         f, method = self.frame, self.method
-        h = 8.0 * self.shortest(time)
-        new_time = minimum(time + h, f.end.value)
+        new_time = minimum(time + self.crossing(time), f.end.value)
         h = new_time - time
         f.new_time.value = new_time
         f.h.value = h

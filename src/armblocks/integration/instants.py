@@ -187,6 +187,7 @@ class Instants(Course):
         time, h = f.time.value, f.h.value
         if self.events:
             self.events.search(time, h)
+            h = f.h.value
         new_time = f.new_time.value
         before = new_time * SAME_BELOW
         if self.events:

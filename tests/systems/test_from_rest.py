@@ -1,0 +1,56 @@
+"""Masses at rest begin to move: what their positions have not passed is not counted as passed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    CompareToZero,
+    CoulombFriction,
+    HitCrossing,
+    Ramp,
+    Relay,
+    SecondOrderLag,
+    Sign,
+    SineWave,
+    Step,
+)
+from armblocks.diagram import Block
+
+
+def masses(random: np.random.Generator) -> ab.Diagram:
+    """Nine of them; a block that switches watches each one's speed, which leaves zero before the position."""
+    builder = ab.DiagramBuilder("masses")
+    kinds = (CoulombFriction(), Sign(), CompareToZero(relation=">"), Relay(), HitCrossing())
+    for k in range(9):
+        size = float(random.choice((-1.0, 1.0)) * random.uniform(0.5, 6.0))
+        drives: tuple[Block, ...] = (
+            SineWave(amplitude=np.sign(size), frequency=abs(size)),
+            Ramp(slope=size, start=0.3 * (k % 2)),
+            Step(time=0.3, initial=0.0, final=size),
+        )
+        mass = SecondOrderLag(
+            natural_frequency=float(random.uniform(1.0, 6.0)), damping=float(random.uniform(0.1, 1.5))
+        )
+        moved = builder.add(f"mass {k}", mass, builder.add(f"drive {k}", drives[k % 3]))
+        builder.add(f"passes {k}", HitCrossing(), moved["y"])
+        builder.add(f"watches {k}", kinds[int(random.integers(5))], moved["rate"])
+    return builder.build()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"solver": "rk45"}, {"solver": "dop853"}, {"solver": "tsitouras"}, {"solver": "rk4", "step": 0.01}],
+    ids=lambda settings: str(settings["solver"]),
+)
+def test_a_mass_that_leaves_its_rest_does_not_pass_it(settings: dict[str, float]) -> None:
+    for seed in range(3):
+        result = ab.simulate(
+            masses(np.random.default_rng(seed)), stop_time=3.0, sample_time=0.01, rtol=1e-8, **settings
+        )
+        for k in range(9):
+            y = result[f"mass {k}/y"]
+            passed = np.count_nonzero(np.diff(np.sign(y[np.abs(y) > 1e-8])))
+            assert result[f"passes {k}/count"][-1] == passed, (seed, k)
