@@ -27,9 +27,18 @@ TURN_SECONDS = 0.02
 def works() -> dict[str, Callable[[], object]]:
     """What is measured, by name; all of it compiled."""
     import numpy as np
-    from simulations import FIXED, five_blocks
 
     import armblocks as ab
+    from armblocks.blocks import Gain, Integrator, Step, Sum
+
+    def five_blocks() -> ab.Diagram:
+        builder = ab.DiagramBuilder("five blocks")
+        total = builder.add("total", Sum(signs="+--"), builder.add("step", Step(time=0.0, final=1.0)))
+        speed = builder.add("speed", Integrator(), builder.add("gain", Gain(gain=4.0), total))
+        place = builder.add("place", Integrator(), speed)
+        builder.connect(place, total["u2"])
+        builder.connect(speed, total["u3"])
+        return builder.build()
 
     def run_of(diagram: ab.Diagram, **options: Any) -> Callable[[], object]:
         return lambda: ab.simulate(diagram, **options)
@@ -43,7 +52,8 @@ def works() -> dict[str, Callable[[], object]]:
             ("multirate", "puma560_multirate"),
         )
     }
-    found["five blocks"] = run_of(five_blocks(), **FIXED)
+    fixed = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
+    found["five blocks"] = run_of(five_blocks(), **fixed)
     arm = ab.load_robot("puma560").nofriction("all")
     q, qd, qdd = np.random.default_rng(0).uniform(-2, 2, (3, 100_000, arm.n))
     out = np.empty_like(q)
