@@ -14,9 +14,13 @@ flows has :class:`~armblocks.integration.segments.Segments`, any other
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import lru_cache
+
 from armblocks.integration.butcher_tableau import ButcherTableau
 from armblocks.integration.course import INSTANT, START, STEP, Course
 from armblocks.integration.delay_history import DelayHistory
+from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.evaluation import Evaluation
 from armblocks.integration.explicit_method import ExplicitMethod
 from armblocks.integration.frame import Arrays, Frame
@@ -29,12 +33,22 @@ from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.segments import Segments
 from armblocks.integration.step_control import Steps
 from armblocks.integration.workspace import Count, LoopSizes, Stage, Status, Workspace
+from armblocks.routines.llvm import definitions
 from armblocks.routines.memory import Integers, Reals
 from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Integer
 
 POINTERS = 12
 """Arrays among the arguments of the loop; the number of steps comes after them."""
+
+
+@lru_cache(maxsize=64)
+def loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
+    """LLVM IR by symbol of a loop, ``advance``, and its functions: the same for all systems of one shape."""
+    program = Program()
+    space = None if pattern is None else LinearSpace(pattern)
+    define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, space)
+    return definitions(program)
 
 
 def define_loop(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +17,10 @@ from armblocks.integration.delay_history import ROWS_OF_A_STEP
 from armblocks.integration.elimination_plan import JacobianPattern
 from armblocks.integration.explicit_method import STIFF_CHECKS
 from armblocks.integration.linear_equations import LinearSpace
-from armblocks.integration.loop import POINTERS, define_loop
+from armblocks.integration.loop import POINTERS, loop_text
 from armblocks.integration.rosenbrock_method import STABLE_CHECKS
 from armblocks.integration.rosenbrock_tableau import Tableau
 from armblocks.integration.workspace import Count, LoopSizes, Scalar, Stage, Status, Workspace
-from armblocks.routines.llvm import definitions
-from armblocks.routines.routine import Program
 
 if TYPE_CHECKING:
     from armblocks.compiler.tape import Tape
@@ -83,7 +80,7 @@ class NativeIntegrator:
             module = Module()
             for name in names:
                 emit_function(module, tape(name), name)
-            for symbol, text in _loop_text(tableau, sizes, pattern).items():
+            for symbol, text in loop_text(tableau, sizes, pattern).items():
                 module.add(symbol, text)
             return module.text
 
@@ -118,8 +115,8 @@ class NativeIntegrator:
         method (its instants are ``k step``); ``rtol``, ``atol``, ``max_step`` s: for adaptive methods. With a
         ``checkpoint`` the run goes on from there, as the run that left it would have. With
         ``watch_stiffness`` it pauses, :attr:`Integration.wants_other`, where a method for stiff systems, or
-        an explicit one again, does better. ``span`` s: the length of the run, more or less; events
-        near the time 0 are told apart beside it (default: ``stop``). Nothing is checked.
+        an explicit one again, does better. ``span`` s: roughly the length of the run, beside which
+        events near the time 0 are told apart (default: ``stop``). Nothing is checked.
         """
         if not isinstance(start, RunPoint):
             start = RunPoint(time=float(samples[0]), x=start)
@@ -172,15 +169,6 @@ class NativeIntegrator:
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
         """The native call. The interpreter's lock is released while it works."""
         return Status(self._advance(*addresses, max_steps))
-
-
-@lru_cache(maxsize=64)
-def _loop_text(tableau: Tableau, sizes: LoopSizes, pattern: JacobianPattern | None) -> Mapping[str, str]:
-    """The functions of a loop, ``advance`` among them: the same for all systems of one shape."""
-    program = Program()
-    space = None if pattern is None else LinearSpace(pattern)
-    define_loop(program, "advance", tableau, Workspace(tableau, sizes), sizes, space)
-    return definitions(program)
 
 
 def _checkpoint(run: Integration, reals: Vector, counts: Integers) -> Checkpoint:
