@@ -1,4 +1,4 @@
-"""Masses at rest begin to move: what their positions have not passed is not counted as passed."""
+"""Guards that are zero at the start of a step: masses that leave their rest, and a throw from the ground."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import pytest
 import armblocks as ab
 from armblocks.blocks import (
     CompareToZero,
+    Constant,
     CoulombFriction,
     HitCrossing,
+    Integrator,
     Ramp,
     Relay,
     SecondOrderLag,
@@ -42,7 +44,15 @@ def masses(random: np.random.Generator) -> ab.Diagram:
 
 @pytest.mark.parametrize(
     "settings",
-    [{"solver": "rk45"}, {"solver": "dop853"}, {"solver": "tsitouras"}, {"solver": "rk4", "step": 0.01}],
+    [
+        {"solver": "rk45"},
+        {"solver": "dop853"},
+        {"solver": "tsitouras"},
+        {"solver": "rk4", "step": 0.01},
+        {"solver": "ros23"},
+        {"solver": "rodas5p"},
+        {"solver": "ros5", "step": 0.01},
+    ],
     ids=lambda settings: str(settings["solver"]),
 )
 def test_a_mass_that_leaves_its_rest_does_not_pass_it(settings: dict[str, float]) -> None:
@@ -54,3 +64,17 @@ def test_a_mass_that_leaves_its_rest_does_not_pass_it(settings: dict[str, float]
             y = result[f"mass {k}/y"]
             passed = np.count_nonzero(np.diff(np.sign(y[np.abs(y) > 1e-8])))
             assert result[f"passes {k}/count"][-1] == passed, (seed, k)
+
+
+@pytest.mark.parametrize("solver", ["rk3", "rk4", "ros5", "heun"])
+@pytest.mark.parametrize("step", [0.3, 0.5, 0.7, 1.0, 1.5])
+def test_a_throw_comes_back_to_the_ground_within_a_step_or_at_its_end(solver: str, step: float) -> None:
+    builder = ab.DiagramBuilder("throw")
+    speed = builder.add("speed", Integrator(initial=5.0), builder.add("weight", Constant(value=-10.0)))
+    height = builder.add("height", Integrator(), speed)
+    for direction in ("either", "falling", "rising"):
+        builder.add(direction, HitCrossing(direction=direction), height)
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=3.0, solver=solver, step=step)
+    for direction, count in (("either", 1), ("falling", 1), ("rising", 0)):
+        assert result[f"{direction}/count"][-1] == count, direction
+        assert result[f"{direction}/last"][-1] == pytest.approx(count, abs=1e-12), direction

@@ -1,4 +1,4 @@
-"""Events of a loop: guards whose sign changes, at an instant and within a step.
+"""Events of a loop: guards whose sign changes, and what follows at that instant.
 
 A guard fires where its sign is the opposite of the one it had after the last step, tick or event, in a step
 that its direction allows. A zero takes no side: a guard that is zero keeps its last sign, and one that is
@@ -10,23 +10,17 @@ from __future__ import annotations
 
 from armblocks.integration import system_functions
 from armblocks.integration.evaluation import Evaluation
-from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW, Frame, copy
+from armblocks.integration.frame import SAME_BELOW, Frame, copy
 from armblocks.integration.guard_functions import GuardFunctions
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.workspace import Count, Scalar, Status
-from armblocks.routines.arithmetic import fma, maximum, minimum, select
+from armblocks.routines.arithmetic import select
 from armblocks.routines.memory import IntegerVariable, Reals, RealVariable
 from armblocks.routines.values import Boolean, Integer, Real
 
 TURNS_TOGETHER, MOST_TURNS = 8, 32
 """Modes are changed together in so many turns, and one for each mode; in all, so many turns for each mode."""
-LAST_PLACE = 2.0**-52
-"""Of a double, beside its size."""
-FINEST = 2.0**-12
-"""Guards are evaluated at distances no shorter than this part of a step."""
-NEAR_START = 2.0**-6
-"""Up to this part of a step, values between the steps are poor beside what has changed since its start."""
 
 
 class Events:
@@ -43,10 +37,8 @@ class Events:
         self.guards = len(frame.sizes.directions)
         self.modes = len(frame.sizes.modes)
         self.functions = GuardFunctions(frame.r.program, frame.places, frame.sizes)
-        self.happened = frame.r.integer(0)
-        """Whether a guard has fired within the step."""
         places = frame.places
-        self.x, self.y, self.new_x = (frame.vector(place) for place in (places.x, places.y, places.new_x))
+        self.x, self.new_x = frame.vector(places.x), frame.vector(places.new_x)
 
     def watch(self, time: Real, x: Reals) -> Integer:
         """Evaluate all guards and mark those that fire; how many do."""
@@ -55,13 +47,6 @@ class Events:
         t = self.point.memory
         self.evaluation.solve(t, x)
         return f.r.call(self.functions.watch, t, x, f.reals, f.p)
-
-    def watch_inside(self, instant: Real, time: Real, h: Real) -> Integer:
-        """How many guards have fired at an instant within the step."""
-        self.method.interpolate(instant, time, h, self.new_x)
-        return self.watch(minimum(instant, self.frame.clamp.value), self.new_x)
-
-    # At an instant.
 
     def make_modes_consistent(self, time: Real) -> None:
         """At the start, resets without events: modes and states take the values that the signals ask for.
@@ -237,136 +222,3 @@ class Events:
                 self.records.others(time, number, row)
                 f.increase(Count.SAMPLE)
             f.leave(Status.STOPPED)
-
-    # Within a step.
-
-    def search(self, time: Real, h: Real) -> None:
-        """If a guard fires within the step, go back to the first instant at which one does.
-
-        The step is searched in windows, at the middle and the end of each. A window is as long as the last
-        ones proved to be smooth enough, at the start an eighth of the step, and is halved where a guard may
-        have gone to zero and come back (``dips``). Then bisection: what is bracketed is "some guard has
-        fired", so that the first of several is found; the step ends on the far side of the zero, where it has
-        fired.
-        """
-        f, r, places = self.frame, self.frame.r, self.frame.places
-        end = f.new_time.value
-        low, high = r.real(time), r.real(end)
-        scan = f.reals.after(Scalar.SCAN)
-        unknown = scan[0] == float("inf")
-        scan[0] = select(unknown, 0.125 * h, minimum(scan[0], h))
-        finest = h * FINEST
-        self.records.extra_stages_once(time, h)
-        with r.part() as search:
-            with r.part() as found:
-                with r.part() as window:
-                    a = low.value
-                    middle = fma(0.5, scan[0], a)
-                    reached = a + scan[0]
-                    # What would leave less than half a window goes along with it, and so does all that is
-                    # left where the middle of a window cannot be told from its ends.
-                    whole = fma(0.5, scan[0], reached) >= end
-                    apart = (middle > a) & (middle < reached)
-                    whole = whole | ~apart
-                    middle = select(whole, fma(0.5, end - a, a), middle)
-                    reached = select(whole, end, reached)
-                    high.value = middle
-                    found.leave_unless(self.watch_inside(middle, time, h) == 0)
-                    f.copy(places.guards, places.guards_middle, self.guards)
-                    high.value = reached
-                    count = r.integer(0)
-                    with r.when(reached >= end):
-                        count.value = self.watch(minimum(end, f.clamp.value), self.y)
-                    with r.otherwise():
-                        count.value = self.watch_inside(reached, time, h)
-                    with r.unless(count.value == 0):
-                        low.value = middle
-                        found.leave()
-                    half = middle - a
-                    dips = r.call(self.functions.dips, f.reals, half) != 0
-                    with r.when(dips & (scan[0] > finest)):
-                        length = minimum(scan[0], reached - a)
-                        scan[0] = 0.5 * length
-                        window.again()
-                    r.call(self.functions.note_slopes, f.reals, half)
-                    r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
-                    f.copy(places.guards, places.guards_before, self.guards)
-                    low.value = reached
-                    scan[0] = 2.0 * scan[0]
-                    window.again_unless(reached >= end)
-                search.leave()
-            self.happened.value = 1
-            self._bisect(low, high, time, h)
-            with r.when(high.value < end):
-                # A step across the border of a mode has no stages of its own, and cannot be taken again.
-                taken = h > 2.0 * self.crossing(time)
-                with r.when((high.value - time < NEAR_START * h) & taken):
-                    self._step_again(high.value, time, h)
-                with r.otherwise():
-                    self.method.interpolate(high.value, time, h, self.y)
-                # An event that is one instant with a tick or breakpoint is at its time.
-                known = f.end.value
-                f.new_time.value = select(high.value * SAME_ABOVE >= known, known, high.value)
-
-    def _step_again(self, instant: Real, time: Real, h: Real) -> None:
-        """Make an instant near the start of the step its end, if a guard fires there then as well.
-
-        What leaves zero as a high power of the time has the wrong sign there between the steps, but not at
-        their ends: a mass at rest moves once its speed does, and does not pass zero.
-        """
-        f, r, end = self.frame, self.frame.r, self.frame.new_time.value
-        self._take_step(time, instant)
-        with r.when(self.watch(minimum(instant, f.clamp.value), self.y) == 0):
-            self._take_step(time, end)
-            self.records.extra_stages_once(time, h)
-            self.method.interpolate(instant, time, h, self.y)
-
-    def _take_step(self, time: Real, new_time: Real) -> None:
-        h = new_time - time
-        self.records.extra_done.value = 0
-        self.frame.h.value = h
-        self.method.stages(time, h, new_time)
-
-    def _bisect(self, low: RealVariable, high: RealVariable, time: Real, h: Real) -> None:
-        """Move ``high`` to the first instant, to the last place, at which a guard has fired.
-
-        None has at ``low``, some has at ``high``. Instants within four units in the last place are one
-        instant: located to the last place, an event at a recorded instant or a tick belongs to it. Near the
-        time 0 the last place is that of a millionth of the run.
-        """
-        r = self.frame.r
-        closest = (LAST_PLACE * 1e-6) * self.frame.reals[Scalar.SPAN]
-        with r.loop() as bisection:
-            a, b = low.value, high.value
-            middle = fma(0.5, b - a, a)
-            bisection.leave_unless((middle > a) & (middle < b) & (b - a > closest))
-            with r.when(self.watch_inside(middle, time, h) == 0):
-                low.value = middle
-            with r.otherwise():
-                high.value = middle
-
-    def shortest(self, time: Real) -> Real:
-        """A length that is as good as nothing beside the time."""
-        return 2.0**-46 * maximum(time, self.frame.reals[Scalar.SPAN])
-
-    def crossing(self, time: Real) -> Real:
-        """The length of the step of :meth:`cross`."""
-        return 8.0 * self.shortest(time)
-
-    def cross(self, time: Real) -> None:
-        """A step of next to no length along the old derivative, after which some guard must have fired.
-
-        The equations of a mode may end where the mode does: a root of something that is about to be mirrored.
-        """
-        f, method = self.frame, self.method
-        new_time = minimum(time + self.crossing(time), f.end.value)
-        h = new_time - time
-        f.new_time.value = new_time
-        f.h.value = h
-        # All stages alike, so that the values between the steps are on the same line.
-        for row in range(1, method.tableau.rows):
-            copy(f.r, method.K(0), method.K(row), f.n)
-        self.records.extra_done.value = 1
-        method.move((1.0,), h)
-        fired = self.watch(minimum(new_time, f.clamp.value), self.y)
-        f.leave_unless(fired != 0, Status.NON_FINITE)

@@ -19,6 +19,11 @@ time, some 100 units in its last place, are taken for the first of infinitely ma
 SHORT = 0.01
 """The first step after an event, beside the time since the guard's event before it."""
 
+UNDECIDED, NEXT_TO_ZERO = 2, 1
+"""Why an event is doubtful: a guard that fires had no sign at the start of the step, or was next to zero."""
+NEAR = 2.0**-3
+"""Next to zero: less than this part of its value at the end of the step."""
+
 
 class GuardFunctions:
     """The functions of a program for the guards of a system.
@@ -41,6 +46,8 @@ class GuardFunctions:
         self.note_events = program.define(self._note_events, "note_events")
         self.dips = program.define(self._dips, "dips")
         self.note_slopes = program.define(self._note_slopes, "note_slopes")
+        self.doubt = program.define(self._doubt, "doubt")
+        self.any_returned = program.define(self._any_returned, "any_returned")
         self.any_fired = program.define(self._any_fired, "any_fired")
         self.any_contradicts = program.define(self._any_contradicts, "any_contradicts")
         self.take_followers = program.define(self._take_followers, "take_followers")
@@ -76,6 +83,31 @@ class GuardFunctions:
             found = contradictions[i] != 0.0
             total.value = total.value + found.count()
         return total.value
+
+    def _doubt(self, r: Routine, reals: Reals) -> Integer:
+        """Whether a guard that is marked had no sign at the start of the step, or was next to zero there; the
+        guards are those at its end."""
+        places, found = self.places, r.integer(0)
+        for i in r.each(self.count):
+            fired, known, before, after = (
+                reals.after(place)[i]
+                for place in (places.fired, places.signs_at_start, places.guards_at_start, places.guards)
+            )
+            near = abs(before) <= NEAR * abs(after)
+            why = select(known == 0.0, r.constant_integer(UNDECIDED), near.count())
+            worse = (fired != 0.0) & (why > found.value)
+            found.value = select(worse, why, found.value)
+        return found.value
+
+    def _any_returned(self, r: Routine, reals: Reals) -> Boolean:
+        """Whether a guard without a sign at the start of the step has taken one, and is zero at its end."""
+        places, found = self.places, r.boolean(False)
+        for i in r.each(self.count):
+            before, now, value = (
+                reals.after(place)[i] for place in (places.signs_at_start, places.signs, places.guards)
+            )
+            found.value = found.value | ((before == 0.0) & (now != 0.0) & (value == 0.0))
+        return found.value
 
     def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
         """Whether a guard is marked that only locates changes of modes, or another one; the marks of the

@@ -22,6 +22,7 @@ from armblocks.integration.clocks import Clocks
 from armblocks.integration.course import INSTANT, START, STEP, Course, Trial
 from armblocks.integration.delays import Delays
 from armblocks.integration.evaluation import Evaluation
+from armblocks.integration.event_search import EventSearch
 from armblocks.integration.events import Events
 from armblocks.integration.frame import SAME_ABOVE, SAME_BELOW, Frame
 from armblocks.integration.method import Method
@@ -50,6 +51,7 @@ class Instants(Course):
         self.point = point
         self.clocks = Clocks(frame, evaluation, point)
         self.events = Events(frame, method, records, evaluation, point) if frame.sizes.directions else None
+        self.search = EventSearch(self.events) if self.events else None
         history = evaluation.history
         self.delays = Delays(frame, method, records, evaluation, history, point) if history else None
         self.segment_end = frame.r.real(0.0)
@@ -136,7 +138,7 @@ class Instants(Course):
         """Try a fixed step, shorter where its end is not finite; at last one across the border of a mode."""
         f, r, method = self.frame, self.frame.r, self.method
         end_row = method.K(method.tableau.end_row)
-        if not self.events:
+        if not self.search:
             trial(time, new_time)
             f.leave_unless(method.all_finite(method.y, end_row), Status.NON_FINITE)
             return
@@ -147,14 +149,14 @@ class Instants(Course):
                 finite.leave_when(method.all_finite(method.y, end_row))
                 h = 0.25 * (end.value - time)
                 end.value = time + h
-                attempt.again_when(h > self.events.shortest(time))
-            self.events.cross(time)
+                attempt.again_when(h > self.search.shortest(time))
+            self.search.cross(time)
 
     def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
         """Steps have become as short as they can be: cross the border of a mode, if that is the cause."""
-        if self.events:
+        if self.search:
             with self.frame.r.unless(finite):
-                self.events.cross(time)
+                self.search.cross(time)
                 accepted.leave()
         else:
             self.frame.leave_unless(finite, Status.NON_FINITE)
@@ -182,18 +184,18 @@ class Instants(Course):
     def accept(self, stages: Stages) -> None:
         """Events within the step, its samples, then the new point becomes the old one."""
         f, r, places, records = self.frame, self.frame.r, self.frame.places, self.records
-        if self.events:
-            self.events.happened.value = 0
+        if self.search:
+            self.search.happened.value = 0
         time, h = f.time.value, f.h.value
-        if self.events:
-            self.events.search(time, h)
+        if self.search:
+            self.search.first_event(time)
             h = f.h.value
         new_time = f.new_time.value
         before = new_time * SAME_BELOW
-        if self.events:
+        if self.search:
             # An event is located to the last place: a record before it shows what was before it, unless a
             # tick or breakpoint is at this instant as well.
-            apart = (self.events.happened.value != 0) & (new_time < f.end.value * SAME_BELOW)
+            apart = (self.search.happened.value != 0) & (new_time < f.end.value * SAME_BELOW)
             before = select(apart, (new_time.bits() - 1).from_bits(), before)
         records.samples(time, before, h)
         if self.delays:
@@ -206,7 +208,7 @@ class Instants(Course):
         bound.value = bound.value * 10.0
         f.taken.value = f.taken.value + 1
         ends = new_time >= f.end.value
-        with r.unless((self.events.happened.value != 0) | ends if self.events else ends):
+        with r.unless((self.search.happened.value != 0) | ends if self.search else ends):
             f.copy(places.slope(self.method.tableau.end_row), places.slope(0), f.n)
             if f.sizes.algebraic or self.delays:
                 # The samples may have changed it; a zero of the same equations is found again at once.

@@ -166,7 +166,8 @@ class Workspace:
     as accepted, ``new_x`` and ``new_z`` what a reset or update makes of them, ``trial_w`` the unknowns of the
     implicit equations at the point evaluated last, ``guards``, those at the beginning and in the middle of
     the window that is searched (``guards_before``, ``guards_middle``), how fast they changed at the end of
-    the window before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet),
+    the window before it (``guard_slopes``, NaN: not known), their ``signs`` (0: not known yet), the values
+    and signs at the start of the step (``guards_at_start``, ``signs_at_start``),
     ``fired``, when each fired last (``last``), how long after the time before (``gap``), how often in a row
     this became shorter (``shrinking``), and how often it fired among the latest events that follow one
     another closely (``repeats``); ``contradictions``, not 0 for the modes that contradict their conditions;
@@ -193,7 +194,9 @@ class Workspace:
         self.guards_middle = self.guards_before + ng
         self.guard_slopes = self.guards_middle + ng
         self.signs = self.guard_slopes + ng
-        self.fired = self.signs + ng
+        self.guards_at_start = self.signs + ng
+        self.signs_at_start = self.guards_at_start + ng
+        self.fired = self.signs_at_start + ng
         self.last = self.fired + ng
         self.gap = self.last + ng
         self.repeats = self.gap + ng

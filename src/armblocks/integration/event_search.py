@@ -1,0 +1,240 @@
+"""Events within a step: the first instant at which a guard fires, by the values between the steps.
+
+They are those of the method's dense output. Where these are poor, the end of a shorter step decides.
+"""
+
+from __future__ import annotations
+
+from armblocks.integration.events import Events
+from armblocks.integration.frame import SAME_ABOVE, copy
+from armblocks.integration.guard_functions import NEXT_TO_ZERO, UNDECIDED
+from armblocks.integration.step_control import GROW
+from armblocks.integration.workspace import Scalar, Status
+from armblocks.routines.arithmetic import fma, maximum, minimum, select
+from armblocks.routines.memory import IntegerVariable, RealVariable
+from armblocks.routines.routine import Part
+from armblocks.routines.values import Boolean, Integer, Real
+
+LAST_PLACE = 2.0**-52
+"""Of a double, beside its size."""
+FINEST = 2.0**-12
+"""Guards are evaluated at distances no shorter than this part of a step."""
+NEAR_START = 2.0**-6
+"""Up to this part of a step, values between the steps are poor beside what has changed since its start."""
+
+
+class EventSearch:
+    """Writes the search of a step for events, and the step across the border of a mode."""
+
+    def __init__(self, events: Events) -> None:
+        self.events = events
+        self.frame, self.method, self.records = events.frame, events.method, events.records
+        self.functions, self.guards = events.functions, events.guards
+        self.happened = self.frame.r.integer(0)
+        """Whether the step ends where a guard has fired by the values between the steps."""
+        places = self.frame.places
+        self.y, self.new_x = (self.frame.vector(place) for place in (places.y, places.new_x))
+
+    def first_event(self, time: Real) -> None:
+        """If a guard fires within the step, let it end at the first instant at which one does.
+
+        The step is searched in windows, at the middle and the end of each. A window is as long as the last
+        ones proved to be smooth enough, at the start an eighth of the step, and is halved where a guard may
+        have gone to zero and come back (``dips``). Then bisection: what is bracketed is "some guard has
+        fired", so that the first of several is found; the step ends on the far side of the zero, where it has
+        fired.
+        """
+        f, r = self.frame, self.frame.r
+        low, high, doubt = r.real(time), r.real(time), r.integer(0)
+        self._keep_start()
+        with r.part() as search:
+            with r.part() as attempt:
+                h, end = f.h.value, f.new_time.value
+                # A step across the border of a mode has no stages of its own, and cannot be taken again.
+                divisible = h > 2.0 * self.crossing(time)
+                self.records.extra_stages_once(time, h)
+                with r.part() as judged:
+                    with r.part() as found:
+                        self._scan(time, h, low, high, found)
+                        search.leave_unless(divisible & r.call(self.functions.any_returned, f.reals))
+                        doubt.value = UNDECIDED
+                        judged.leave()
+                    self._bisect(low, high, time, h)
+                    doubt.value = 0
+                    with r.when(high.value < end):
+                        self._judge(doubt, high.value, time, h)
+                with r.when((doubt.value != 0) & divisible):
+                    self._take_shorter(high.value, doubt.value == UNDECIDED, time, h, attempt)
+                with r.otherwise(), r.when(high.value < end):
+                    self.method.interpolate(high.value, time, h, self.y)
+                    f.new_time.value = high.value
+            self.happened.value = 1
+            # An event that is one instant with a tick or breakpoint is at its time.
+            known, new_time = f.end.value, f.new_time.value
+            f.new_time.value = select(new_time * SAME_ABOVE >= known, known, new_time)
+
+    def _scan(self, time: Real, h: Real, low: RealVariable, high: RealVariable, found: Part) -> None:
+        """Go through the windows of a step; leave ``found`` where a guard has fired between the variables."""
+        f, r, places = self.frame, self.frame.r, self.frame.places
+        end = f.new_time.value
+        low.value = time
+        scan = f.reals.after(Scalar.SCAN)
+        unknown = scan[0] == float("inf")
+        scan[0] = select(unknown, 0.125 * h, minimum(scan[0], h))
+        finest = h * FINEST
+        with r.part() as window:
+            a = low.value
+            middle = fma(0.5, scan[0], a)
+            reached = a + scan[0]
+            # What would leave less than half a window goes along with it, and so does all that is
+            # left where the middle of a window cannot be told from its ends.
+            whole = fma(0.5, scan[0], reached) >= end
+            apart = (middle > a) & (middle < reached)
+            whole = whole | ~apart
+            middle = select(whole, fma(0.5, end - a, a), middle)
+            reached = select(whole, end, reached)
+            high.value = middle
+            found.leave_unless(self.watch_inside(middle, time, h) == 0)
+            f.copy(places.guards, places.guards_middle, self.guards)
+            high.value = reached
+            count = r.integer(0)
+            with r.when(reached >= end):
+                count.value = self.events.watch(minimum(end, f.clamp.value), self.y)
+            with r.otherwise():
+                count.value = self.watch_inside(reached, time, h)
+            with r.unless(count.value == 0):
+                low.value = middle
+                found.leave()
+            half = middle - a
+            dips = r.call(self.functions.dips, f.reals, half) != 0
+            with r.when(dips & (scan[0] > finest)):
+                length = minimum(scan[0], reached - a)
+                scan[0] = 0.5 * length
+                window.again()
+            r.call(self.functions.note_slopes, f.reals, half)
+            r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
+            f.copy(places.guards, places.guards_before, self.guards)
+            low.value = reached
+            scan[0] = 2.0 * scan[0]
+            window.again_unless(reached >= end)
+
+    def watch_inside(self, instant: Real, time: Real, h: Real) -> Integer:
+        """How many guards have fired at an instant within the step."""
+        self.method.interpolate(instant, time, h, self.new_x)
+        return self.events.watch(minimum(instant, self.frame.clamp.value), self.new_x)
+
+    def _judge(self, doubt: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
+        """Whether an event that the values between the steps show is doubtful, and why.
+
+        These values are poor near the start of the step, and where a guard is next to zero there. What leaves
+        zero as a high power of the time has the wrong sign between the steps, but not at their ends: a mass
+        at rest moves once its speed does, and does not pass zero.
+        """
+        f, r, functions, t = self.frame, self.frame.r, self.functions, self.events.point.memory
+        self.watch_inside(instant, time, h)
+        self.events.point.value = minimum(f.new_time.value, f.clamp.value)
+        self.events.evaluation.solve(t, self.y)
+        functions.evaluate(r, t, self.y, f.reals, f.p)
+        early = instant - time < NEAR_START * h
+        found = r.call(functions.doubt, f.reals)
+        doubt.value = select(early & (found == 0), NEXT_TO_ZERO, found)
+
+    def _take_shorter(self, instant: Real, undecided: Boolean, time: Real, h: Real, attempt: Part) -> None:
+        """Take a step to an instant at which an event is doubtful: what it says at its end holds.
+
+        Where nothing has fired there, an eighth of the step is searched instead, unless that is shorter. A
+        guard without a sign takes one halfway to the instant.
+        """
+        f, r, crossing = self.frame, self.frame.r, self.crossing(time)
+        distance, shorter = instant - time, 0.125 * h
+        length = select(undecided, maximum(0.5 * distance, crossing), distance)
+        new_time = r.real(time + length)
+        last = undecided | (distance >= shorter) | (shorter < 2.0 * crossing)
+        searched = r.boolean(False)
+        with r.part() as step:
+            self._take_step(time, new_time.value)
+            self._restore_start()
+            with r.when(searched.value):
+                self._grow_from(shorter)
+                attempt.again()
+            step.leave_unless(self.events.watch(minimum(new_time.value, f.clamp.value), self.y) == 0)
+            with r.when(last):
+                # No shorter, so that steps without an event do not creep.
+                step.leave_when(f.h.value > 0.5 * crossing)
+                new_time.value = time + crossing
+                step.again()
+            searched.value = True
+            new_time.value = time + shorter
+            step.again()
+        self._grow_from(f.h.value)
+
+    def _keep_start(self) -> None:
+        """Keep what is known of the guards at the start of the step."""
+        places, f = self.frame.places, self.frame
+        f.copy(places.signs, places.signs_at_start, self.guards)
+        f.copy(places.guards_before, places.guards_at_start, self.guards)
+
+    def _restore_start(self) -> None:
+        """What is known of the guards is again what it was at the start of the step."""
+        places, f = self.frame.places, self.frame
+        f.copy(places.signs_at_start, places.signs, self.guards)
+        f.copy(places.guards_at_start, places.guards_before, self.guards)
+        for i in f.r.each(self.guards):
+            f.vector(places.guard_slopes)[i] = float("nan")
+
+    def _grow_from(self, h: Real) -> None:
+        """An adaptive step after this one grows from its length."""
+        if self.method.tableau.adaptive:
+            length = self.frame.scalar[Scalar.STEP]
+            length.value = minimum(length.value, GROW * h)
+
+    def _take_step(self, time: Real, new_time: Real) -> None:
+        f, h = self.frame, new_time - time
+        self.records.extra_done.value = 0
+        f.h.value = h
+        f.new_time.value = new_time
+        self.method.stages(time, h, new_time)
+
+    def _bisect(self, low: RealVariable, high: RealVariable, time: Real, h: Real) -> None:
+        """Move ``high`` to the first instant, to the last place, at which a guard has fired.
+
+        None has at ``low``, some has at ``high``. Instants within four units in the last place are one
+        instant: located to the last place, an event at a recorded instant or a tick belongs to it. Near the
+        time 0 the last place is that of a millionth of the run.
+        """
+        r = self.frame.r
+        closest = (LAST_PLACE * 1e-6) * self.frame.reals[Scalar.SPAN]
+        with r.loop() as bisection:
+            a, b = low.value, high.value
+            middle = fma(0.5, b - a, a)
+            bisection.leave_unless((middle > a) & (middle < b) & (b - a > closest))
+            with r.when(self.watch_inside(middle, time, h) == 0):
+                low.value = middle
+            with r.otherwise():
+                high.value = middle
+
+    def shortest(self, time: Real) -> Real:
+        """A length that is as good as nothing beside the time."""
+        return 2.0**-46 * maximum(time, self.frame.reals[Scalar.SPAN])
+
+    def crossing(self, time: Real) -> Real:
+        """The length of the step of :meth:`cross`."""
+        return 8.0 * self.shortest(time)
+
+    def cross(self, time: Real) -> None:
+        """A step of next to no length along the old derivative, after which some guard must have fired.
+
+        The equations of a mode may end where the mode does: a root of something that is about to be mirrored.
+        """
+        f, method = self.frame, self.method
+        new_time = minimum(time + self.crossing(time), f.end.value)
+        h = new_time - time
+        f.new_time.value = new_time
+        f.h.value = h
+        # All stages alike, so that the values between the steps are on the same line.
+        for row in range(1, method.tableau.rows):
+            copy(f.r, method.K(0), method.K(row), f.n)
+        self.records.extra_done.value = 1
+        method.move((1.0,), h)
+        fired = self.events.watch(minimum(new_time, f.clamp.value), self.y)
+        f.leave_unless(fired != 0, Status.NON_FINITE)
