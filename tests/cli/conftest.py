@@ -5,18 +5,24 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from armblocks.cli.main import app
+
+command_made_once = cache(get_command)
+"""Typer's runner reads the signatures of all commands for each call: half of the time of a short command."""
 
 
 @pytest.fixture
 def invoke(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
     """Call the command line in this process, from an empty folder."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("typer.testing._get_command", command_made_once)
 
     def call(*arguments: str, columns: int = 80) -> Result:
         return CliRunner().invoke(app, list(arguments), env={"COLUMNS": str(columns), "ARMBLOCKS_DEBUG": ""})
