@@ -5,14 +5,24 @@ from __future__ import annotations
 import gc
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from armblocks.robot import Robot
 from robots_for_tests import LAW_ROBOTS, build_kr180, build_puma560
 
-FULL_EFFORT = ("compiler", "dynamics", "integration", "simulation")
-"""Folders of tests that compile as users do."""
+TESTS = Path(__file__).parent
+FULL_EFFORT = (
+    "compiler",
+    "dynamics/test_dynamics_kernels.py",
+    "integration",
+    "simulation/test_hybrid_simulation.py",
+    "simulation/test_tableaux.py",
+)
+"""Folders and files of tests that compile as users do: their laws are about the compiled code."""
+ALLOCATIONS_BEFORE_COLLECTION = 10_000
+"""With Python's own 700, the collector takes a tenth of the tests' time: diagrams are many small objects."""
 
 
 def pytest_sessionstart() -> None:
@@ -23,6 +33,7 @@ def pytest_sessionstart() -> None:
 def pytest_collection_finish() -> None:
     """What has been collected is no garbage for the rest of the session."""
     gc.freeze()
+    gc.set_threshold(ALLOCATIONS_BEFORE_COLLECTION)
     gc.enable()
 
 
@@ -57,8 +68,9 @@ def effort(request: pytest.FixtureRequest) -> Iterator[None]:
     as users do.
     """
     asked = os.environ.get("ARMBLOCKS_EFFORT", "little")
+    full = any(request.path.is_relative_to(TESTS / place) for place in FULL_EFFORT)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ARMBLOCKS_EFFORT", "full" if request.path.parent.name in FULL_EFFORT else asked)
+        patch.setenv("ARMBLOCKS_EFFORT", "full" if full else asked)
         yield
 
 
