@@ -18,6 +18,27 @@ from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, e
 
 from interruptible import start_interruptible
 
+NOT_NEEDED = (
+    # The browser's own address bar: Chromium loads two pages for its suggestions into every new window, which
+    # takes as much processor time as the studio's page.
+    "WebUIOmniboxPopup",
+    "WebUIOmniboxAimPopup",
+    # What Playwright turns off: of two lists of features Chromium reads the last one only.
+    "AvoidUnnecessaryBeforeUnloadCheckSync",
+    "DestroyProfileOnBrowserClose",
+    "HttpsUpgrades",
+    "HttpsFirstBalancedModeAutoEnable",
+    "LensOverlay",
+    "MediaRouter",
+    "PaintHolding",
+    "ThirdPartyStoragePartitioning",
+    "AvoidCorsURLLoaderRestartOnRedirect",
+    "OptimizationHints",
+    "NetworkTimeServiceQuerying",
+    "AimEnabled",
+    "PreconnectToSearch",
+)
+"""Features of Chromium that no journey needs."""
 FLAGS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -29,6 +50,7 @@ FLAGS = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    f"--disable-features={','.join(NOT_NEEDED)}",
 ]
 TOUR_SEEN = "if (location.protocol === 'http:') localStorage.setItem('armblocks-tour-seen', 'yes')"
 """Nobody is shown around; pages that are no page of the studio (about:blank) have nothing to keep that in."""
