@@ -7,7 +7,7 @@ file under ``tests``.
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -43,40 +43,62 @@ def literal_pieces(node: ast.expr, names: dict[str, ast.expr]) -> Iterator[str]:
             )
 
 
+def is_message(node: ast.AST) -> bool:
+    """Whether an error or warning is made here."""
+    if not isinstance(node, ast.Call) or not node.args:
+        return False
+    kind = called(node)
+    return kind in TREE or (
+        kind == "warn"
+        and any(isinstance(argument, ast.Name) and argument.id in TREE for argument in node.args[1:])
+    )
+
+
+def called(node: ast.Call) -> str:
+    """The last name of what is called."""
+    return node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
+
+
 def messages() -> Iterator[tuple[str, list[str]]]:
     """Every place where an error or warning is made, with the literal pieces of its message."""
     for path in sorted(SOURCE.rglob("*.py")):
-        if path.name == "errors.py":
+        text = path.read_text(encoding="utf-8")
+        if path.name == "errors.py" or not any(name in text for name in TREE):
             continue
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = ast.parse(text)
         scopes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-        seen: set[int] = set()
+        seen: set[ast.Call] = set()
         for scope in (*scopes, tree):
-            names = {
-                target.id: node.value
-                for node in ast.walk(scope)
-                if isinstance(node, ast.Assign)
-                for target in node.targets
-                if isinstance(target, ast.Name)
-            }
-            for node in ast.walk(scope):
-                if not isinstance(node, ast.Call) or id(node) in seen or not node.args:
-                    continue
-                kind = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
-                is_warning = kind == "warn" and any(
-                    isinstance(argument, ast.Name) and argument.id in TREE for argument in node.args[1:]
-                )
-                if kind not in TREE and not is_warning:
-                    continue
-                seen.add(id(node))
-                pieces = list(literal_pieces(node.args[0], names))
-                if kind == "UnknownNameError":
-                    pieces = [f"there is no {' '.join(pieces)} named"]
-                for keyword in node.keywords:
-                    if keyword.arg in ("allowed", "fix"):
-                        pieces += literal_pieces(keyword.value, names)
-                place = f"{path.relative_to(SOURCE).as_posix()}:{node.lineno}"
-                yield place, pieces
+            inside = list(ast.walk(scope))
+            calls = [node for node in inside if isinstance(node, ast.Call) and is_message(node)]
+            if not seen.issuperset(calls):
+                names = assigned(inside)
+                for node in calls:
+                    if node not in seen:
+                        seen.add(node)
+                        yield f"{path.relative_to(SOURCE).as_posix()}:{node.lineno}", pieces_of(node, names)
+
+
+def assigned(nodes: Sequence[ast.AST]) -> dict[str, ast.expr]:
+    """What is assigned to each name."""
+    return {
+        target.id: node.value
+        for node in nodes
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+
+
+def pieces_of(node: ast.Call, names: dict[str, ast.expr]) -> list[str]:
+    """The literal pieces of the message that is made here."""
+    pieces = list(literal_pieces(node.args[0], names))
+    if called(node) == "UnknownNameError":
+        pieces = [f"there is no {' '.join(pieces)} named"]
+    for keyword in node.keywords:
+        if keyword.arg in ("allowed", "fix"):
+            pieces += literal_pieces(keyword.value, names)
+    return pieces
 
 
 def runs(pieces: list[str]) -> Iterator[tuple[str, ...]]:

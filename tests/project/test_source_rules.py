@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -31,12 +31,6 @@ CONTROL_FLOW = re.compile(r"\b(br label|br i1|switch i\d+|indirectbr) | = phi |\
 """Text of LLVM IR that jumps, branches or merges, and calls that would write it."""
 
 
-def functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            yield node
-
-
 def public_definitions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.ClassDef]:
     for node in tree.body:
         if not isinstance(node, ast.FunctionDef | ast.ClassDef) or node.name.startswith("_"):
@@ -55,6 +49,12 @@ def trees() -> dict[str, ast.Module]:
     }
 
 
+@pytest.fixture(scope="module")
+def nodes(trees: dict[str, ast.Module]) -> dict[str, list[ast.AST]]:
+    """All nodes of the tree of every file."""
+    return {name: list(ast.walk(tree)) for name, tree in trees.items()}
+
+
 def test_a_module_says_what_it_is_for(trees: dict[str, ast.Module]) -> None:
     assert [name for name, tree in trees.items() if not ast.get_docstring(tree)] == []
 
@@ -68,9 +68,9 @@ def test_public_definitions_have_docstrings(trees: dict[str, ast.Module]) -> Non
     ] == []
 
 
-def forbidden_parts(tree: ast.Module, imports: set[str]) -> Iterator[int]:
+def forbidden_parts(nodes: Iterable[ast.AST], imports: set[str]) -> Iterator[int]:
     """Lines that evaluate text, import one of these modules, or let a file be unpickled."""
-    for node in ast.walk(tree):
+    for node in nodes:
         match node:
             case ast.Call(func=ast.Name(id=called)) if called in FORBIDDEN_CALLS:
                 yield node.lineno
@@ -85,11 +85,11 @@ def forbidden_parts(tree: ast.Module, imports: set[str]) -> Iterator[int]:
                 pass
 
 
-def test_nothing_is_evaluated_pickled_or_fetched(trees: dict[str, ast.Module]) -> None:
+def test_nothing_is_evaluated_pickled_or_fetched(nodes: dict[str, list[ast.AST]]) -> None:
     assert [
         f"{name}:{line}"
-        for name, tree in trees.items()
-        for line in forbidden_parts(tree, FORBIDDEN_IMPORTS - DOORS.get(name, set()))
+        for name, inside in nodes.items()
+        for line in forbidden_parts(inside, FORBIDDEN_IMPORTS - DOORS.get(name, set()))
     ] == []
 
 
@@ -103,15 +103,16 @@ def test_nothing_is_evaluated_pickled_or_fetched(trees: dict[str, ast.Module]) -
     ],
 )
 def test_what_is_forbidden_is_found(source: str, lines: list[int]) -> None:
-    assert list(forbidden_parts(ast.parse(source), FORBIDDEN_IMPORTS)) == lines
+    assert list(forbidden_parts(ast.walk(ast.parse(source)), FORBIDDEN_IMPORTS)) == lines
 
 
-def test_functions_can_be_read_in_one_sitting(trees: dict[str, ast.Module]) -> None:
+def test_functions_can_be_read_in_one_sitting(nodes: dict[str, list[ast.AST]]) -> None:
     assert [
         f"{name}: {function.name} has {lines} lines"
-        for name, tree in trees.items()
-        for function in functions(tree)
-        if (lines := (function.end_lineno or 0) - function.lineno + 1) > LONGEST_FUNCTION
+        for name, inside in nodes.items()
+        for function in inside
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
+        and (lines := (function.end_lineno or 0) - function.lineno + 1) > LONGEST_FUNCTION
     ] == []
 
 
