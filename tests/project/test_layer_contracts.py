@@ -32,7 +32,7 @@ VIOLATIONS = {
 
 
 def judge(folder: Path) -> tuple[dict[str, bool], dict[str, str]]:
-    """Run import-linter over ``folder/src``: by contract, whether it is kept, and what is said of broken ones."""
+    """Run import-linter over ``folder/src``: whether each contract is kept; what is said of broken ones."""
     script = (
         "import sys; sys.path.insert(0, 'src'); "
         "from importlinter.cli import lint_imports; sys.exit(lint_imports())"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -19,12 +20,33 @@ GRID = 30
 NAMES = ("derivative", "signals", "residual", "update", "guards", "reset")
 
 
+class Evaluated:
+    """A function of CasADi whose arguments and results stay in place: CasADi converts arrays slowly."""
+
+    def __init__(self, function: ca.Function) -> None:
+        assert all(function.sparsity_in(k).is_dense() for k in range(function.n_in()))
+        assert all(function.sparsity_out(k).is_dense() for k in range(function.n_out()))
+        self.taken = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self.given = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+        self.buffer, self.evaluate = function.buffer()
+        for k, array in enumerate(self.taken):
+            self.buffer.set_arg(k, memoryview(array))
+        for k, array in enumerate(self.given):
+            self.buffer.set_res(k, memoryview(array))
+
+    def __call__(self, *values: float | np.ndarray) -> list[np.ndarray]:
+        for array, value in zip(self.taken, values, strict=True):
+            array[:] = value
+        self.evaluate()
+        return [array.copy() for array in self.given]
+
+
 class Reference:
     """One run of a system from 0; ``signals`` at the samples, ``events`` so far."""
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
-        self.functions = {name: getattr(system, name).casadi_function() for name in NAMES}
+        self.functions = {name: Evaluated(getattr(system, name).casadi_function()) for name in NAMES}
         self.p = system.parameter_values
         self.x, self.z, self.w = (
             np.asarray(getattr(system, name)(self.p)[0])
@@ -38,14 +60,13 @@ class Reference:
         w = self.w
         if w.size and name != "residual":
             w = self.solve(t, x)
-        results = self.functions[name].call([t, x, self.z, w, self.p, *more])
-        return [np.asarray(value).reshape(-1) for value in results]
+        return self.functions[name](t, x, self.z, w, self.p, *more)
 
     def solve(self, t: float, x: np.ndarray) -> np.ndarray:
         """The zero of one unknown, between -10 and 10."""
 
         def residual(w: float) -> float:
-            return float(self.functions["residual"].call([t, x, self.z, w, self.p])[0])
+            return float(self.functions["residual"](t, x, self.z, w, self.p)[0][0])
 
         return np.array([brentq(residual, -10.0, 10.0, xtol=1e-14)])
 

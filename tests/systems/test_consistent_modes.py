@@ -119,7 +119,7 @@ def limited(u: Array, dt: float, rising: float, falling: float, start: float) ->
 def test_rates_of_many_sines_are_limited() -> None:
     """Crests, touches of the limit and restarts from below and above, with few events each."""
     random = np.random.default_rng(4)
-    count, dt = 60, 1e-3
+    count, dt = 30, 1e-3
     amplitude, frequency = random.uniform(0.3, 3.0, count), random.uniform(0.3, 3.0, count)
     phase = random.uniform(0.0, 6.0, count)
     amplitude[0], frequency[0], phase[0] = 1.1166089529668757, 1.7826608001550557, 2.350048796723417
