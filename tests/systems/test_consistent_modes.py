@@ -15,6 +15,7 @@ import armblocks as ab
 from armblocks import DiagramBuilder
 from armblocks.blocks import (
     Abs,
+    Backlash,
     Clock,
     CompareToZero,
     Constant,
@@ -26,6 +27,7 @@ from armblocks.blocks import (
     Integrator,
     IntegratorLimited,
     IntervalTest,
+    Product,
     PulseGenerator,
     Quantizer,
     RateLimiterContinuous,
@@ -297,6 +299,46 @@ def test_nothing_with_a_memory_acts_on_a_signal_that_is_not_consistent_yet() -> 
     np.testing.assert_allclose(result["integral/y"], result.time, atol=1e-12)
     np.testing.assert_array_equal(result["hits/count"], 0.0)
     np.testing.assert_array_equal(result["triggered/y"], -1.0)
+
+
+def test_what_a_hysteresis_gives_on_the_way_to_its_value_is_not_remembered() -> None:
+    """Behind a jump, a relay, a rate limiter and a play take several turns to find their values."""
+    builder = DiagramBuilder("turns")
+    jump = builder.add("jump", Step(time=1.0))
+    relay = builder.add("relay", Relay(), jump)
+    above = builder.add("above", CompareToZero(relation=">"), jump)
+    limited = builder.add("limited", RateLimiterContinuous(rising=0.0), jump)
+    back = builder.add("back", Step(time=2.0, initial=2.0, final=1.5))
+    driving = builder.add("driving", Product(), jump, back)
+    play = builder.add("play", Backlash(width=1.0), driving)
+    watched = {
+        "difference": builder.add("difference", Sum(signs="+-"), above, relay),
+        "relays": builder.add("relays", Sum(signs="+-"), relay, builder.add("second", Relay(), relay)),
+        "limit": limited,
+        "release": builder.add("release", Sum(signs="+-"), play, builder.add("one", Gain(gain=1.5), jump)),
+    }
+    for name, signal in watched.items():
+        builder.add(f"{name} passes", HitCrossing(offset=0.25), signal)
+        builder.add(f"{name} sinks", HitCrossing(offset=-0.25), signal)
+        builder.add(f"{name} remembered", Relay(on_point=0.2, off_point=-0.2, off_value=0.5), signal)
+    builder.add("continuous", Integrator(), jump)
+    result = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.25)
+    for name in watched:
+        np.testing.assert_array_equal(result[f"{name} passes/count"], 0.0)
+        np.testing.assert_array_equal(result[f"{name} sinks/count"], 0.0)
+        np.testing.assert_array_equal(result[f"{name} remembered/y"], 0.5)
+
+
+def test_a_relay_that_resets_what_it_watches_stays_on() -> None:
+    """At one instant the integral reaches 1, the relay switches on and resets the integral, and stays on."""
+    builder = DiagramBuilder("reset")
+    integral = builder.add("integral", ResettableIntegrator(external_reset="rising"))
+    relay = builder.add("relay", Relay(on_point=1.0, off_point=-1.0), integral)
+    builder.connect(relay, integral["reset"])
+    builder.connect(builder.add("rate", Constant(value=1.0)), integral["u"])
+    result = ab.simulate(builder.build(), stop_time=1.75, sample_time=0.25)
+    np.testing.assert_array_equal(result["relay/y"], result.time >= 1.0)
+    np.testing.assert_allclose(result["integral/y"], result.time % 1.0, atol=1e-12)
 
 
 def test_a_touch_at_a_corner_is_sampled_as_it_is_at_the_tick() -> None:

@@ -169,12 +169,12 @@ class Relay(Block):
         return {"y": broadcast({**inputs, **own})}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("mode", inputs["u"], "1 on, 0 off"),)
+        return (State("mode", inputs["u"], "1 on, 0 off", follows=True, remembers=True),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (
-            Guard("on", inputs["u"], "u - on_point", 1),
-            Guard("off", inputs["u"], "u - off_point", -1),
+            Guard("on", inputs["u"], "u - on_point", 1, locates=True),
+            Guard("off", inputs["u"], "u - off_point", -1, locates=True),
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -187,9 +187,6 @@ class Relay(Block):
         sides = self.guard_values(t, x, u, p)
         stays = if_else(sides["off"] < 0.0, 0.0, x["mode"])
         return {"mode": if_else(sides["on"] > 0.0, 1.0, stays)}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        return {"mode": if_else(e["on"] > 0.0, 1.0, if_else(e["off"] < 0.0, 0.0, x["mode"]))}
 
 
 @dataclass(frozen=True, kw_only=True)

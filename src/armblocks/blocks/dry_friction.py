@@ -108,14 +108,15 @@ class Backlash(Block):
         return (State("rest", inputs["u"], "the output just before the latest instant"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("mode", inputs["u"], "1 driven upwards, -1 downwards, 0 at rest"),)
+        doc = "1 driven upwards, -1 downwards, 0 at rest"
+        return (State("mode", inputs["u"], doc, follows=True, remembers=True),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = inputs["u"]
         return (
-            Guard("upper", shape, "u reaches the upper end of the play", 1),
-            Guard("lower", shape, "u reaches the lower end of the play", -1),
-            Guard("turn", shape, "u turns back"),
+            Guard("upper", shape, "u reaches the upper end of the play", 1, locates=True),
+            Guard("lower", shape, "u reaches the lower end of the play", -1, locates=True),
+            Guard("turn", shape, "u turns back", locates=True),
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -145,10 +146,6 @@ class Backlash(Block):
         upwards = if_else(released, fmin(by_place, 0.0), 1.0)
         downwards = if_else(released_down, fmax(by_place, 0.0), -1.0)
         return {"mode": if_else(x["mode"] > 0.0, upwards, if_else(x["mode"] < 0.0, downwards, by_place))}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        happened = logic_or(e["turn"] != 0.0, logic_or(e["upper"] > 0.0, e["lower"] < 0.0))
-        return {"mode": if_else(happened, self.mode_values(t, x, u, p)["mode"], x["mode"])}
 
     def initial_states(self, p: Signals) -> Signals:
         return {"rest": p["initial"]}

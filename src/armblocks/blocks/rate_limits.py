@@ -72,7 +72,9 @@ class RateLimiting(Block):
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": if_else(x["mode"] == 0.0, u["u"], x["y"])}
+        jumps = fabs(self._jump(t, x, u)) > self._band(u)
+        follows = if_else(jumps, x["kept"], u["u"])
+        return {"y": if_else(x["mode"] == 0.0, follows, x["y"])}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         limits = self.limits(u, p)
@@ -106,20 +108,29 @@ class RateLimiting(Block):
         law = self._law(t, x, u, p)
         fired = logic_or(e["gap"] != 0.0, logic_or(e["fast"] != 0.0, e["fast_down"] != 0.0))
         leaves = logic_and(x["mode"] == 0.0, law != 0.0)
-        at_instant = fabs(t - x["kept_at"]) <= SAME_INSTANT * fabs(t)
         return {
             "mode": if_else(fired, law, x["mode"]),
-            "y": if_else(logic_and(leaves, at_instant), x["kept"], x["y"]),
+            "y": if_else(logic_and(leaves, self._at_instant(t, x)), x["kept"], x["y"]),
         }
+
+    def _at_instant(self, t: SX, x: Signals) -> SX:
+        """Whether this is the latest tick, event or breakpoint."""
+        return fabs(t - x["kept_at"]) <= SAME_INSTANT * fabs(t)
+
+    def _jump(self, t: SX, x: Signals, u: Signals) -> SX:
+        """How far u has jumped at this instant."""
+        return if_else(self._at_instant(t, x), u["u"] - x["kept"], 0.0)
+
+    def _band(self, u: Signals) -> SX:
+        """The largest jump that is passed on."""
+        return SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
 
     def _law(self, t: SX, x: Signals, u: Signals, p: Signals) -> SX:
         """The mode after this instant, from the one before it."""
         limits, guards = self.limits(u, p), self.guard_values(t, x, u, p)
-        band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
+        band, jump = self._band(u), self._jump(t, x, u)
         too_fast, too_fast_down = guards["fast"] > 0.0, guards["fast_down"] < 0.0
         by_rate = if_else(too_fast, 1.0, if_else(too_fast_down, -1.0, 0.0))
-        at_instant = fabs(t - x["kept_at"]) <= SAME_INSTANT * fabs(t)
-        jump = if_else(at_instant, u["u"] - x["kept"], 0.0)
         follows = if_else(jump > band, 1.0, if_else(jump < -band, -1.0, by_rate))
         gap = guards["gap"]
         met = logic_and(gap <= 0.0, u["u'"] <= limits["rising"])

@@ -349,7 +349,8 @@ class Block(ABC):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         """The consistent value of every mode at this moment.
 
-        It follows from the values of the moment. ``x`` has the modes as they are, for modes with a memory.
+        It follows from the values of the moment. ``x`` has the modes as they are, for modes with a memory, or
+        as they were before the instant, for those that remember it.
         """
         return {}
 
@@ -361,7 +362,8 @@ class Block(ABC):
         that value. Blocks override this where a mode is allowed to differ (hysteresis, counted edges), or
         where its value costs more than the question.
         """
-        found = self.mode_values(t, x, u, p)
+        before = {mode: x[f"{mode} before"] for mode in x if f"{mode} before" in x}
+        found = self.mode_values(t, {**x, **before}, u, p)
         return {name: logic_or(value > x[name], value < x[name]) for name, value in found.items()}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:

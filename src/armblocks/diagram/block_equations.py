@@ -10,6 +10,7 @@ a gain of zero hides nothing.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -228,6 +229,8 @@ def _trace(structure: _Structure) -> BlockEquations:
     located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
     asked = tuple(entry for entry in conditions if entry not in located)
     modes, guards = _modes_and_guards(block, shapes, located)
+    remembering = tuple(mode for mode in modes if mode.remembers)
+    discrete = (*discrete, *(dataclasses.replace(mode, name=mode.before) for mode in remembering))
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
         "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],
@@ -243,6 +246,8 @@ def _trace(structure: _Structure) -> BlockEquations:
         p["T"] = SX(structure.period)
     x.update(z)
     x.update(_answers(block, asked, t, x, u, p))
+    # What a mode is follows from what it was before the instant, and not from what it is in between.
+    earlier = x | {mode.name: x[mode.before] for mode in remembering}
     if structure.settled:
         x.update(block.mode_values(t, x, u, p))
     quantities: Signals = block.condition_values(t, x, u, p) if located else {}
@@ -276,7 +281,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         SlotKind.RECORD: block.records(t, x, u, p),
         SlotKind.UPDATE: block.updates(t, x, u, p),
         SlotKind.GUARD: {**block.guard_values(t, x, u, p), **sides},
-        SlotKind.MODE: {**block.mode_values(t, x, u, p), **answers},
+        SlotKind.MODE: {**block.mode_values(t, earlier, u, p), **answers},
         SlotKind.CONTRADICTION: {**block.contradictions(t, x, u, p), **wrong},
         SlotKind.RESET: resets,
         SlotKind.DELAYED: {line.name: u[line.input] for line in lines},

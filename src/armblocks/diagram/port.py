@@ -27,7 +27,9 @@ class State:
     """One state or mode of a block; the numerics hold its value, the block never does.
 
     ``follows``: whether a mode is a function of the signals of the moment alone. Such modes are made
-    consistent before anything with a memory (an edge, a relay, a reset) acts on the signals.
+    consistent before any event (an edge, a trigger, a reset) acts on the signals. ``remembers``: such a
+    function may also read the value that the mode had before (a hysteresis): that before the instant, or
+    before the latest event at it.
     """
 
     name: str
@@ -35,6 +37,12 @@ class State:
     doc: str
     unit: str = ""
     follows: bool = False
+    remembers: bool = False
+
+    @property
+    def before(self) -> str:
+        """The name of what a mode that ``remembers`` was before."""
+        return f"{self.name} before"
 
 
 @dataclass(frozen=True)

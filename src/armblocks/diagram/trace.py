@@ -78,6 +78,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     guards = _guards(model, flow)
     entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
     modes, followers, contradictions = _contradictions(model, symbols, flow)
+    remembered = _remembered(model, symbols)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
@@ -107,6 +108,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         guard_actions=tuple(guard.action for _, guard in entries),
         modes=modes,
         followers=followers,
+        remembered=remembered,
         locating=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", ends, c=contradictions) if modes else None,
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
@@ -254,6 +256,22 @@ def _contradictions(
             follows += [mode.follows] * (place.stop - place.start)
             found.append(flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name)))
     return tuple(places), tuple(follows), found
+
+
+def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
+    """The places in ``z`` of all modes that remember what they were, each with the place of that."""
+    ranges = signature(*symbols.discrete_slots).ranges
+    return tuple(
+        place
+        for name, equations in model.flow.equations.items()
+        for mode in equations.modes
+        if mode.remembers
+        for place in zip(_places(ranges[f"{name}/{mode.name}"]), _places(ranges[f"{name}/{mode.before}"]))
+    )
+
+
+def _places(entries: slice) -> range:
+    return range(entries.start, entries.stop)
 
 
 def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:

@@ -133,6 +133,9 @@ class HybridSystem:
     """The places of the modes in ``z``."""
     followers: tuple[bool, ...] = ()
     """For each mode, whether it is a function of the signals alone."""
+    remembered: tuple[tuple[int, int], ...] = ()
+    """The places in ``z`` of the modes that are functions also of what they were before an instant, or before
+    the latest event at it, and of that."""
     locating: tuple[int, ...] = ()
     """The guards whose zeros only tell when such modes change."""
     tangents: tuple[int, int, int] | None = None

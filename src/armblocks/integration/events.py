@@ -79,6 +79,7 @@ class Events:
                 f.counts[left] = remaining
                 iteration.again_when((same.value == 0.0) & (remaining > 0))
             f.counts[left] = 0
+            self._remember_modes()
 
     def _follow_at_start(self) -> None:
         """Modes that follow the signals, before anything with a memory is asked."""
@@ -135,13 +136,15 @@ class Events:
                     turns.again()
                 with r.unless(r.call(functions.any_fired, f.reals, no)):
                     turns.leave_unless(r.call(functions.any_contradicts, f.reals, no))
-                    self._remember(time, quiet_turns)
+                    self._settle(time, quiet_turns)
                     turns.again()
             r.call(functions.take_signs, f.reals, no)
             self._count_events(time, yes, bounds=True)
+            self._remember_modes()
             self.reset()
             self.take_reset()
             self._take_fired_signs()
+        self._remember_modes()
         r.call(functions.take_signs, f.reals, no)
         places, slopes = f.places, f.vector(f.places.guard_slopes)
         f.copy(places.guards, places.guards_before, self.guards)
@@ -161,7 +164,7 @@ class Events:
             functions.evaluate(r, self.point.memory, self.x, f.reals, f.p)
             r.call(functions.take_tangent_signs, f.reals)
 
-    def _remember(self, time: Real, quiet_turns: IntegerVariable) -> None:
+    def _settle(self, time: Real, quiet_turns: IntegerVariable) -> None:
         """One turn of the modes with a memory, without an event."""
         f, r = self.frame, self.frame.r
         r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
@@ -170,6 +173,17 @@ class Events:
         self._hold(quiet_turns, follows=False)
         self.take_reset()
         self._take_fired_signs()
+
+    def _remember_modes(self) -> None:
+        """What a mode is now is what it was before, for what comes next."""
+        f = self.frame
+        if not f.sizes.remembered:
+            return
+        z, (modes, before) = f.vector(f.places.z), zip(*f.sizes.remembered)
+        of_modes = f.r.integers("mode.remembering", modes)
+        of_before = f.r.integers("mode.before", before)
+        for i in f.r.each(len(modes)):
+            z[of_before[i]] = z[of_modes[i]]
 
     def _count_quiet_turn(self, time: Real, quiet_turns: IntegerVariable) -> None:
         """Return after too many turns without an event."""

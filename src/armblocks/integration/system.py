@@ -121,6 +121,7 @@ class CompiledSystem:
             captures=bool(description["captures"]),
             modes=tuple(int(place) for place in description["modes"]),
             followers=tuple(bool(follows) for follows in description["followers"]),
+            remembered=tuple((int(mode), int(before)) for mode, before in description["remembered"]),
             locating=tuple(int(guard) for guard in description["locating"]),
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
@@ -301,6 +302,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "captures": system.captures,
         "modes": list(system.modes),
         "followers": list(system.followers),
+        "remembered": [list(places) for places in system.remembered],
         "locating": list(system.locating),
         "tangents": system.tangents,
         "guard_directions": list(system.guard_directions),

@@ -135,7 +135,8 @@ class LoopSizes:
     ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
     those that end the run where they are positive. ``captures``: whether ``update`` is also called just
     before every instant. ``modes``: the places of the modes in ``z``; ``followers``, for each, whether it
-    is a function of the signals alone; ``locating``, the guards that only tell when such modes change.
+    is a function of the signals alone; ``remembered``, the places in ``z`` of those that also read what they
+    were before, each with the place of that; ``locating``, the guards that only tell when such modes change.
     ``tangents``: from which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any.
     """
 
@@ -149,6 +150,7 @@ class LoopSizes:
     captures: bool = False
     modes: tuple[int, ...] = ()
     followers: tuple[bool, ...] = ()
+    remembered: tuple[tuple[int, int], ...] = ()
     locating: tuple[int, ...] = ()
     tangents: tuple[int, int, int] | None = None
 
