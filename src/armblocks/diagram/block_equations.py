@@ -229,8 +229,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
     asked = tuple(entry for entry in conditions if entry not in located)
     modes, guards = _modes_and_guards(block, shapes, located)
-    remembering = tuple(mode for mode in modes if mode.remembers)
-    discrete = (*discrete, *(dataclasses.replace(mode, name=mode.before) for mode in remembering))
+    discrete += tuple(dataclasses.replace(mode, name=mode.before) for mode in modes if mode.remembers)
     ends = {
         "x": [Slot(state.name, state.shape) for state in states],
         "z": [Slot(state.name, state.shape) for state in (*discrete, *past, *modes)],
@@ -247,7 +246,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     x.update(z)
     x.update(_answers(block, asked, t, x, u, p))
     # What a mode is follows from what it was before the instant, and not from what it is in between.
-    earlier = x | {mode.name: x[mode.before] for mode in remembering}
+    earlier = x | {mode.name: x[mode.before] for mode in modes if mode.remembers}
     if structure.settled:
         x.update(block.mode_values(t, x, u, p))
     quantities: Signals = block.condition_values(t, x, u, p) if located else {}
@@ -256,10 +255,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     wrong = {name: SX(answer) != x[name] for name, answer in answers.items()}
 
     state_shapes = {state.name: state.shape for state in (*states, *discrete, *modes)}
-    resets = dict(block.resets(t, x, u, p, e))
-    resets |= {
-        entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
-    }
+    resets = {**block.resets(t, x, u, p, e), **_sides_after(located, x, e)}
     captures = block.captures(t, x, u, p)
     sought: dict[SlotKind, dict[str, Shape]] = {
         SlotKind.OUTPUT: _output_shapes(structure.block, dict(structure.input_shapes)),
@@ -334,6 +330,13 @@ def _moving_delays(groups: Sequence[Group]) -> frozenset[str]:
 
 def _positive(quantity: SX, closed: bool) -> SX:
     return quantity >= 0.0 if closed else quantity > 0.0
+
+
+def _sides_after(located: Sequence[Condition], x: Signals, e: Signals) -> Signals:
+    """What the modes of conditions become at events."""
+    return {
+        entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
+    }
 
 
 def _sided(quantity: SX, closed: bool) -> SX:
