@@ -140,6 +140,7 @@ def test_shipped_examples_are_canonical_and_follow_the_schema(
     copy = write_diagram(tmp_path / "copy.json", diagram)
     assert copy.read_bytes() == path.read_bytes()
     assert read_diagram(copy, BLOCKS) == diagram
+    assert load_diagram(name, BLOCKS, draft=True) == diagram
     schema.validate(json.loads(path.read_text()))
 
 

@@ -45,20 +45,23 @@ def load_diagram(
     resolve_robot: ResolveRobot = load_robot,
     *,
     trust: bool = False,
+    draft: bool = False,
 ) -> Diagram:
     """A shipped diagram by its name, ``"kr180model"``, or a diagram file by its path.
 
     What holds a path separator or ends in ``.json`` is a path, everything else a name. Raises
     ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`. With ``trust`` the
-    files of Python functions that the diagram names are run; without, such a diagram is refused.
+    files of Python functions that the diagram names are run; without, such a diagram is refused. With
+    ``draft`` the diagram is not checked, which traces no equations: enough for what only draws it.
     """
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
-        return read_diagram(text, library, resolve_robot, trust=trust)
+        return read_diagram(text, library, resolve_robot, trust=trust, draft=draft)
     known = list_examples()
     if text not in known:
         raise UnknownNameError("shipped diagram", text, known)
-    return read_diagram(shipped_folder("examples") / f"{text}{SUFFIX}", library, resolve_robot, trust=trust)
+    path = shipped_folder("examples") / f"{text}{SUFFIX}"
+    return read_diagram(path, library, resolve_robot, trust=trust, draft=draft)
 
 
 def read_diagram(
@@ -67,8 +70,9 @@ def read_diagram(
     resolve_robot: ResolveRobot = load_robot,
     *,
     trust: bool = False,
+    draft: bool = False,
 ) -> Diagram:
-    """The checked diagram of a file; ``library`` holds the block types that it may use.
+    """The diagram of a file, checked unless ``draft``; ``library`` holds the block types that it may use.
 
     ``resolve_robot`` turns a shipped name or a path into a robot; paths in the file are relative to the
     file's folder. Raises ``FormatError`` for a missing or unreadable file and for what the format forbids,
@@ -77,7 +81,7 @@ def read_diagram(
     """
     data = read_bounded(fspath(path), MOST_BYTES)
     return diagram_from_bytes(
-        data, fspath(path), library, resolve_robot, folder=Path(path).parent, trust=trust
+        data, fspath(path), library, resolve_robot, folder=Path(path).parent, trust=trust, draft=draft
     )
 
 
