@@ -9,6 +9,17 @@ from playwright.sync_api import Locator, Page, expect
 
 from conftest import PATIENCE_MS
 
+DIALOG = "[role=dialog]"
+"""The dialog on the page: to look for a role inside it is quicker than in the whole page."""
+FRAMES_REQUESTED = """async () => {
+    // How many animation frames the page requests while ten frames pass.
+    const request = window.requestAnimationFrame
+    let count = 0
+    window.requestAnimationFrame = (called) => (count++, request.call(window, called))
+    for (let k = 0; k < 10; k++) await new Promise((passed) => request.call(window, passed))
+    window.requestAnimationFrame = request
+    return count
+}"""
 UPPERMOST = """(element) => {
     const { x, y, width, height } = element.getBoundingClientRect()
     return document.elementFromPoint(x + width / 2, y + height / 2) === element
@@ -32,22 +43,26 @@ def new_diagram(page: Page) -> None:
     expect(page.get_by_text("Type to add a block")).to_be_visible()
 
 
-def add(page: Page, typed: str) -> None:
-    """Add a block by keyboard alone."""
+def add(page: Page, typed: str, *, by_key: bool = True) -> None:
+    """Add a block by keyboard alone: letter by letter, or after the first letter all at once."""
     page.keyboard.press(typed[0])
-    box = page.get_by_role("textbox", name="Add a block")
+    box = page.locator(DIALOG).get_by_role("textbox", name="Add a block")
     expect(box).to_be_visible()
-    box.press_sequentially(typed[1:])
+    if by_key:
+        box.press_sequentially(typed[1:])
+    else:
+        box.fill(typed)
     box.press("Enter")
     expect(box).to_be_hidden()
 
 
 def drag_from_library(page: Page, kind: str, x: float, y: float) -> None:
     """Drop a block with the mouse at a place of the canvas, px."""
-    page.get_by_role("textbox", name="Search the library").fill(kind)
+    library = page.locator(".palette")
+    library.get_by_role("textbox", name="Search the library").fill(kind)
     target = page.locator(".canvas")  # an empty one has examples on it
-    page.locator(f'.kind[data-type="{kind}"]').drag_to(target, target_position={"x": x, "y": y})
-    page.get_by_role("button", name="Clear the search").click()
+    library.locator(f'.kind[data-type="{kind}"]').drag_to(target, target_position={"x": x, "y": y})
+    library.get_by_role("button", name="Clear the search").click()
 
 
 def wire(page: Page, source: str, target: str) -> None:
@@ -119,6 +134,11 @@ def copied_text(page: Page, part: str) -> str:
 def expect_focus_inside(found: Locator) -> None:
     """Wait until the keys go to a dialog: it takes the focus shortly after it is shown."""
     expect(found.locator(":focus")).to_have_count(1)
+
+
+def expect_no_frames(page: Page) -> None:
+    """Wait until the page requests no animation frames: a page that rests costs nothing."""
+    wait_until(page, lambda: page.evaluate(FRAMES_REQUESTED) == 0)
 
 
 def expect_no_faults(page: Page) -> None:

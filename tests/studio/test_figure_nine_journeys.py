@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import (
+    DIALOG,
     add,
     block,
     drag_from_library,
     expect_focus_inside,
     expect_no_faults,
+    expect_no_frames,
     new_diagram,
     run,
     wire,
@@ -102,7 +104,7 @@ def test_with_the_mouse(page: Page, folder: Path) -> None:
     expect(page.locator(".react-flow__node")).to_have_count(len(BLOCKS))
     for name, values in VALUES:
         block(page, name).dblclick()
-        dialog = page.get_by_role("dialog")
+        dialog = page.locator(DIALOG)
         for parameter, text in values.items():
             if parameter == "robot":
                 dialog.get_by_role("combobox", name="robot").select_option(text)
@@ -121,12 +123,20 @@ def test_with_the_mouse(page: Page, folder: Path) -> None:
 
 def tab_to(page: Page, field: Locator) -> None:
     """Go to a field of the dialog with the Tab key, once around at most."""
-    expect_focus_inside(page.get_by_role("dialog"))
+    expect_focus_inside(page.locator(DIALOG))
     for _ in range(40):
         if field.evaluate("(element) => element === document.activeElement"):
             return
         page.keyboard.press("Tab")
     raise AssertionError("Tab does not lead there")
+
+
+def enter(page: Page, text: str, *, by_key: bool) -> None:
+    """Type into the field that has the keys: key by key, or all at once where an earlier text came by key."""
+    if by_key:
+        page.keyboard.type(text)
+    else:
+        page.keyboard.insert_text(text)
 
 
 def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
@@ -135,23 +145,24 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
     page.keyboard.press("Enter")
     expect(page.get_by_text("Type to add a block")).to_be_visible()
     for count, (_, typed, _, _) in enumerate(BLOCKS, 1):
-        add(page, typed)
+        add(page, typed, by_key=count == 1)
         expect(page.locator(".react-flow__node")).to_have_count(count)
+    dialog = page.locator(DIALOG)
     for name, values in VALUES:
         page.keyboard.press("Control+f")
-        page.get_by_role("textbox", name="Find").press_sequentially(name)
-        expect(page.get_by_role("listbox", name="Found").get_by_role("option").first).to_contain_text(name)
+        expect_focus_inside(dialog)
+        enter(page, name, by_key=name == "jtraj")
+        expect(dialog.get_by_role("option").first).to_contain_text(name)
         page.keyboard.press("Enter")
         expect(block(page, name)).to_be_focused()
         page.keyboard.press("Enter")
-        dialog = page.get_by_role("dialog")
         for parameter, text in values.items():
             role = "combobox" if parameter == "robot" else "textbox"
             field = dialog.get_by_role(role, name=re.compile(rf"^{parameter}\b"))
             tab_to(page, field)
             if role == "textbox":
                 page.keyboard.press("Control+a")
-            page.keyboard.type(text)
+            enter(page, text, by_key=name == "jtraj" or role == "combobox")
             expect(field).to_have_value(text)
         tab_to(page, dialog.get_by_role("button", name="OK", exact=True))
         page.keyboard.press("Enter")
@@ -160,22 +171,20 @@ def test_with_the_keyboard_alone(page: Page, folder: Path) -> None:
     for count, (source, target) in enumerate(WIRES, 1):
         page.keyboard.press(">")
         for label, port in (("From the output", source), ("To the input", target)):
-            box = page.get_by_role("combobox", name=label)
+            box = dialog.get_by_role("combobox", name=label)
             expect(box).to_be_visible()
             if box.input_value() == port:  # suggested, as the port of the block that is selected
                 continue
             tab_to(page, box)
             page.keyboard.press("Control+a")
-            if count == 1:
-                page.keyboard.type(port)
-            else:  # the keys of a field are the same for every wire: one event brings the whole name
-                page.keyboard.insert_text(port)
+            enter(page, port, by_key=count == 1)
             expect(page.locator(f'[role="option"][value="{port}"][data-combobox-selected]')).to_be_visible()
             page.keyboard.press("Enter")
             expect(box).to_have_value(port)
-        tab_to(page, page.get_by_role("button", name="Connect", exact=True))
+        tab_to(page, dialog.get_by_role("button", name="Connect", exact=True))
         page.keyboard.press("Enter")
         expect(page.locator(".react-flow__edge")).to_have_count(count)
     expect_no_faults(page)
+    expect_no_frames(page)  # the lists of ports were scrolled, and are gone
     run(page)
     save_and_compare(page, folder / "by keyboard.json")

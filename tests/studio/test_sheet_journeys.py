@@ -396,6 +396,15 @@ DROPS = """async () => {
 OPENINGS = """async () => {
     // Each block is opened by a double click; what its dialog asks for is read, and the dialog closed again.
     // Nothing waits for a picture: to draw each dialog in software takes longer than to make it.
+    // What opens over the page stands beside its root, where there is little to search after each change.
+    const over = (selector) => {
+        for (const part of document.body.children) {
+            const found = part.id === 'root' ? null : part.querySelector(selector)
+            if (found) return found
+        }
+        return null
+    }
+    const path = document.getElementsByClassName('breadcrumbs')
     const until = (found) =>
         new Promise((resolve) => {
             const look = (_, watch) => {
@@ -409,23 +418,24 @@ OPENINGS = """async () => {
             if (!look([], watch)) watch.observe(document, { subtree: true, childList: true })
         })
     const dialog = (name) => {
-        const shown = document.querySelector('[role=dialog]')
+        const shown = over('[role=dialog]')
         return shown?.querySelector('h2')?.textContent.startsWith(name) ? shown : null
     }
+    const firstWords = (element) => document.createTreeWalker(element, NodeFilter.SHOW_TEXT).nextNode().data
     const node = (name) => document.querySelector(`.react-flow__node[data-id="${CSS.escape(name)}"]`)
     const names = [...document.querySelectorAll('.react-flow__node')].map((node) => node.dataset.id)
     const asked = {}
     for (const name of names) {
         node(name).dispatchEvent(new MouseEvent('dblclick', { bubbles: true }))
-        const shown = await until(() => dialog(name) ?? document.querySelector('.breadcrumbs'))
+        const shown = await until(() => dialog(name) ?? path[0])
         if (shown.matches('.breadcrumbs')) {
             shown.querySelector('button').click()
             await until(() => node(name))
             continue
         }
-        asked[name] = [...shown.querySelectorAll('label')].map((label) => label.innerText.split(/\\s/)[0])
+        asked[name] = [...shown.querySelectorAll('label')].map(firstWords)
         ;[...shown.querySelectorAll('button')].find((button) => button.textContent === 'Cancel').click()
-        await until(() => !document.querySelector('[role=dialog]'))
+        await until(() => !over('[role=dialog]'))
     }
     return asked
 }"""

@@ -1,6 +1,7 @@
 import { Button, Group, Modal, Select, Stack } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import { show, useDialogs } from '../dialogs'
+import { SCROLLED } from '../scrolled'
 import { change, useStudio } from '../store'
 
 /** The way to draw a wire by keyboard: type the names of two ports. The selected block's are suggested. */
@@ -41,8 +42,8 @@ export function ConnectDialog() {
         }}
       >
         <Stack gap="sm">
-          <Select label="From the output" data={sources} value={source} onChange={setSource} searchable selectFirstOptionOnChange data-autofocus={!source || undefined} nothingFoundMessage="no such output" />
-          <Select label="To the input" data={targets} value={target} onChange={setTarget} searchable selectFirstOptionOnChange data-autofocus={source ? true : undefined} nothingFoundMessage="no such free input" />
+          <Select {...SCROLLED} label="From the output" data={sources} value={source} onChange={setSource} searchable selectFirstOptionOnChange data-autofocus={!source || undefined} nothingFoundMessage="no such output" />
+          <Select {...SCROLLED} label="To the input" data={targets} value={target} onChange={setTarget} searchable selectFirstOptionOnChange data-autofocus={source ? true : undefined} nothingFoundMessage="no such free input" />
           <Group justify="flex-end" gap="xs">
             <Button variant="default" onClick={close}>
               Cancel

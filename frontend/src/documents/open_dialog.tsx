@@ -1,4 +1,4 @@
-import { Badge, Modal, NavLink, ScrollArea, Stack, Text, TextInput } from '@mantine/core'
+import { Badge, Modal, NavLink, Stack, Text, TextInput } from '@mantine/core'
 import { IconFile, IconHistory, IconPencil } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
 import type { Request } from '../connection'
@@ -48,7 +48,7 @@ function Choice() {
           if (event.key === 'Enter' && first) go(first)
         }}
       />
-      <ScrollArea.Autosize mah="55vh" type="auto">
+      <div className="files">
         <Part title="Open now">
           {open.map((entry) => (
             <NavLink
@@ -74,7 +74,7 @@ function Choice() {
         {found && !open.length && !recent.length && !files.length && (
           <p className="empty">{typed ? 'No file has such a name.' : 'This folder has no models yet: save one, or begin with an example.'}</p>
         )}
-      </ScrollArea.Autosize>
+      </div>
     </Stack>
   )
 }

@@ -1,6 +1,7 @@
 import { Alert, Autocomplete, Button, Group, Modal, Stack, Text } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
+import { SCROLLED } from '../scrolled'
 import { line, useStudio } from '../store'
 import { projectFiles, show, useDialogs } from '../dialogs'
 
@@ -52,6 +53,7 @@ function SaveAs() {
           data-autofocus
           data={files.filter((file) => file !== path)}
           limit={8}
+          {...SCROLLED}
           comboboxProps={{ withinPortal: true }}
           value={typed}
           onChange={(value) => {

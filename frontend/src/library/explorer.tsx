@@ -1,5 +1,5 @@
 import '../mantine_later.css'
-import { ScrollArea, Tree, useTree, type TreeNodeData } from '@mantine/core'
+import { Tree, useTree, type TreeNodeData } from '@mantine/core'
 import { IconChevronRight, IconSitemap } from '@tabler/icons-react'
 import { useEffect, useMemo, useState } from 'react'
 import type { Outline } from '../protocol'
@@ -34,7 +34,7 @@ export function Explorer() {
   const data = useMemo(() => (outline ? [node(outline, [], title)] : []), [outline, title])
   if (!outline) return <p className="empty">No model is open.</p>
   return (
-    <ScrollArea className="explorer" type="auto">
+    <div className="explorer">
       <Tree
         data={data}
         tree={tree}
@@ -63,7 +63,7 @@ export function Explorer() {
         )}
       />
       {outline.subsystems.length === 0 && <p className="empty">The model has one sheet. Ctrl+G puts the selected blocks into a subsystem.</p>}
-    </ScrollArea>
+    </div>
   )
 }
 

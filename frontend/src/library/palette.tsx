@@ -1,4 +1,4 @@
-import { CloseButton, ScrollArea, TextInput } from '@mantine/core'
+import { CloseButton, TextInput } from '@mantine/core'
 import { IconChevronRight, IconSearch } from '@tabler/icons-react'
 import { memo, useMemo, useState } from 'react'
 import { BLOCK_TYPE } from '../canvas/insert'
@@ -33,7 +33,7 @@ export function Palette() {
         value={sought}
         onChange={(event) => setSought(event.currentTarget.value)}
       />
-      <ScrollArea className="families" type="auto" scrollbarSize={7} offsetScrollbars="y">
+      <div className="families">
         {families.length === 0 && sought && <p className="empty">No block matches “{sought}”.</p>}
         {families.map(([family, kinds]) => {
           const shown = sought !== '' || open.has(family)
@@ -54,7 +54,7 @@ export function Palette() {
             </section>
           )
         })}
-      </ScrollArea>
+      </div>
     </div>
   )
 }
