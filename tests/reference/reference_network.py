@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,8 @@ from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
 MOST_PASSES = 30
 Link = tuple[np.ndarray, np.ndarray]
 """The array of an input, and the array of the signal that drives it."""
+Work = Callable[[], bool]
+"""Evaluates a node; whether a mode has changed."""
 
 
 class Network:
@@ -45,6 +47,8 @@ class Network:
         self.order = EvaluationOrder(self.blocks, self.drivers, flat.gates)
         self.links = {b.name: [self._link(b, port) for port in b.fed] for b in self.blocks.values()}
         self.links_of_node: dict[Node, list[Link]] = {}
+        self.plans: dict[tuple[bool, bool], list[Work]] = {}
+        self.followed = [b for b in self.blocks.values() if b.clock is None and (b.lines or b.modes)]
         self._start()
 
     # -- structure -----------------------------------------------------------------------------------------
@@ -106,13 +110,11 @@ class Network:
         """
         self.t, self.frozen = t, frozen
         self.time[0] = t
+        plan = self._plan(frozen, flowing)
         for _ in range(MOST_PASSES):
             changed = False
-            for loop in self.order.flowing if flowing else self.order.groups:
-                if loop in self.order.loops:
-                    self._solve(loop)
-                else:
-                    changed = self._work_out(loop[0]) or changed
+            for work in plan:
+                changed = work() or changed
             if frozen or not (changed and self.order.late):
                 return
         raise UnsupportedError(f"modes and signals have no consistent values at {t}")
@@ -130,34 +132,74 @@ class Network:
         for target, source in self.links[block.name]:
             target[:] = source
 
-    def _work_out(self, node: Node) -> bool:
-        """Evaluate one node; whether a mode has changed."""
+    def _plan(self, frozen: bool, flowing: bool) -> list[Work]:
+        """What evaluates the nodes one after the other."""
+        if (frozen, flowing) not in self.plans:
+            groups = self.order.flowing if flowing else self.order.groups
+            self.plans[frozen, flowing] = [
+                self._loop_work(group) if group in self.order.loops else self._work(group[0])
+                for group in groups
+                if not (frozen and group not in self.order.loops and group[0][0] == "modes")
+            ]
+        return self.plans[frozen, flowing]
+
+    def _loop_work(self, loop: tuple[Node, ...]) -> Work:
+        def work() -> bool:
+            self._solve(loop)
+            return False
+
+        return work
+
+    def _work(self, node: Node) -> Work:
+        """What evaluates one node, and says whether a mode has changed."""
         kind, name, port = node
         block = self.blocks[name]
-        held = block.clock is not None and (block.clock not in self.ticking or not block.on)
-        if kind == "modes":
-            if self.frozen or held:
+
+        def held() -> bool:
+            return block.clock is not None and (block.clock not in self.ticking or not block.on)
+
+        def take_derivative() -> bool:
+            ref = self.drivers[name, block.block.time_derivatives[port]]
+            block.outputs[port][:] = self.blocks[ref.block].rates[ref.port]
+            return False
+
+        def take_rate() -> bool:
+            self._rate(block, port)
+            return False
+
+        if kind == "out" and port in block.block.time_derivatives:
+            return take_derivative
+        if kind == "rate":
+            return take_rate
+        links = self._links_of(block, node)
+
+        def feed() -> None:
+            for target, source in links:
+                target[:] = source
+
+        def update_modes() -> bool:
+            if held():
                 return False
-            self._feed_some(block, node)
+            feed()
             self._past(block)
             return block.update_modes()
-        if kind == "out":
-            if port in block.block.time_derivatives:
-                ref = self.drivers[name, block.block.time_derivatives[port]]
-                block.outputs[port][:] = self.blocks[ref.block].rates[ref.port]
-            elif not held:
-                self._feed_some(block, node)
+
+        def take_output() -> bool:
+            if block.clock is None or not held():
+                feed()
                 self._past(block)
                 block.outputs[port][:] = block.value("out", port)
             return False
-        if kind == "rate":
-            self._rate(block, port)
-        else:
-            self._feed_some(block, node)
-            block.rates[f"x:{port}"] = block.value("xdot", port) * (1.0 if block.on else 0.0)
-        return False
 
-    def _feed_some(self, block: Any, node: Node) -> None:
+        def take_slope() -> bool:
+            feed()
+            block.rates[f"x:{port}"] = block.value("xdot", port) * (1.0 if block.on else 0.0)
+            return False
+
+        return {"modes": update_modes, "out": take_output}.get(kind, take_slope)
+
+    def _links_of(self, block: Any, node: Node) -> list[Link]:
+        """The inputs that a node reads."""
         if node not in self.links_of_node:
             kind, _, port = node
             keys: set[str] = set()
@@ -165,7 +207,10 @@ class Network:
                 keys |= block.needs("mode" if kind == "modes" else kind, entry)
             ports = sorted(key[2:] for key in keys if key.startswith("u:"))
             self.links_of_node[node] = [self._link(block, port) for port in ports]
-        for target, source in self.links_of_node[node]:
+        return self.links_of_node[node]
+
+    def _feed_some(self, block: Any, node: Node) -> None:
+        for target, source in self._links_of(block, node):
             target[:] = source
 
     def _rate(self, block: Any, port: str) -> None:
@@ -250,8 +295,8 @@ class Network:
 
     def modes_differ(self) -> bool:
         """Whether the present signals ask for other modes than those that hold."""
-        for block in self.blocks.values():
-            if block.clock is not None or not block.on:
+        for block in self.followed:
+            if not block.on:
                 continue
             for line in block.lines:
                 self._past(block)

@@ -132,7 +132,7 @@ class ReferenceRun:
                 high - low > 1e-14 * max(1.0, self.t)
                 and self.t + low < self.t + (low + high) / 2 < self.t + high
             ):
-                if self.stepped(x, (low + high) / 2, latest):
+                if self.stepped(x, (low + high) / 2, latest, whole=False):
                     low = (low + high) / 2
                 else:
                     high = (low + high) / 2
@@ -155,8 +155,11 @@ class ReferenceRun:
         if self.t < end:
             self.instant(self.t, [])
 
-    def stepped(self, start: np.ndarray, h: float, latest: float) -> bool:
-        """Take one Runge-Kutta step with the modes of its start; whether they hold at all its stages."""
+    def stepped(self, start: np.ndarray, h: float, latest: float, whole: bool = True) -> bool:
+        """Take one Runge-Kutta step with the modes of its start; whether they hold at all its stages.
+
+        Unless the ``whole`` step is needed, it ends at the first stage at which they do not.
+        """
         network, t = self.network, self.t
         calm = True
 
@@ -170,8 +173,12 @@ class ReferenceRun:
         # The right limit: a signal may have a value for the instant alone, as the height at a bounce.
         a = rate(0.0, min(h, JUST_AFTER) * rate(0.0, 0.0))
         b = rate(h / 2, h / 2 * a)
+        if not (calm or whole):
+            return False
         c = rate(h / 2, h / 2 * b)
         d = rate(h, h * c)
+        if not (calm or whole):
+            return False
         network.x[:] = start + h / 6 * (a + 2 * b + 2 * c + d)
         self.slopes = a, d
         network.evaluate(min(t + h, latest), frozen=True, flowing=True)
