@@ -1,6 +1,7 @@
 """Every operation that CasADi's scalar graphs can hold arrives on the tape with its meaning."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 
 import casadi
 import numpy as np
@@ -8,9 +9,10 @@ import pytest
 from casadi import SX
 from small_functions import mixed, traced
 
-from armblocks.compiler import compile_function
+from armblocks.compiler import Kernel, compile_function
 from armblocks.compiler.from_casadi import tape_from
 from armblocks.compiler.interpret import interpret
+from armblocks.equations import TracedFunction
 from armblocks.errors import CompileError
 
 UNARY: dict[str, Callable[[SX], SX]] = {
@@ -71,37 +73,43 @@ VALUES = np.array(
 )
 
 
-@pytest.mark.parametrize("name", UNARY)
-def test_unary_operations_mean_what_casadi_means(name: str) -> None:
-    function = traced(UNARY[name], 1)
-    kernel = compile_function(function)
-    for value in (*VALUES, np.nan):
-        expected = function([value])[0]
-        # CasADi calls the C library; ours may differ by its error and our own.
-        np.testing.assert_allclose(kernel([value]), expected, rtol=1e-15, err_msg=str(value))
-        np.testing.assert_allclose(interpret(kernel.tape, [[value]])[0], expected, rtol=1e-15)
+@cache
+def all_of(arity: int) -> tuple[TracedFunction, Kernel]:
+    """All operations on one or two numbers, as one function: one result each, in their order."""
+    operations = (UNARY if arity == 1 else BINARY).values()
+    function = traced(lambda *ends: casadi.vertcat(*(one(*ends) for one in operations)), *[1] * arity)
+    return function, compile_function(function)
 
 
-@pytest.mark.parametrize("name", BINARY)
-def test_binary_operations_mean_what_casadi_means(name: str) -> None:
-    function = traced(BINARY[name], 1, 1)
-    kernel = compile_function(function)
-    for x in VALUES:
-        for y in VALUES:
-            expected = function([x], [y])[0]
-            np.testing.assert_allclose(kernel([x], [y]), expected, rtol=1e-15, err_msg=f"{x} {y}")
-            np.testing.assert_allclose(interpret(kernel.tape, [[x], [y]])[0], expected, rtol=1e-15)
+def means_what_casadi_means(names: Sequence[str], *columns: np.ndarray) -> None:
+    """Native code for one sample and for lanes, and the interpreter, against CasADi at many points."""
+    (function, kernel), samples = all_of(len(columns)), [column[:, None] for column in columns]
+    # CasADi takes one sample in each column.
+    expected = np.asarray(function.casadi_function()(*(column[None] for column in columns))).T
+    singles = np.array([kernel(*sample) for sample in zip(*samples)])
+    for found in (singles, kernel(*samples), interpret(kernel.tape, samples)[0]):
+        for name, one, other in zip(names, found.T, expected.T, strict=True):
+            # CasADi calls the C library; ours may differ by its error and our own.
+            np.testing.assert_allclose(one, other, rtol=1e-15, err_msg=name)
 
 
-@pytest.mark.parametrize(
-    "name", ["fmin", "fmax", "add", "divide", "fmod", "remainder", "atan2", "hypot", "power"]
-)
-def test_nan_is_handed_on(name: str) -> None:
+def test_unary_operations_mean_what_casadi_means() -> None:
+    means_what_casadi_means(list(UNARY), np.append(VALUES, np.nan))
+
+
+def test_binary_operations_mean_what_casadi_means() -> None:
+    x, y = np.meshgrid(VALUES, VALUES)
+    means_what_casadi_means(list(BINARY), x.ravel(), y.ravel())
+
+
+def test_nan_is_handed_on() -> None:
     """CasADi's fmin and fmax drop a NaN; a limiter would then hide the first bad signal."""
-    kernel = compile_function(traced(BINARY[name], 1, 1))
+    names = ["fmin", "fmax", "add", "divide", "fmod", "remainder", "atan2", "hypot", "power"]
+    places = [list(BINARY).index(name) for name in names]
+    _, kernel = all_of(2)
     for x, y in ((np.nan, 2.0), (2.0, np.nan), (np.nan, np.nan)):
-        assert np.isnan(kernel([x], [y])[0])
-        assert np.isnan(kernel([[x]] * 9, [[y]] * 9)).all()
+        assert np.isnan(kernel([x], [y])[places]).all()
+        assert np.isnan(kernel([[x]] * 9, [[y]] * 9)[:, places]).all()
 
 
 def test_the_branch_not_taken_has_no_influence() -> None:

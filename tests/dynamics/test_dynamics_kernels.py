@@ -11,11 +11,15 @@ from robots_for_tests import RANDOM_ROBOTS, build_puma560, evaluate
 
 BATCH = 11
 """Not a multiple of any lane count."""
+PUMA = build_puma560()
 
 
-@pytest.mark.parametrize("robot", [build_puma560(), RANDOM_ROBOTS[1]], ids=lambda robot: robot.name)
+@pytest.mark.parametrize("robot", [PUMA, RANDOM_ROBOTS[1]], ids=lambda robot: robot.name)
 @pytest.mark.parametrize("name", TRACES)
-def test_kernel_gives_the_traced_numbers(robot: Robot, name: str):
+def test_kernel_gives_the_traced_numbers(robot: Robot, name: str, monkeypatch: pytest.MonkeyPatch):
+    """For a tree of all joint types as users compile it, for a Puma without optimisation."""
+    if robot is PUMA:
+        monkeypatch.setenv("ARMBLOCKS_EFFORT", "little")
     traced = TRACES[name](robot)
     kernel = compile_function(traced)
     random = np.random.default_rng(0)
