@@ -62,9 +62,9 @@ def test_values_and_integrals(method: str, outside: str, solver: str, step: floa
 @pytest.mark.parametrize("method", ["linear", "flat"])
 def test_a_long_table_is_compiled_and_run_as_a_short_one(method: str) -> None:
     random = np.random.default_rng(3)
-    times = np.cumsum(random.uniform(0.5e-4, 1.5e-4, 100_000))
-    values = random.normal(size=100_000)
-    result = run(diagram_of(data=np.column_stack([times, values]), method=method), stop=9.0)
+    times = np.cumsum(random.uniform(0.5e-4, 1.5e-4, 20_000))
+    values = random.normal(size=20_000)
+    result = run(diagram_of(data=np.column_stack([times, values]), method=method), stop=1.8)
     t = result.time
     rows = np.clip(np.searchsorted(times, t, side="right") - 1, 0, None)
     expected = np.interp(t, times, values) if method == "linear" else values[rows]
@@ -74,7 +74,7 @@ def test_a_long_table_is_compiled_and_run_as_a_short_one(method: str) -> None:
     whole = (rows > 0) & (rows < len(times) - 1)
     rest = (t - times[rows]) * ((values[rows] + expected) / 2)
     np.testing.assert_allclose(result["integral/y"][whole], (area[rows] + rest)[whole], atol=1e-9)
-    assert result.run.events >= 85_000
+    assert result.run.events >= 17_000
 
 
 def test_the_equations_say_the_same_to_casadi() -> None:

@@ -215,8 +215,8 @@ def symbolic(tree: object, a: SX, b: SX) -> SX:
     }[name]()
 
 
-@given(st.lists(EXPRESSIONS, min_size=4, max_size=10))
-@settings(max_examples=25, deadline=None, derandomize=True)
+@given(st.lists(EXPRESSIONS, min_size=8, max_size=20))
+@settings(max_examples=12, deadline=None, derandomize=True)
 def test_random_arithmetic_gives_the_interpreters_bits(trees: list[object]) -> None:
     kernel = compile_function(
         traced(lambda a, b: casadi.vertcat(*(symbolic(tree, a, b) for tree in trees)), 3, 2, name="random")

@@ -21,6 +21,9 @@ from armblocks.compiler.target import Target
 from armblocks.equations import TracedFunction, signature
 from armblocks.errors import InputError
 
+BACK = 300
+"""Values in a row that are still in use: some pieces long."""
+
 
 @cache
 def long_function(count: int) -> TracedFunction:
@@ -29,7 +32,7 @@ def long_function(count: int) -> TracedFunction:
     def equations(x: SX, u: SX) -> tuple[SX, SX]:
         values = [x[0], x[1]]
         for k in range(count):
-            a, b, c = values[-1], values[-2], values[max(0, len(values) - 900)]
+            a, b, c = values[-1], values[-2], values[max(0, len(values) - BACK)]
             values.append(ca.if_else(a < b, 0.7 * a + 0.2 * c, 0.6 * b - 0.3 * a * u[k % 3] + 0.01 * k))
             if k % 97 == 0:
                 values.append(ca.sin(values[-1]))
@@ -47,7 +50,7 @@ def long_function(count: int) -> TracedFunction:
 @cache
 def function_in_pieces() -> Kernel:
     """A long function compiled as usual."""
-    return compile_function(long_function(1000))
+    return compile_function(long_function(600))
 
 
 def _count(count: int) -> list[int]:
@@ -56,7 +59,7 @@ def _count(count: int) -> list[int]:
 
 
 def test_a_long_function_gives_the_bits_that_it_has_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
-    traced = long_function(1000)
+    traced = long_function(600)
     tape = tape_from(traced)
     assert is_long(tape)
     rng = np.random.default_rng(0)
@@ -79,7 +82,7 @@ def test_a_long_function_gives_the_bits_that_it_has_in_one_piece(monkeypatch: py
 
 
 def test_every_operation_and_store_is_in_one_piece_and_no_piece_is_long() -> None:
-    tape = tape_from(long_function(3000))
+    tape = tape_from(long_function(1500))
     stores = {
         k: (register,) for k, register in enumerate(register for part in tape.outputs for register in part)
     }
@@ -89,13 +92,13 @@ def test_every_operation_and_store_is_in_one_piece_and_no_piece_is_long() -> Non
     assert sorted(k for piece in done.pieces for k in piece.stores) == sorted(stores)
     for piece in done.pieces:
         assert piece.last - piece.first + ACCESS_WEIGHT * len(piece.stores) <= 2 * LENGTH
-    # Places are used again: 900 values back are in use, not all 3000.
-    assert done.room < 2 * 900 + LENGTH
+    # Places are used again: 300 values back are in use, not all 1500.
+    assert done.room < 2 * BACK + LENGTH
 
 
 @pytest.mark.parametrize("effort", ["LONG", "VERY_LONG"])
 def test_less_optimisation_changes_no_bit(effort: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    traced = long_function(1000)
+    traced = long_function(600)
     x, u = np.random.default_rng(1).normal(size=(2, 11, 3))
     expected = function_in_pieces()(x[:, :2], u)
     monkeypatch.setenv("ARMBLOCKS_CACHE_DIR", "")
