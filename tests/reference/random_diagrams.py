@@ -39,6 +39,7 @@ SWITCHING = (
 )
 DIVIDING = "Divide LinearSolve Product"
 """Their inputs differ: equations are simplified, so that a signal over itself is 1 also where it is 0."""
+HYSTERESIS = "Relay Backlash RateLimiterContinuous Quantizer"
 STATES = (
     "Integrator FirstOrderLag ResettableIntegrator IntegratorLimited SecondOrderIntegrator TransferFunction "
     "RateLimiterContinuous RateLimiterDynamic SecondOrderIntegratorLimited UnitDelay ZeroOrderHold "
@@ -136,6 +137,8 @@ class Maker:
                 self.subsystem(self_nodes, signals, depth)
             elif not calm and self.random.random() < 0.02:
                 self.ball(self_nodes, signals)
+            elif self.random.random() < 0.05:
+                self.comparison(self_nodes, signals)
             else:
                 self.block(self_nodes, signals, calm)
         return self.end_feedback(self_nodes, signals, loops)
@@ -467,6 +470,31 @@ class Maker:
         ball = Node(name, "SecondOrderIntegratorLimited", place, {"u": weight.ref, "dx0": f"{back.name}/y"})
         nodes += [back, ball]
         signals += [Signal(f"{name}/x", ()), Signal(f"{name}/dx", ())]
+
+    def comparison(self, nodes: list[Node], signals: list[Signal]) -> None:
+        """Watch the difference of what two blocks that switch give, the second fed by the first or beside it.
+
+        At a jump each finds its value in a turn of its own; the difference on the way must not be seen.
+        """
+        r = self.random
+        scalars = [s for s in signals if s.shape == ()]
+        if not scalars:
+            return
+        fed = scalars[int(r.integers(len(scalars)))]
+        found: list[Signal] = []
+        for _ in range(2):
+            kind = str(r.choice(HYSTERESIS.split() if r.random() < 0.6 else SWITCHING.split()))
+            if len(BLOCKS[kind]().input_ports()) == 1 and self.add(
+                nodes, signals, kind, self.parameters(kind), {"u": fed}
+            ):
+                found.append(signals[-1])
+                fed = signals[-1] if r.random() < 0.5 else fed
+        inputs = dict(zip(("u1", "u2"), [*found, fed, fed]))
+        if self.add(nodes, signals, "Sum", {"signs": "+-"}, inputs):
+            difference = signals[-1]
+            for kind, limit in (("HitCrossing", "offset"), ("Relay", "on_point")):
+                value = float(r.choice([0.3, 0.5, 0.7]))
+                self.add(nodes, signals, kind, {limit: value}, {"u": difference})
 
     def begin_feedback(self, nodes: list[Node], signals: list[Signal]) -> list[str]:
         """Blocks with states whose inputs are connected at the end."""
