@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from firefox_bidi import firefox_path
+from playwright._impl._api_structures import SetCookieParam
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
 from interruptible import start_interruptible
@@ -145,6 +146,44 @@ class SharedBrowser:
 SHARED_BROWSER = SharedBrowser()
 
 
+class SharedStudio:
+    """One studio for all journeys of a process that do not kill it: a start takes seconds."""
+
+    def __init__(self) -> None:
+        self._studio: Studio | None = None
+        self._cookies: list[SetCookieParam] = []
+
+    def opened(self, folder: Callable[[str], Path]) -> Studio:
+        """The studio, started in a new folder where it is not running."""
+        if self._studio is None:
+            self._studio = Studio(folder("project"), "van_der_pol_pid")
+        return self._studio
+
+    def log_in(self, context: BrowserContext) -> None:
+        """Let a context in: the link that the studio prints serves once, its cookie as often as wanted."""
+        assert self._studio is not None
+        if not self._cookies:
+            context.request.get(self._studio.link)
+            (cookie,) = context.cookies()
+            self._cookies = [
+                {
+                    "name": cookie.get("name", ""),
+                    "value": cookie.get("value", ""),
+                    "url": self._studio.address,
+                }
+            ]
+        context.add_cookies(self._cookies)
+
+    def close(self) -> None:
+        """End it as a user does."""
+        if self._studio is not None:
+            studio, self._studio, self._cookies = self._studio, None, []
+            studio.stop()
+
+
+SHARED_STUDIO = SharedStudio()
+
+
 @pytest.fixture(scope="module")
 def browser() -> Browser:
     """Each test or file makes contexts of its own in it."""
@@ -160,6 +199,13 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
         fixtures = getattr(nextitem, "fixturenames", ())
         if nextitem is None or (nextitem.path != item.path and "browser" not in fixtures):
             SHARED_BROWSER.close()
+            SHARED_STUDIO.close()
+
+
+@pytest.fixture(scope="module")
+def studio(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Studio:
+    """The studio that the journeys of a process share. Each file or test makes pages of its own in it."""
+    return SHARED_STUDIO.opened(tmp_path_factory.mktemp)
 
 
 def new_context(browser: Browser) -> BrowserContext:
@@ -174,9 +220,10 @@ def new_context(browser: Browser) -> BrowserContext:
 
 
 @contextmanager
-def watched(browser: Browser, link: str) -> Generator[Page]:
-    """A page, logged in, that must say no error on its console; it shows the first example."""
+def watched(browser: Browser, address: str) -> Generator[Page]:
+    """A page of the shared studio that must say no error on its console."""
     context = new_context(browser)
+    SHARED_STUDIO.log_in(context)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     page = context.new_page()
     faults: list[str] = []
@@ -187,7 +234,7 @@ def watched(browser: Browser, link: str) -> Generator[Page]:
 
     page.on("console", hear)
     page.on("pageerror", lambda error: faults.append(str(error)))
-    page.goto(link)
+    page.goto(address)
     page.locator(".react-flow__node").first.wait_for()
     yield page
     context.close()
@@ -195,17 +242,15 @@ def watched(browser: Browser, link: str) -> Generator[Page]:
 
 
 @pytest.fixture(scope="module")
-def open_studio(browser: Browser) -> Iterator[Callable[..., Page]]:
-    """Start a studio that all tests of a file share, and show its page; ``model`` opens first.
+def open_studio(browser: Browser, studio: Studio) -> Iterator[Callable[[str], Page]]:
+    """Show a page of the shared studio until the file ends; the argument is the example that it opens.
 
     Where the model has no arm, the page does not draw one, which takes a browser without graphics long.
     """
     with ExitStack() as stack:
 
-        def opened(folder: Path, model: str = "kr180model") -> Page:
-            started = Studio(folder, model)
-            stack.callback(started.stop)
-            return stack.enter_context(watched(browser, started.link))
+        def opened(example: str) -> Page:
+            return stack.enter_context(watched(browser, f"{studio.address}#{example}"))
 
         yield opened
 
@@ -214,6 +259,7 @@ def open_studio(browser: Browser) -> Iterator[Callable[..., Page]]:
 def pytest_sessionfinish() -> None:
     """Leave no browser behind, wherever the tests ended."""
     SHARED_BROWSER.close()
+    SHARED_STUDIO.close()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -23,6 +23,7 @@ from building import (
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
+from conftest import Studio
 
 BLOCKS = [
     ("JTraj", "jtraj", 60, 250),
@@ -73,13 +74,13 @@ VALUES = [
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("figure-nine")
+def folder(studio: Studio) -> Path:
+    return studio.folder
 
 
 @pytest.fixture(scope="module")
-def page(open_studio: Callable[..., Page], folder: Path) -> Page:
-    page = open_studio(folder, "van_der_pol_pid")
+def page(open_studio: Callable[[str], Page]) -> Page:
+    page = open_studio("van_der_pol_pid")
     page.set_viewport_size({"width": 1920, "height": 1080})
     page.locator(".dock .tab").get_by_text("Tune", exact=True).click()  # an arm drawn in software takes long
     return page

@@ -13,6 +13,7 @@ from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
 from armblocks.formats import load_robot, read_robots
+from conftest import Studio
 
 PRINTED = Path(__file__).parents[1] / "formats" / "kr180_as_printed.m"
 DROP = """([name, content]) => {
@@ -27,14 +28,14 @@ DROP = """([name, content]) => {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("robots")
+def folder(studio: Studio) -> Path:
+    return studio.folder
 
 
 @pytest.fixture(scope="module")
-def page(open_studio: Callable[..., Page], folder: Path) -> Page:
+def page(open_studio: Callable[[str], Page]) -> Page:
     """One page for all: each test leaves it with a diagram on the screen. It begins without an arm."""
-    return open_studio(folder, "van_der_pol_pid")
+    return open_studio("van_der_pol_pid")
 
 
 def drop(page: Page, name: str, content: bytes) -> None:

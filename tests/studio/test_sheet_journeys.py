@@ -14,16 +14,17 @@ from playwright.sync_api import Locator, Page, expect
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import DiagramBlock
 from armblocks.formats import diagram_from_bytes, load_robot
+from conftest import Studio
 
 
 @pytest.fixture(scope="module")
-def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("sheets")
+def shared_folder(studio: Studio) -> Path:
+    return studio.folder
 
 
 @pytest.fixture(scope="module")
-def shared(open_studio: Callable[..., Page], shared_folder: Path) -> Page:
-    return open_studio(shared_folder, "van_der_pol_pid")
+def shared(open_studio: Callable[[str], Page]) -> Page:
+    return open_studio("van_der_pol_pid")
 
 
 @pytest.fixture

@@ -24,16 +24,17 @@ from building import (
 from playwright.sync_api import Page, expect
 
 import armblocks as ab
+from conftest import Studio
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("journeys")
+def folder(studio: Studio) -> Path:
+    return studio.folder
 
 
 @pytest.fixture(scope="module")
-def shared(open_studio: Callable[..., Page], folder: Path) -> Page:
-    return open_studio(folder)
+def shared(open_studio: Callable[[str], Page]) -> Page:
+    return open_studio("kr180model")
 
 
 @pytest.fixture
@@ -170,19 +171,6 @@ def test_a_run_is_paused_stepped_resumed_and_stopped(page: Page) -> None:
     page.get_by_role("button", name="Stop").click()
     expect(state).to_contain_text("stopped")
     speed.select_option("as fast as possible")
-
-
-def test_two_pages_show_the_same_document(open_studio: Callable[..., Page], tmp_path: Path) -> None:
-    page = open_studio(tmp_path, "van_der_pol_pid")
-    other = page.context.new_page()
-    other.goto(page.url)
-    other.locator(".react-flow__node").first.wait_for()
-    block(page, "PID").click()
-    page.keyboard.press("Delete")
-    expect(block(other, "PID")).to_have_count(0)
-    other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})
-    other.keyboard.press("Control+z")
-    expect(block(page, "PID")).to_be_visible()
 
 
 def test_copied_blocks_travel_as_text(page: Page) -> None:

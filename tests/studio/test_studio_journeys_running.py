@@ -11,10 +11,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from building import play_slowly, wait_until
+from building import DIALOG, play_slowly, wait_until
 from playwright.sync_api import Locator, Page, expect
 
 import armblocks as ab
+from conftest import Studio
 
 Opened = Callable[[ab.Diagram], Page]
 GAIN, LAG = 2.0, 1.0
@@ -32,18 +33,21 @@ def lag_model(name: str) -> ab.Diagram:
 
 
 @pytest.fixture(scope="module")
-def opened(open_studio: Callable[..., Page], tmp_path_factory: pytest.TempPathFactory) -> Opened:
-    """One server and one page for all: each test opens a model of its own."""
-    folder = tmp_path_factory.mktemp("running")
-    page = open_studio(folder, "van_der_pol_pid")
-    origin = page.url.partition("#")[0]
+def opened(open_studio: Callable[[str], Page], studio: Studio) -> Opened:
+    """One page for all: each test opens a model of its own."""
+    page = open_studio("van_der_pol_pid")
 
     def opening(diagram: ab.Diagram) -> Page:
-        ab.save_diagram(diagram, folder / f"{diagram.name}.json")
-        page.goto("about:blank")
-        page.goto(f"{origin}#{diagram.name}.json")
+        file = f"{diagram.name}.json"
+        ab.save_diagram(diagram, studio.folder / file)
+        page.keyboard.press("Escape")
+        page.keyboard.press("Control+o")
+        dialog = page.locator(DIALOG)
+        dialog.get_by_role("textbox", name="Search the files").fill(file)
+        dialog.get_by_text(file, exact=True).first.click()
         expect(page.locator(".title")).to_have_text(diagram.name)
         page.locator(".react-flow__node").first.wait_for()
+        tab(page, "Scopes")
         return page
 
     return opening
@@ -139,7 +143,7 @@ def test_two_runs_are_compared(opened: Opened) -> None:
     expect(said).to_contain_text("✓")
     page.get_by_role("textbox", name="Search the signals").fill("LAG")
     expect(page.locator(".signals label")).to_have_count(1)
-    name = page.get_by_role("textbox", name="Name of Run 1")
+    name = page.locator(".kept-run").last.get_by_role("textbox", name="Name of Run")
     name.fill("slow")
     name.press("Enter")
     page.get_by_role("button", name="Forget slow").click()
