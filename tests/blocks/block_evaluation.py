@@ -16,9 +16,11 @@ def evaluate(block: Block, *inputs: ArrayLike, t: float = 0.0, x: ArrayLike = ()
     builder.add("block", block, *sources)
     system = trace_diagram(builder.build())
     p = system.parameter_values
-    (z,) = system.initial_discrete(p)
-    # a reset without events: the modes settle
-    _, settled = system.reset(t, x, z, (), p, np.zeros(system.guards.outputs.size))
-    (y,) = system.signals(t, x, settled, (), p)
+    z = np.zeros(0)
+    if system.discrete.size:
+        (start,) = system.initial_discrete(p)
+        # a reset without events: the modes settle
+        _, z = system.reset(t, x, start, (), p, np.zeros(system.guards.outputs.size))
+    (y,) = system.signals(t, x, z, (), p)
     values = system.signals_layout.unpack(y)
     return {path.removeprefix("block/"): value for path, value in values.items() if path[:6] == "block/"}
