@@ -64,11 +64,11 @@ def test_van_der_pol_with_mu_1000(rtol: float, error: float) -> None:
 
 @pytest.mark.parametrize("name", list(KINETICS))
 def test_chemical_kinetics_against_radau(name: str) -> None:
-    """SciPy's Radau at 1e-10 shares nothing with these methods."""
+    """SciPy's Radau at 1e-9 shares nothing with these methods: it keeps a thousandth of what is allowed."""
     rates, start, stop = KINETICS[name]
     system = compile_system(kinetics(name))
     expected = solve_ivp(
-        lambda t, y: rates(y), (0, stop), start, method="Radau", rtol=1e-10, atol=1e-14, dense_output=True
+        lambda t, y: rates(y), (0, stop), start, method="Radau", rtol=1e-9, atol=1e-14, dense_output=True
     ).sol
     # Order 2 keeps fewer digits along the oscillator's steep fronts.
     for solver, rtol, allowed in (("rodas5p", 1e-8, 2e-6), ("ros23", 1e-6, 5e-3)):
