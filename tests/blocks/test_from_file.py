@@ -12,8 +12,8 @@ from armblocks.blocks import FromFile, Integrator, Ramp
 from armblocks.diagram import Diagram, DiagramBuilder, TimeTable, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, InputError, UnknownNameError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.01)])
 TIMES = np.array([0.5, 0.7, 1.5, 1.501, 3.0])
@@ -33,7 +33,7 @@ def run(
     options = SimulationOptions(
         stop_time=stop, sample_time=stop / count, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    return simulate(compile_system(trace_diagram(diagram)), options)
+    return simulate(compiled(diagram), options)
 
 
 @SOLVERS

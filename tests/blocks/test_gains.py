@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from armblocks.blocks import Clock, Integrator, SineWave, SineWaveFunction, SliderGain, WeightedSampleTime
-from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 
 def run(block: Block, source: Block, solver: str = "auto") -> SimulationResult:
@@ -21,7 +21,7 @@ def run(block: Block, source: Block, solver: str = "auto") -> SimulationResult:
     options = SimulationOptions(
         stop_time=2.0, sample_time=0.1, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    return simulate(compile_system(trace_diagram(builder.build())), options)
+    return simulate(compiled(builder.build()), options)
 
 
 @pytest.mark.parametrize("solver", ["rk45", "rk4"])

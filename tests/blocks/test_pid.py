@@ -19,11 +19,11 @@ from armblocks.blocks import (
     SineWave,
     Step,
 )
-from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.002)])
 T = 0.05
@@ -39,7 +39,7 @@ def run(
     options = SimulationOptions(
         stop_time=stop, sample_time=T, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    return simulate(compile_system(trace_diagram(builder.build())), options)
+    return simulate(compiled(builder.build()), options)
 
 
 @SOLVERS
@@ -226,7 +226,7 @@ def test_a_limiter_behind_it_can_be_tracked() -> None:
     actuator = builder.add("actuator", Saturation(lower=-1.0, upper=1.5), control)
     builder.connect(actuator["y"], control["tracking"])
     options = SimulationOptions(stop_time=4.0, sample_time=T, solver="rk45", rtol=1e-10, atol=1e-12)
-    result = simulate(compile_system(trace_diagram(builder.build())), options)
+    result = simulate(compiled(builder.build()), options)
     expected = limited_reference("back_calculation", result.time)
     np.testing.assert_allclose(result["actuator/y"], expected, atol=2e-3)
 

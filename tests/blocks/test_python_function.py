@@ -13,8 +13,8 @@ from armblocks.blocks import Clock, Constant, Derivative, Expression, Integrator
 from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, FormatError, InputError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 CODE = """
 import numpy as np
@@ -37,7 +37,7 @@ def run(diagram: Diagram, solver: str = "auto", step: float | None = None) -> Si
     options = SimulationOptions(
         stop_time=2.0, sample_time=0.1, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    return simulate(compile_system(trace_diagram(diagram)), options)
+    return simulate(compiled(diagram), options)
 
 
 def test_scalars_vectors_and_the_time() -> None:

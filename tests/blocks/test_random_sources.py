@@ -22,6 +22,7 @@ from armblocks.diagram import Block, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
+from compiled_diagrams import compiled
 
 M1, M2 = 4294967087, 4294944443
 A1 = ((0, 1, 0), (0, 0, 1), (-810728, 1403580, 0))
@@ -59,7 +60,7 @@ def drawn(block: Block, count: int, period: float = 0.001) -> np.ndarray:
     builder = DiagramBuilder("d")
     builder.add("noise", block)
     options = SimulationOptions(stop_time=(count - 1) * period, sample_time=period)
-    return simulate(compile_system(trace_diagram(builder.build())), options)["noise/y"]
+    return simulate(compiled(builder.build()), options)["noise/y"]
 
 
 def test_the_generator_is_mrg32k3a_to_the_last_bit() -> None:
@@ -135,7 +136,7 @@ def test_what_a_lag_makes_of_white_noise_has_the_variance_of_theory(solver: str)
     builder.add("lag", FirstOrderLag(time_constant=tau), noise)
     step = period if solver == "rk4" else None
     options = SimulationOptions(stop_time=stop, sample_time=0.05, solver=solver, step=step)
-    result = simulate(compile_system(trace_diagram(builder.build())), options)
+    result = simulate(compiled(builder.build()), options)
     values = result["lag/y"][20:]
     a = np.exp(-period / tau)
     exact = power / period * (1 - a) / (1 + a)

@@ -23,11 +23,11 @@ from armblocks.blocks import (
     TransferFunctionLeadOrLag,
     TransferFunctionRealZero,
 )
-from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
+from compiled_diagrams import compiled
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.01)])
 
@@ -43,7 +43,7 @@ def run(
     options = SimulationOptions(
         stop_time=stop, sample_time=stop / 200, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    result = simulate(compile_system(trace_diagram(builder.build())), options)
+    result = simulate(compiled(builder.build()), options)
     return result.time, [result[f"b{k}/y"] for k in range(len(chain) + 1)]
 
 

@@ -10,12 +10,12 @@ from scipy import signal
 
 from armblocks.blocks import BLOCKS, AnalogFilter, DigitalFilter, DiscreteZeroPole, SineWave, Step, ZeroPole
 from armblocks.blocks.linear_systems import ZeroPoleGain, realised
-from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
 from armblocks.formats import read_diagram, write_diagram
-from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
+from compiled_diagrams import compiled
 
 SOLVERS = pytest.mark.parametrize(("solver", "step"), [("rk45", None), ("rk4", 0.002)])
 SYSTEMS = [
@@ -37,7 +37,7 @@ def run(
     options = SimulationOptions(
         stop_time=4.0, sample_time=sample, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    result = simulate(compile_system(trace_diagram(builder.build())), options)
+    result = simulate(compiled(builder.build()), options)
     return result.time, result["u/y"], result["block/y"]
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from armblocks.diagram import Diagram, trace_diagram
+from armblocks.diagram import Diagram
 from armblocks.equations import SimulationOptions
-from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 
 def run(
@@ -15,4 +15,4 @@ def run(
     options = SimulationOptions(
         stop_time=stop_time, sample_time=stop_time / 100, rtol=rtol, atol=atol, solver=solver
     )
-    return simulate(compile_system(trace_diagram(diagram)), options)
+    return simulate(compiled(diagram), options)

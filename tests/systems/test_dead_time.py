@@ -38,6 +38,7 @@ from armblocks.errors import DiagramError
 from armblocks.integration.native_integrator import FIRST_ROOM
 from armblocks.integration.system import compile_system
 from armblocks.simulation import RunState, SimulationResult, simulate
+from compiled_diagrams import compiled
 
 Run = Callable[..., SimulationResult]
 
@@ -46,7 +47,7 @@ def native(**settings: object) -> Run:
     def run(diagram: Diagram, stop: float, **more: object) -> SimulationResult:
         chosen = {"stop_time": stop, "sample_time": stop / 200} | settings | more
         options = SimulationOptions(**chosen)  # pyright: ignore
-        return simulate(compile_system(trace_diagram(diagram)), options)
+        return simulate(compiled(diagram), options)
 
     return run
 

@@ -18,11 +18,11 @@ from armblocks.blocks import (
     StopSimulation,
     ZeroOrderHold,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, Diagram, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import SimulationError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 SOLVERS = [("rk45", None), ("rk4", 0.01)]
 
@@ -31,7 +31,7 @@ def run(diagram: Diagram, solver: str, step: float | None) -> SimulationResult:
     options = SimulationOptions(
         stop_time=10.0, sample_time=0.1, solver=solver, step=step, rtol=1e-10, atol=1e-12
     )
-    return simulate(compile_system(trace_diagram(diagram)), options)
+    return simulate(compiled(diagram), options)
 
 
 def watched(block: Block, relation: str = ">", level: float = 0.5) -> Diagram:

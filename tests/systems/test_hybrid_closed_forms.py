@@ -33,8 +33,8 @@ from armblocks.blocks import (
 )
 from armblocks.diagram import Block, BlockHandle, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
-from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
+from compiled_diagrams import compiled
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]
 SAMPLES = 100
@@ -45,7 +45,7 @@ def native(solver: str, step: float | None = None) -> Run:
         options = SimulationOptions(
             stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
         )
-        result = simulate(compile_system(trace_diagram(diagram)), options)
+        result = simulate(compiled(diagram), options)
         return {name: result[name] for name in result.names} | {"t": result.time}
 
     return run

@@ -28,12 +28,12 @@ from armblocks.blocks import (
     Step,
     Tachometer,
 )
-from armblocks.diagram import Block, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError
-from armblocks.integration.system import compile_system
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 
 @pytest.fixture(params=["rk45", "rk4"])
@@ -50,7 +50,7 @@ def sensed(seed: float = 0.0) -> SimulationResult:
     q, qd = builder.add("q", Constant(value=(0.5,) * 3)), builder.add("qd", Constant(value=(0.0,) * 3))
     builder.add("sensor", sensor, q, qd)
     options = SimulationOptions(stop_time=10.0, sample_time=1e-3)
-    return simulate(compile_system(trace_diagram(builder.build())), options)
+    return simulate(compiled(builder.build()), options)
 
 
 # -- sensors
@@ -211,7 +211,7 @@ def test_an_integrated_pose_stays_a_rotation_at_any_step() -> None:
     source = builder.add("V", SineWave(amplitude=(1.0, 1.0, 1.0, 3.0, 2.0, 4.0), phase=(0, 1, 2, 3, 4, 5)))
     builder.add("pose", PoseIntegration(), source)
     options = SimulationOptions(stop_time=200.0, sample_time=1.0, solver="euler", step=0.1)
-    R = simulate(compile_system(trace_diagram(builder.build())), options)["pose/T"][:, :3, :3]
+    R = simulate(compiled(builder.build()), options)["pose/T"][:, :3, :3]
     np.testing.assert_allclose(R @ R.transpose(0, 2, 1), np.tile(np.eye(3), (201, 1, 1)), atol=1e-14)
 
 

@@ -20,11 +20,11 @@ from armblocks.blocks import (
     UnitDelay,
     ZeroOrderHold,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, Diagram, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
+from compiled_diagrams import compiled
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]
 SAMPLES = 200
@@ -35,7 +35,7 @@ def native(solver: str, step: float | None = None) -> Run:
         options = SimulationOptions(
             stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
         )
-        result = simulate(compile_system(trace_diagram(diagram)), options)
+        result = simulate(compiled(diagram), options)
         return {name: result[name] for name in result.names} | {"t": result.time}
 
     return run

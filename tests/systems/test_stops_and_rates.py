@@ -35,11 +35,11 @@ from armblocks.blocks import (
     VariableIntegerDelay,
     WrapToZero,
 )
-from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
+from armblocks.diagram import Block, Diagram, DiagramBuilder
 from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, InputError
-from armblocks.integration.system import compile_system
 from armblocks.simulation import simulate
+from compiled_diagrams import compiled
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]
 SAMPLES = 100
@@ -50,7 +50,7 @@ def native(solver: str, step: float | None = None) -> Run:
         options = SimulationOptions(
             stop_time=stop, sample_time=stop / SAMPLES, solver=solver, step=step, rtol=1e-10, atol=1e-12
         )
-        result = simulate(compile_system(trace_diagram(diagram)), options)
+        result = simulate(compiled(diagram), options)
         return {name: result[name] for name in result.names} | {"t": result.time}
 
     return run
@@ -274,7 +274,7 @@ def at_ticks(block: Block, *courses: list[float]) -> dict[str, list[float]]:
     ]
     builder.add("block", block, *fed)
     options = SimulationOptions(stop_time=float(n - 1), sample_time=1.0)
-    result = simulate(compile_system(trace_diagram(builder.build())), options)
+    result = simulate(compiled(builder.build()), options)
     return {port.name: result[f"block/{port.name}"].tolist() for port in block.output_ports()}
 
 

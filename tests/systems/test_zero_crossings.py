@@ -49,6 +49,7 @@ from armblocks.diagram import Block, Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.integration.system import compile_system
 from armblocks.simulation import SimulationResult, simulate
+from compiled_diagrams import compiled
 
 Run = Callable[[Diagram, float], dict[str, np.ndarray]]
 SAMPLES = 100
@@ -57,7 +58,7 @@ SAMPLES = 100
 def result_of(
     diagram: Diagram, stop: float, solver: str = "rk45", step: float | None = None
 ) -> SimulationResult:
-    return simulate(compile_system(trace_diagram(diagram)), options(stop, solver, step))
+    return simulate(compiled(diagram), options(stop, solver, step))
 
 
 def options(stop: float, solver: str, step: float | None) -> SimulationOptions:
