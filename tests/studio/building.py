@@ -47,7 +47,8 @@ def add(page: Page, typed: str, *, by_key: bool = True) -> None:
     """Add a block by keyboard alone: letter by letter, or after the first letter all at once."""
     page.keyboard.press(typed[0])
     box = page.locator(DIALOG).get_by_role("textbox", name="Add a block")
-    expect(box).to_be_visible()
+    expect(box).to_be_focused()
+    expect(box).to_have_value(typed[0])
     if by_key:
         box.press_sequentially(typed[1:])
     else:
