@@ -43,6 +43,7 @@ from armblocks.blocks import (
     SignalGenerator,
     SineWave,
     Step,
+    StickSlipFriction,
     Sum,
     Switch,
     TransportDelay,
@@ -302,7 +303,7 @@ def test_nothing_with_a_memory_acts_on_a_signal_that_is_not_consistent_yet() -> 
 
 
 def test_what_a_hysteresis_gives_on_the_way_to_its_value_is_not_remembered() -> None:
-    """Behind a jump, a relay, a rate limiter and a play take several turns to find their values."""
+    """Behind a jump, a relay, a rate limiter, a play and friction take several turns to find their values."""
     builder = DiagramBuilder("turns")
     jump = builder.add("jump", Step(time=1.0))
     relay = builder.add("relay", Relay(), jump)
@@ -311,7 +312,10 @@ def test_what_a_hysteresis_gives_on_the_way_to_its_value_is_not_remembered() -> 
     back = builder.add("back", Step(time=2.0, initial=2.0, final=1.5))
     driving = builder.add("driving", Product(), jump, back)
     play = builder.add("play", Backlash(width=1.0), driving)
+    force = builder.add("force", Step(time=1.0, final=2.0))
+    friction = builder.add("mass", StickSlipFriction(), force)["friction"]
     watched = {
+        "friction": builder.add("friction", Sum(signs="+-"), friction, jump),
         "difference": builder.add("difference", Sum(signs="+-"), above, relay),
         "relays": builder.add("relays", Sum(signs="+-"), relay, builder.add("second", Relay(), relay)),
         "limit": limited,

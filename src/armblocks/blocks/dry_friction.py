@@ -9,7 +9,7 @@ from typing import ClassVar
 from casadi import SX, fabs, fmax, fmin, if_else, logic_and, logic_or, sign
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import JUST, SMALLEST_JUMP, limits_in_order
+from armblocks.blocks.switching import JUST, SMALLEST_JUMP, limits_in_order, same_instant
 from armblocks.diagram import (
     Block,
     Guard,
@@ -195,6 +195,9 @@ class StickSlipFriction(Block):
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("mode", (), "0 at rest, 1 sliding forwards, -1 backwards"),)
 
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("instant", (), "the latest tick, event or breakpoint", "s"),)
+
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (
             Guard("stop", (), "the speed"),
@@ -204,14 +207,20 @@ class StickSlipFriction(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sliding = x["mode"] * p["coulomb"] + p["viscous"] * x["v"]
-        return {"x": x["x"], "v": x["v"], "friction": if_else(x["mode"] == 0.0, u["F"], sliding)}
+        # Where the force jumps, friction never holds more than it can.
+        breaking = logic_and(same_instant(t, x["instant"]), fabs(u["F"]) > p["static"])
+        holding = if_else(breaking, sign(u["F"]) * p["coulomb"], u["F"])
+        return {"x": x["x"], "v": x["v"], "friction": if_else(x["mode"] == 0.0, holding, sliding)}
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"instant": t}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         sliding = (u["F"] - x["mode"] * p["coulomb"] - p["viscous"] * x["v"]) / p["mass"]
         return {"x": x["v"], "v": if_else(x["mode"] == 0.0, 0.0, sliding)}
 
     def initial_states(self, p: Signals) -> Signals:
-        return {"x": p["initial_position"], "v": p["initial_speed"]}
+        return {"x": p["initial_position"], "v": p["initial_speed"], "instant": SX(0.0)}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {

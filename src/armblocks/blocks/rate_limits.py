@@ -15,7 +15,7 @@ from typing import ClassVar
 from casadi import SX, fabs, fmax, if_else, logic_and, logic_or, sign
 from numpy.typing import ArrayLike
 
-from armblocks.blocks.switching import SMALLEST_JUMP
+from armblocks.blocks.switching import SMALLEST_JUMP, same_instant
 from armblocks.diagram import (
     Block,
     Guard,
@@ -32,8 +32,6 @@ from armblocks.diagram import (
 APART = 1e-3
 """A limiter that is switched on, in an enabled subsystem, follows an input that is nearer to its last output
 than this, beside its size."""
-SAME_INSTANT = 2.0**-50
-"""Times that differ less, beside their size, are one instant."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,16 +108,12 @@ class RateLimiting(Block):
         leaves = logic_and(x["mode"] == 0.0, law != 0.0)
         return {
             "mode": if_else(fired, law, x["mode"]),
-            "y": if_else(logic_and(leaves, self._at_instant(t, x)), x["kept"], x["y"]),
+            "y": if_else(logic_and(leaves, same_instant(t, x["kept_at"])), x["kept"], x["y"]),
         }
-
-    def _at_instant(self, t: SX, x: Signals) -> SX:
-        """Whether this is the latest tick, event or breakpoint."""
-        return fabs(t - x["kept_at"]) <= SAME_INSTANT * fabs(t)
 
     def _jump(self, t: SX, x: Signals, u: Signals) -> SX:
         """How far u has jumped at this instant."""
-        return if_else(self._at_instant(t, x), u["u"] - x["kept"], 0.0)
+        return if_else(same_instant(t, x["kept_at"]), u["u"] - x["kept"], 0.0)
 
     def _band(self, u: Signals) -> SX:
         """The largest jump that is passed on."""

@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from casadi import SX, fmax, fmin, if_else, logic_or
+from casadi import SX, fabs, fmax, fmin, if_else, logic_or
 
 from armblocks.diagram import (
     Block,
@@ -24,6 +24,8 @@ JUST = 1e-300
 
 SMALLEST_JUMP = 1e-9
 """A smaller jump of a signal, beside its size, cannot be told from rounding by a block that looks for one."""
+SAME_INSTANT = 2.0**-50
+"""Times that differ less, beside their size, are one instant."""
 _SAME_INSTANT = 1.0 + 2.0**-51
 """Half of what the numerics take for one instant."""
 
@@ -35,6 +37,11 @@ def since(t: SX, instant: SX) -> SX:
     are one instant: the guard is positive two units in the last place before it.
     """
     return t * _SAME_INSTANT - instant + JUST
+
+
+def same_instant(t: SX, instant: SX) -> SX:
+    """Whether a time is that of an instant that the block has kept: four units in the last place."""
+    return fabs(t - instant) <= SAME_INSTANT * fabs(t)
 
 
 def zero_crossing_parameter() -> Any:
