@@ -46,7 +46,7 @@ def page(shared: Page) -> Page:
 def open_example(page: Page, name: str) -> Page:
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Menu").click()
-    page.get_by_role("menuitem", name=re.compile(f"^{name} [a-z]")).click()
+    page.get_by_role("menuitem", name=re.compile(f"^{name} (?!not saved)[a-z]")).click()
     expect(page.get_by_role("menu")).to_be_hidden()
     expect(page.locator(".title")).to_have_text(name)
     page.locator(".react-flow__node").first.wait_for()
