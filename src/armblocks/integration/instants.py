@@ -5,9 +5,9 @@ At an instant (a tick, an event, a breakpoint, the start) things happen in this 
 1. the flow is integrated up to it with the old values; the step ends exactly there, and where something
    keeps left limits, ``update`` is called for that with no clock marked;
 2. all clocks that tick now are marked and ``update`` gives ``z``;
-3. guards whose sign the jump has changed fire, and so do those whose zero was located here; ``reset`` gives
-   ``x`` and ``z``; this is repeated until none fires; then modes that contradict their conditions take their
-   consistent values, and all this is repeated until nothing changes;
+3. modes that follow the signals become consistent; then guards whose sign the jump has changed fire, and so
+   do those whose zero was located here, and ``reset`` gives ``x`` and ``z``; where none fires, other modes
+   that contradict their conditions take their consistent values; all this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
 5. the integration starts anew. The first step after an event is at most a hundredth of the time since the
    event before it, and later ones grow tenfold at most: no step leaps over a bounce that is getting shorter.
