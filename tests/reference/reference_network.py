@@ -353,7 +353,7 @@ class Network:
         self.ticking = set(clocks)
         for _ in range(2):  # a restart at this tick changes what is read
             self.evaluate(t)
-            again = [b for b in self.blocks.values() if b.clock in self.ticking and b.restarts]
+            again = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
             if not again:
                 break
             for block in again:
