@@ -387,8 +387,10 @@ def is_invariant(case: Case) -> Iterator[str]:
         found = case.signals(diagram)
         kept = {name: found[names(name)] for name in case.run if names(name) in found}
         wanted = {name: case.run[name] for name in kept}
-        for text in different(kept, wanted, 1e-6):
-            yield f"{what}: {text}"
+        texts = list(different(kept, wanted, 1e-6))
+        if texts:
+            expect_well_posed(case, case.run)
+        yield from (f"{what}: {text}" for text in texts)
 
 
 Change = Callable[[Recipe], tuple[Recipe, Callable[[str], str]]]
