@@ -13,7 +13,7 @@ from casadi import SX, logic_or
 
 from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formula_value
 from armblocks.diagram.parameter import Parameter, Value, shape_of
-from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View
+from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View, name_before
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
@@ -362,7 +362,7 @@ class Block(ABC):
         that value. Blocks override this where a mode is allowed to differ (hysteresis, counted edges), or
         where its value costs more than the question.
         """
-        before = {mode: x[f"{mode} before"] for mode in x if f"{mode} before" in x}
+        before = {mode: x[name_before(mode)] for mode in x if name_before(mode) in x}
         found = self.mode_values(t, {**x, **before}, u, p)
         return {name: logic_or(value > x[name], value < x[name]) for name, value in found.items()}
 

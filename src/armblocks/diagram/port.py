@@ -42,7 +42,12 @@ class State:
     @property
     def before(self) -> str:
         """The name of what a mode that ``remembers`` was before."""
-        return f"{self.name} before"
+        return name_before(self.name)
+
+
+def name_before(mode: str) -> str:
+    """The name of the discrete state that keeps what a mode was before."""
+    return f"{mode} before"
 
 
 @dataclass(frozen=True)
