@@ -26,8 +26,8 @@ SMALLEST_JUMP = 1e-9
 """A smaller jump of a signal, beside its size, cannot be told from rounding by a block that looks for one."""
 SAME_INSTANT = 2.0**-50
 """Times that differ less, beside their size, are one instant."""
-_SAME_INSTANT = 1.0 + 2.0**-51
-"""Half of what the numerics take for one instant."""
+_HALF_LATER = 1.0 + 2.0**-51
+"""A time times this is later by half of what is one instant."""
 
 
 def since(t: SX, instant: SX) -> SX:
@@ -36,7 +36,7 @@ def since(t: SX, instant: SX) -> SX:
     An instant that is rounded, such as 5 times 0.2 s, and a recorded time or a tick that is rounded otherwise
     are one instant: the guard is positive two units in the last place before it.
     """
-    return t * _SAME_INSTANT - instant + JUST
+    return t * _HALF_LATER - instant + JUST
 
 
 def same_instant(t: SX, instant: SX) -> SX:
