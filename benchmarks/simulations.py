@@ -29,11 +29,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from compare import five_blocks
 from measure import Timing, in_turn
 from urdf import to_urdf
 
 import armblocks as ab
-from armblocks.blocks import Gain, Integrator, Step, Sum
 
 HERE = Path(__file__).parent
 QF = np.array([0.5, 0.9, -0.8, 0.6, -0.4, 1.0])
@@ -224,16 +224,6 @@ def _drake_run(
     seconds = time.perf_counter() - begin
     final = context.get_continuous_state_vector().CopyToVector().tolist()
     return Run(seconds, integrator.get_num_steps_taken(), final)
-
-
-def five_blocks() -> ab.Diagram:
-    builder = ab.DiagramBuilder("five blocks")
-    total = builder.add("total", Sum(signs="+--"), builder.add("step", Step(time=0.0, final=1.0)))
-    speed = builder.add("speed", Integrator(), builder.add("gain", Gain(gain=4.0), total))
-    place = builder.add("place", Integrator(), speed)
-    builder.connect(place, total["u2"])
-    builder.connect(speed, total["u3"])
-    return builder.build()
 
 
 FIXED = {"stop_time": 10.0, "step": 1e-3, "solver": "rk4", "sample_time": 0.01}
