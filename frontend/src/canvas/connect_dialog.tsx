@@ -4,6 +4,12 @@ import { show, useDialogs } from '../dialogs'
 import { SCROLLED } from '../scrolled'
 import { change, useStudio } from '../store'
 
+/**
+ * How a port is chosen: by typing. Without `selectFirstOptionOnDropdownOpen`, Mantine forgets the highlighted option in a
+ * timer after the list opens; on a busy machine that is after the first keys, and Enter chooses nothing.
+ */
+const TYPED = { ...SCROLLED, searchable: true, selectFirstOptionOnChange: true, selectFirstOptionOnDropdownOpen: true } as const
+
 /** The way to draw a wire by keyboard: type the names of two ports. The selected block's are suggested. */
 export function ConnectDialog() {
   const opened = useDialogs((s) => s.open === 'connect')
@@ -42,8 +48,8 @@ export function ConnectDialog() {
         }}
       >
         <Stack gap="sm">
-          <Select {...SCROLLED} label="From the output" data={sources} value={source} onChange={setSource} searchable selectFirstOptionOnChange data-autofocus={!source || undefined} nothingFoundMessage="no such output" />
-          <Select {...SCROLLED} label="To the input" data={targets} value={target} onChange={setTarget} searchable selectFirstOptionOnChange data-autofocus={source ? true : undefined} nothingFoundMessage="no such free input" />
+          <Select {...TYPED} label="From the output" data={sources} value={source} onChange={setSource} data-autofocus={!source || undefined} nothingFoundMessage="no such output" />
+          <Select {...TYPED} label="To the input" data={targets} value={target} onChange={setTarget} data-autofocus={source ? true : undefined} nothingFoundMessage="no such free input" />
           <Group justify="flex-end" gap="xs">
             <Button variant="default" onClick={close}>
               Cancel
