@@ -19,13 +19,13 @@ from armblocks.diagram import (
     diagram_views,
     infer_shapes,
 )
+from armblocks.drawing import block_picture, diagram_picture
 from armblocks.face.block_examples import caption, example_block
 from armblocks.formats import diagram_to_bytes, diagram_to_python, load_robot
-from armblocks.report import block_picture, diagram_picture
+from armblocks.pictures.style import theme_variables
+from armblocks.pictures.svg import page_rules, svg_inline
 from armblocks.report.figures import Figure, motion_figures, view_figures
 from armblocks.report.motion import motions
-from armblocks.report.style import theme_variables
-from armblocks.report.svg import page_rules, svg_inline
 
 FIGURE_WIDTH = 736.0
 """px: what the theme's column holds, so that type in figures is as large as it says."""

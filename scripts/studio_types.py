@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from armblocks.report.style import FONT_STACK, MONO_STACK, PALETTE
+from armblocks.pictures.style import FONT_STACK, MONO_STACK, PALETTE
 from armblocks.studio.schema import message_schema
 
 FRONTEND = Path(__file__).resolve().parent.parent / "frontend"
@@ -44,7 +44,7 @@ def tones() -> str:
         f".f-{name} {{ fill: var(--{name}); }}\n.s-{name} {{ stroke: var(--{name}); }}"
         for name in (tone.value for tone in PALETTE)
     )
-    banner = "/* Made from armblocks.report.style by scripts/studio_types.py: do not edit. */"
+    banner = "/* Made from armblocks.pictures.style by scripts/studio_types.py: do not edit. */"
     return (
         f"{banner}\n:root {{\n{properties('light')}\n  --font: 'Inter Variable', {FONT_STACK};\n"
         f"  --mono: 'JetBrains Mono', {MONO_STACK};\n}}\n"

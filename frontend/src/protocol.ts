@@ -153,7 +153,7 @@ export interface Place {
 /**
  * A wire between two ports, written ``block/port``.
  *
- * ``bends``: the way that somebody has drawn, see :func:`armblocks.report.wire_routing.bent`.
+ * ``bends``: the way that somebody has drawn, see :func:`armblocks.drawing.wire_routing.bent`.
  */
 export interface Wire {
   source: string;

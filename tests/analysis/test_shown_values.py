@@ -19,7 +19,7 @@ from armblocks.analysis.shown_values import (
     shown_poles,
     shown_zeros,
 )
-from armblocks.report.analysis import shown_summary, summarise
+from armblocks.report.motion_summary import shown_summary, summarise
 from robots_for_tests import build_puma560
 from unordered import matched
 

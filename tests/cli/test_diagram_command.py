@@ -9,7 +9,7 @@ from typer.testing import Result
 import armblocks as ab
 from armblocks.blocks import Gain, Inport, Outport, Scope, SineWave
 from armblocks.diagram import Connection, Diagram, DiagramBuilder, PortRef, Subsystem
-from armblocks.report import DRAWING_FORMATS, drawing_bytes
+from armblocks.drawing import DRAWING_FORMATS, drawing_bytes
 
 Invoke = Callable[..., Result]
 BEGINNINGS = {"svg": b"<?xml", "png": b"\x89PNG", "pdf": b"%PDF-"}

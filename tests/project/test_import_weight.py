@@ -5,7 +5,9 @@ import subprocess
 import sys
 
 # What else the studio's page can do without, so that it is there while the server imports it.
-BEHIND_THE_PAGE = {"casadi", "pydantic", "armblocks.blocks", "armblocks.diagram", "armblocks.report"}
+BEHIND_THE_PAGE = {"casadi", "pydantic"} | {
+    f"armblocks.{package}" for package in ("blocks", "diagram", "drawing", "rendering", "report")
+}
 HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "starlette", "numpy"}
 
 

@@ -8,8 +8,10 @@ import pytest
 
 PACKAGES = (
     "armblocks",
+    "armblocks.drawing",
     "armblocks.equations",
     "armblocks.formats",
+    "armblocks.rendering",
     "armblocks.report",
     "armblocks.simulation",
 )

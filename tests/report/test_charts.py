@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armblocks.report.charts import Panel, Trace, spread, thin_out, time_chart
-from armblocks.report.path_chart import path_chart
-from armblocks.report.picture import Picture, Polyline, Text, text_marks
-from armblocks.report.scale import padded
-from armblocks.report.style import Tone
-from armblocks.report.text_width import text_width
+from armblocks.pictures.picture import Picture, Polyline, Text, text_marks
+from armblocks.pictures.style import Tone
+from armblocks.pictures.text_width import text_width
+from armblocks.pictures.thinning import thin_out
+from armblocks.report.charts.path_chart import path_chart
+from armblocks.report.charts.scale import padded
+from armblocks.report.charts.time_chart import Panel, Trace, spread, time_chart
 
 
 def boxes(picture: Picture) -> list[tuple[float, float, float, float]]:

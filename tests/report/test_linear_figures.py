@@ -11,6 +11,11 @@ import pytest
 
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.errors import UnknownNameError
+from armblocks.pictures.numbers import log_ticks
+from armblocks.pictures.picture import Picture, Polyline, text_marks
+from armblocks.pictures.png import picture_png
+from armblocks.pictures.svg import svg_file
+from armblocks.pictures.text_width import text_width
 from armblocks.report import (
     bode_picture,
     impulse_picture,
@@ -20,13 +25,8 @@ from armblocks.report import (
     step_picture,
     write_linear_report,
 )
-from armblocks.report.axes import straight_field, within
-from armblocks.report.numbers import log_ticks
-from armblocks.report.picture import Picture, Polyline, text_marks
-from armblocks.report.png import picture_png
-from armblocks.report.scale import LogScale
-from armblocks.report.svg import svg_file
-from armblocks.report.text_width import text_width
+from armblocks.report.charts.axes import straight_field, within
+from armblocks.report.charts.scale import LogScale
 
 
 def servo(dt: float = 0.0) -> LinearSystem:

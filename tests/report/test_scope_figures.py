@@ -3,8 +3,8 @@
 import armblocks as ab
 from armblocks.blocks import Clock, Constant, Integrator, Mux, Saturation, Scope, SineWave, Step
 from armblocks.diagram import Diagram, DiagramBuilder
+from armblocks.pictures.picture import text_marks
 from armblocks.report.figures import view_figures
-from armblocks.report.picture import text_marks
 
 
 def diagram() -> Diagram:

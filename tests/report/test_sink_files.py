@@ -10,8 +10,8 @@ import armblocks as ab
 from armblocks.blocks import Clock, SineWave, Spectrum, Subsystem, ToFile
 from armblocks.diagram import Diagram, DiagramBuilder, Inport
 from armblocks.errors import DiagramError, FormatError, InputError
+from armblocks.pictures.picture import text_marks
 from armblocks.report.figures import view_figures
-from armblocks.report.picture import text_marks
 
 
 def diagram(**files: ToFile) -> Diagram:

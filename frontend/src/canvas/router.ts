@@ -1,6 +1,6 @@
 /**
  * Orthogonal wires around blocks: a sparse grid, A* with a price for bends, nets that share their stem. The prices are
- * those of `report/wire_routing.py`, so that a report draws a sheet much as the canvas does. Each net has a grid of
+ * those of `drawing/wire_routing.py`, so that a report draws a sheet much as the canvas does. Each net has a grid of
  * its own over the window that it needs, so the work for one wire does not grow with the sheet.
  */
 
@@ -57,7 +57,7 @@ const MOST_NODES = 60_000
 /**
  * The corner points of a way along `bends`, the coordinates of its straight pieces in turn (px): of a wire that leaves
  * to the side x, y, x … The first and the last piece go with their ports. `null` without bends, or where the last piece
- * would not run in the direction of its port. The same as in `report/wire_routing.py`.
+ * would not run in the direction of its port. The same as in `drawing/wire_routing.py`.
  */
 export function bent(source: WireEnd, bends: readonly number[], target: WireEnd): Point[] | null {
   let [x, y] = [source.x, source.y]

@@ -14,9 +14,9 @@ from rich.text import Text
 from armblocks.cli.progress import factor_text
 from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind, diagram_views
-from armblocks.report.analysis import JointSummary, LimitKind, people_unit, shown_summary, summarise
+from armblocks.pictures.numbers import wall_time
 from armblocks.report.motion import motions
-from armblocks.report.numbers import wall_time
+from armblocks.report.motion_summary import JointSummary, LimitKind, people_unit, shown_summary, summarise
 
 if TYPE_CHECKING:
     from armblocks import Diagram, SimulationResult

@@ -83,12 +83,12 @@ class Diagram:
 
     ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams look alike. ``layout``
     may name only some blocks, ``bends`` only some wires: those whose way somebody has drawn, see
-    :func:`armblocks.report.wire_routing.bent`; ``notes`` are annotations by name. ``mask`` are the parameters
-    that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` what they are, the defaults where
-    nothing is given; blocks whose parameters are formulas have the values that follow from these. ``link``
-    names the entry of a library file that the diagram is, ``servos.json#JointServo``; it is empty for one of
-    its own. ``extras`` are unknown keys of a file, preserved: it has the keys ``""`` (the document),
-    ``"blocks"`` (by block name), and whatever else a file format puts there.
+    :func:`armblocks.drawing.wire_routing.bent`; ``notes`` are annotations by name. ``mask`` are the
+    parameters that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` what they are, the
+    defaults where nothing is given; blocks whose parameters are formulas have the values that follow from
+    these. ``link`` names the entry of a library file that the diagram is, ``servos.json#JointServo``; it is
+    empty for one of its own. ``extras`` are unknown keys of a file, preserved: it has the keys ``""`` (the
+    document), ``"blocks"`` (by block name), and whatever else a file format puts there.
     """
 
     name: str

@@ -246,7 +246,7 @@ class Arm:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the arm with all joints at zero, and its table."""
-        from armblocks.report import arm_picture_svg
+        from armblocks.rendering import arm_picture_svg
 
         return robot_html(self.robot, arm_picture_svg(self.robot, [0.0] * self.n))
 

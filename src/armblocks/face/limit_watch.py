@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import Diagram
-from armblocks.report.analysis import limit_findings, warn_of_limits
 from armblocks.report.motion import MovingArm, moving_arms
+from armblocks.report.motion_summary import limit_findings, warn_of_limits
 from armblocks.simulation import SimulationResult
 
 _Array = NDArray[np.float64]

@@ -61,6 +61,6 @@ def draw_diagram(
     displays show what it holds; ``rates`` shows the clocks of sampled blocks. Raises UnknownNameError for
     another suffix or sheet.
     """
-    from armblocks import report
+    from armblocks import drawing
 
-    return report.draw_diagram(path, diagram, result, sheet=sheet, theme=theme, rates=rates)
+    return drawing.draw_diagram(path, diagram, result, sheet=sheet, theme=theme, rates=rates)

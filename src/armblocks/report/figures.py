@@ -14,15 +14,15 @@ from armblocks.analysis.spectrum import SignalSpectrum, signal_spectrum
 from armblocks.blocks import Mux
 from armblocks.diagram import Diagram, SpectrumSettings, View, ViewKind, diagram_views, flat_diagram
 from armblocks.errors import InputError
-from armblocks.report.arm_drawing import moments_picture
-from armblocks.report.charts import Panel, Trace, fits_beside, time_chart
+from armblocks.pictures.numbers import axis_number, si_prefix
+from armblocks.pictures.picture import Picture, Text
+from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, Tone
+from armblocks.pictures.svg import svg_marks
+from armblocks.rendering.arm_drawing import moments_picture
+from armblocks.report.charts.path_chart import path_chart, side_by_side
+from armblocks.report.charts.spectrum_chart import spectrum_chart
+from armblocks.report.charts.time_chart import Panel, Trace, fits_beside, time_chart
 from armblocks.report.motion import Motion
-from armblocks.report.numbers import axis_number, si_prefix
-from armblocks.report.path_chart import path_chart, side_by_side
-from armblocks.report.picture import Picture, Text
-from armblocks.report.spectrum_chart import spectrum_chart
-from armblocks.report.style import FIGURE_WIDTH, SMALL_SIZE, Tone
-from armblocks.report.svg import svg_marks
 from armblocks.simulation.result import SimulationResult
 
 _Array = NDArray[np.float64]

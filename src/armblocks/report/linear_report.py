@@ -9,12 +9,12 @@ from pathlib import Path
 from armblocks.analysis.linear_system import LinearSystem
 from armblocks.errors import UnknownNameError
 from armblocks.files import write_atomically
-from armblocks.report.frequency_charts import bode_picture, nyquist_picture
-from armblocks.report.picture import Picture
-from armblocks.report.png import picture_png
-from armblocks.report.response_charts import impulse_picture, step_picture
-from armblocks.report.root_charts import pole_zero_picture, root_locus_picture
-from armblocks.report.svg import svg_file
+from armblocks.pictures.picture import Picture
+from armblocks.pictures.png import picture_png
+from armblocks.pictures.svg import svg_file
+from armblocks.report.charts.frequency_charts import bode_picture, nyquist_picture
+from armblocks.report.charts.response_charts import impulse_picture, step_picture
+from armblocks.report.charts.root_charts import pole_zero_picture, root_locus_picture
 from armblocks.report.writing import FIGURE_FORMATS, make_folder
 
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from armblocks.diagram import Diagram, ViewKind, diagram_views
-from armblocks.report.analysis import MotionSummary
+from armblocks.pictures.numbers import axis_number, wall_time
+from armblocks.pictures.picture import Picture
+from armblocks.pictures.svg import escape, svg_inline
 from armblocks.report.figures import Figure
 from armblocks.report.motion import Motion
-from armblocks.report.numbers import axis_number, wall_time
+from armblocks.report.motion_summary import MotionSummary
 from armblocks.report.page_style import page_css
 from armblocks.report.page_tables import html_table, limits_table, loads_table, tool_table, value_cell
-from armblocks.report.picture import Picture
-from armblocks.report.svg import escape, svg_inline
 from armblocks.robot import inertia_findings
 from armblocks.simulation.result import SimulationResult
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from armblocks.report.style import FONT_STACK, MONO_STACK, theme_variables
-from armblocks.report.svg import page_rules
+from armblocks.pictures.style import FONT_STACK, MONO_STACK, theme_variables
+from armblocks.pictures.svg import page_rules
 
 
 def page_css() -> str:

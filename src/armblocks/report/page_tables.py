@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.report.analysis import LimitFinding, LimitKind, MotionSummary, people_unit
+from armblocks.pictures.numbers import MINUS, axis_number, table_number
+from armblocks.pictures.style import trace_tone
+from armblocks.pictures.svg import escape
 from armblocks.report.motion import Motion
-from armblocks.report.numbers import MINUS, axis_number, table_number
-from armblocks.report.style import trace_tone
-from armblocks.report.svg import escape
+from armblocks.report.motion_summary import LimitFinding, LimitKind, MotionSummary, people_unit
 
 MOST_NUMBERS = 64
 """Of a longer array a report gives the range."""

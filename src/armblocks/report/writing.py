@@ -11,15 +11,15 @@ from itertools import islice
 from pathlib import Path
 
 from armblocks.diagram import Diagram
+from armblocks.drawing.diagram_drawing import diagram_picture, sheets
 from armblocks.errors import FormatError, UnknownNameError
 from armblocks.files import write_atomically
-from armblocks.report.analysis import MotionSummary, summarise
-from armblocks.report.diagram_drawing import diagram_picture, sheets
+from armblocks.pictures.svg import svg_file
 from armblocks.report.figures import Figure, file_name, motion_figures, view_figures
 from armblocks.report.motion import Motion, motions
+from armblocks.report.motion_summary import MotionSummary, summarise
 from armblocks.report.page import ReportContents, Sheet, report_page
 from armblocks.report.sink_files import DATA_FORMATS, REPORT_DATA, sink_files, write_files
-from armblocks.report.svg import svg_file
 from armblocks.simulation.result import SimulationResult
 
 FIGURE_FORMATS = ("svg", "png")
@@ -125,8 +125,8 @@ def _encoding(figure: Figure, kind: str) -> Callable[[], bytes]:
     """What gives the bytes of a figure's file. Its slow part, if any, lets other threads run."""
     if kind == "svg":
         return svg_file(figure.picture, marks=figure.svg_marks).encode
-    from armblocks.report.png import picture_pixels
-    from armblocks.report.png_file import png_bytes
+    from armblocks.pictures.png import picture_pixels
+    from armblocks.pictures.png_file import png_bytes
 
     return partial(png_bytes, picture_pixels(figure.picture))
 

@@ -46,7 +46,7 @@ class NewBlock(Message):
 class Wire(Message):
     """A wire between two ports, written ``block/port``.
 
-    ``bends``: the way that somebody has drawn, see :func:`armblocks.report.wire_routing.bent`.
+    ``bends``: the way that somebody has drawn, see :func:`armblocks.drawing.wire_routing.bent`.
     """
 
     source: str

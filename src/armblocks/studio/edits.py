@@ -29,8 +29,8 @@ from armblocks.diagram import (
 from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
+from armblocks.drawing.diagram_layout import standing_box
 from armblocks.errors import DiagramError, UnknownNameError
-from armblocks.report.diagram_layout import standing_box
 from armblocks.studio.clipping import ReadDiagram, pasted, reader
 from armblocks.studio.edit_messages import (
     AddBlocks,

@@ -20,8 +20,8 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, ParameterFormula
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
+from armblocks.drawing.diagram_file import drawing_bytes
 from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputError, UnknownNameError
-from armblocks.report.diagram_file import drawing_bytes
 from armblocks.robot import Robot
 from armblocks.studio import messages as say
 from armblocks.studio.check import check

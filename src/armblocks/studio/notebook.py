@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from armblocks.diagram import Diagram, View, ViewKind, diagram_views
 from armblocks.errors import InputError
 from armblocks.face.arm import Arm
-from armblocks.report.arm_drawing import arm_picture_svg
+from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult
 from armblocks.studio.frames import sample_frame

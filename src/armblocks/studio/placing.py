@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from armblocks.diagram import Diagram, DiagramBlock, Placement
-from armblocks.report.diagram_layout import boxes
+from armblocks.drawing.diagram_layout import boxes
 
 
 def placed(diagram: Diagram) -> Diagram:

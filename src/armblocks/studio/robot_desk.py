@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from armblocks import formats
 from armblocks.errors import ArmblocksWarning, FormatError, InputError
-from armblocks.report.arm_drawing import arm_picture_svg
+from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.studio import robot_messages as say
 from armblocks.studio.messages import Recover

@@ -8,13 +8,13 @@ from typing import Any
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
+from armblocks.drawing.block_faces import FaceShape, face_size, port_labels
+from armblocks.drawing.diagram_drawing import block_marks
+from armblocks.drawing.diagram_layout import Box, drawn_blocks, standing_box
 from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
-from armblocks.report.block_faces import FaceShape, face_size, port_labels
-from armblocks.report.diagram_drawing import block_marks
-from armblocks.report.diagram_layout import Box, drawn_blocks, standing_box
-from armblocks.report.picture import Picture
-from armblocks.report.svg import svg_marks
+from armblocks.pictures.picture import Picture
+from armblocks.pictures.svg import svg_marks
 from armblocks.studio.edit_messages import Place, SheetNote, Wire
 from armblocks.studio.edits import DEFAULT_ROBOT
 from armblocks.studio.parameter_values import parameter_json

@@ -1,0 +1,257 @@
+"""What a block shows on its face: outline, size, and the drawing that says what it does.
+
+Most blocks show a sign of :mod:`.face_symbols`; here are those whose outline or drawing is their own.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+
+from armblocks import blocks as kinds
+from armblocks.diagram import Block
+from armblocks.drawing.face_marks import Room, least_room, sign_marks, words
+from armblocks.drawing.face_symbols import sign_of, stated_text, value_text
+from armblocks.drawing.sink_faces import Trend, display, scope, xy_graph
+from armblocks.drawing.structure_faces import (
+    BAR,
+    branch_labels,
+    bus_outline,
+    control_ports,
+    is_subsystem,
+    lever_marks,
+    mask_width,
+    oval,
+    port_number,
+    stop_marks,
+    subsystem_marks,
+    tag_outline,
+    tag_text,
+    tag_width,
+)
+from armblocks.pictures.numbers import axis_number
+from armblocks.pictures.picture import Curve, Disc, Group, Mark, Polyline, Rectangle, Text
+from armblocks.pictures.style import Tone
+from armblocks.pictures.text_width import text_width
+from armblocks.rendering.camera import Camera
+from armblocks.robot import Robot
+from armblocks.robot.geometry import link_frames
+
+
+class FaceShape(Enum):
+    """The outline of a block."""
+
+    CARD = "card"
+    TRIANGLE = "triangle"
+    CIRCLE = "circle"
+    BAR = "bar"
+    BUS = "bus"
+    OVAL = "oval"
+    TAG = "tag"
+
+
+def face_size(block: Block) -> tuple[FaceShape, float, float]:
+    """Outline, width and height in px that suit the face; port names may widen it."""
+    match block:
+        case kinds.Sum() if len(block.signs) <= 3:
+            return FaceShape.CIRCLE, 34.0, 34.0
+        case kinds.Gain() | kinds.SliderGain():
+            return FaceShape.TRIANGLE, 62.0, 52.0
+        case kinds.Mux() | kinds.Demux():
+            return FaceShape.BAR, 9.0, 48.0
+        case kinds.BusCreator() | kinds.BusSelector() | kinds.BusAssignment():
+            return FaceShape.BUS, 30.0, 48.0
+        case kinds.Inport() | kinds.Outport():
+            return FaceShape.OVAL, 44.0, 24.0
+        case kinds.Goto() | kinds.From():
+            return FaceShape.TAG, tag_width(block), 26.0
+        case kinds.Product():
+            return FaceShape.CARD, 46.0, 46.0
+        case kinds.Display():
+            return FaceShape.CARD, 104.0, max(40.0, 24.0 * block.inputs + 8)
+        case kinds.Scope() | kinds.XYGraph():
+            return FaceShape.CARD, 72.0, 60.0
+        case kinds.JTraj() | kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
+            return FaceShape.CARD, 84.0, 64.0
+        case kinds.Terminator():
+            return FaceShape.CARD, 34.0, 34.0
+        case _ if is_subsystem(block):
+            return FaceShape.CARD, 104.0, 64.0
+        case _:
+            width, height = least_room(sign_of(block))
+            return FaceShape.CARD, max(68.0, width), max(50.0, height)
+
+
+def face_width(block: Block) -> float:
+    """px that the drawing needs between the names of the ports."""
+    shape, width, _ = face_size(block)
+    if shape is not FaceShape.CARD or isinstance(block, kinds.Display):
+        return width
+    if is_subsystem(block):
+        return mask_width(block)
+    if _draws_itself(block):
+        return 0.62 * width
+    return least_room(sign_of(block))[0]
+
+
+def _draws_itself(block: Block) -> bool:
+    return isinstance(
+        block,
+        kinds.Product | kinds.Scope | kinds.XYGraph | kinds.JTraj | kinds.RobotPlot | kinds.Fkine
+        | kinds.ForwardDynamics | kinds.ArmPlant | kinds.Switch | kinds.ManualSwitch | kinds.MultiportSwitch
+        | kinds.StopSimulation,
+    )  # fmt: skip
+
+
+def outline(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
+    """The block's body."""
+    match face_size(block)[0]:
+        case FaceShape.CIRCLE:
+            radius = min(width, height) / 2
+            return Disc(x + width / 2, y + height / 2, radius, Tone.SURFACE, Tone.WIRE, 1.2)
+        case FaceShape.TRIANGLE:
+            tip, back = (x, x + width) if flipped else (x + width, x)
+            corners = [(back, y), (tip, y + height / 2), (back, y + height)]
+            return Polyline(corners, stroke=Tone.WIRE, width=1.2, fill=Tone.SURFACE, closed=True)
+        case FaceShape.BAR:
+            return Rectangle(x, y, width, height, radius=1.5, fill=Tone.WIRE)
+        case FaceShape.BUS:
+            return Group(bus_outline(block, x, y, width, height, flipped))
+        case FaceShape.OVAL:
+            return oval(x, y, width, height)
+        case FaceShape.TAG:
+            return tag_outline(block, x, y, width, height, flipped)
+        case FaceShape.CARD:
+            return Rectangle(x, y, width, height, 5, Tone.SURFACE, Tone.WIRE, 1.2)
+
+
+def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False) -> list[Mark]:
+    """The drawing inside the block, but that of a subsystem and of a switch, which depends on its ports."""
+    match block:
+        case kinds.Gain() | kinds.SliderGain():
+            return _gain(block, room, flipped=flipped)
+        case kinds.Sum() | kinds.BusCreator() | kinds.BusSelector() | kinds.BusAssignment():
+            return []
+        case kinds.Inport() | kinds.Outport():
+            return port_number(block, room)
+        case kinds.Goto() | kinds.From():
+            return words(room.shrunk(6.0, 0.0), tag_text(block), size=11.0)
+        case kinds.Product():
+            # Where all inputs are factors one sign says it; else the signs stand at the ports.
+            return words(room, "×", size=20) if set(block.operators) == {"*"} else []
+        case kinds.Scope():
+            return scope(room, trend)
+        case kinds.XYGraph():
+            return xy_graph(room, trend)
+        case kinds.Display():
+            return display(room, block.inputs, trend)
+        case kinds.StopSimulation():
+            return stop_marks(room)
+        case kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
+            caption = "" if isinstance(block, kinds.RobotPlot) else block.title
+            return _robot(room, block.robot, caption)
+        case _:
+            return sign_marks(sign_of(block), room)
+
+
+def face_at_ports(
+    block: Block,
+    room: Room,
+    heights: tuple[float, ...],
+    tops: tuple[tuple[str, float], ...],
+    *,
+    flipped: bool,
+) -> list[Mark] | None:
+    """The drawing of a block that shows what its ports do; ``None`` for all others.
+
+    ``heights`` (px) of the inputs at the side, ``tops``: names and places (px) of those on the upper edge.
+    """
+    if is_subsystem(block):
+        return subsystem_marks(block, room, tops)
+    if isinstance(block, kinds.Switch | kinds.ManualSwitch | kinds.MultiportSwitch):
+        if isinstance(block, kinds.Switch):
+            heights = (heights[0], heights[-1])
+        elif isinstance(block, kinds.MultiportSwitch):
+            heights = heights[1:]
+        return lever_marks(block, room, heights, flipped)
+    return None
+
+
+def port_labels(block: Block) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What stands beside the inputs and the outputs: names where a side has several, signs for operators."""
+    into = tuple(port.name for port in block.input_ports())
+    out = tuple(port.name for port in block.output_ports())
+    match block:
+        case kinds.Product():
+            several = set(block.operators) != {"*"}
+            return tuple("×" if o == "*" else "÷" for o in block.operators) if several else (), ()
+        case kinds.Display() if block.inputs > 2:
+            return (), ()
+        case kinds.If() | kinds.SwitchCase():
+            return into if len(into) > 1 else (), branch_labels(block)
+        case kinds.BusCreator():
+            return into, ()
+        case kinds.BusSelector():
+            return (), out
+        case kinds.Switch():
+            return ("", f"{block.criterion} {value_text(block.threshold)}".replace(">=", "≥"), ""), ()
+        case kinds.ManualSwitch():
+            return (), ()
+        case _ if is_subsystem(block):
+            above = control_ports(block)
+            return tuple("" if name in above else name for name in into), out
+        case _:
+            return into if len(into) > 1 else (), out if len(out) > 1 else ()
+
+
+def bus_width(block: Block, size: float) -> float:
+    """px of a bus block whose element names have a type of this size."""
+    labels = [label for side in port_labels(block) for label in side]
+    return max((text_width(label, size) for label in labels), default=0.0) + BAR + 14
+
+
+def _powered(gain: object) -> str:
+    """A long number with a power of ten, such as 2.5e4; nothing where that is long as well."""
+    array = np.asarray(gain, dtype=np.float64)
+    if array.size != 1:
+        return ""
+    digits, _, power = f"{float(array.reshape(-1)[0]):.2e}".partition("e")
+    text = f"{axis_number(float(digits))}e{axis_number(int(power))}"
+    return text if len(text) <= 6 else ""
+
+
+def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) -> list[Mark]:
+    """The formula or the value, as much of both as the triangle holds; else the letter of every gain."""
+    most = 0.56 * room.width
+    wishes = (stated_text(block, "gain"), value_text(block.gain), _powered(block.gain))
+    text = next((wish for wish in wishes if wish and text_width(wish, 9.5) <= most), "K")
+    size = 12.0 if text_width(text, 12.0) < 0.52 * room.width else 9.5
+    share = 0.64 if flipped else 0.36
+    return [Text(room.x + share * room.width, room.middle[1] + 0.36 * size, text, size, Tone.INK, "middle")]
+
+
+def _robot(room: Room, robot: Robot, caption: str) -> list[Mark]:
+    """The robot's own joints and links as a small figure of sticks."""
+    heavy = not caption
+    box = room.shrunk(7.0, 7.0)
+    if caption:
+        box = Room(box.x, box.y + 8, box.width, box.height - 8)
+    frames = link_frames(robot, [0.35 + 0.25 * k if k % 2 else 0.3 for k in range(robot.n)])
+    row = {link.name: k for k, link in enumerate(robot.links, start=1)}
+    points = frames[:, :3, 3]
+    camera = Camera.framing(points + 1e-6 * np.arange(3), box.width, box.height, margin=3.0)
+    flat = camera.flat(points) + np.array([box.x, box.y])
+    marks: list[Mark] = []
+    for k, link in enumerate(robot.links, start=1):
+        a, b = flat[row[link.parent] if link.parent is not None else 0], flat[k]
+        if float(np.hypot(*(b - a))) > 1.5:
+            marks.append(Polyline(np.stack([a, b]), stroke=Tone.PAINT, width=5.0 if heavy else 4.0))
+    for k in range(len(robot.links)):
+        x, y = flat[k].tolist()
+        marks.append(Disc(x, y, 2.7 if heavy else 2.3, fill=Tone.GRAPHITE))
+    x, y = flat[0].tolist()
+    base = (("M", x - 7, y + 5), ("L", x + 7, y + 5), ("L", x + 3.5, y), ("L", x - 3.5, y), ("Z",))
+    if caption:
+        marks.append(Text(room.x + 6, room.y + 13, caption, 9.5, Tone.MUTED))
+    return [Curve(base, stroke=None, fill=Tone.GRAPHITE), *marks]

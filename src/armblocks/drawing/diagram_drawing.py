@@ -1,0 +1,433 @@
+"""A diagram as a drawing: blocks that say what they do, wires around them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+
+from armblocks.diagram import (
+    Block,
+    Bus,
+    Connection,
+    Diagram,
+    PortRef,
+    Shapes,
+    View,
+    ViewKind,
+    diagram_views,
+    flatten_hierarchy,
+    infer_shapes,
+    levels_of,
+)
+from armblocks.drawing import block_faces
+from armblocks.drawing.block_faces import FaceShape
+from armblocks.drawing.diagram_layout import (
+    NAME_ROOM,
+    NAME_SIZE,
+    PORT_TEXT,
+    PORT_TEXT_ROOM,
+    Box,
+    PortSpot,
+    boxes,
+    sized_box,
+)
+from armblocks.drawing.face_marks import Room
+from armblocks.drawing.rates import Rates
+from armblocks.drawing.sink_faces import Trend
+from armblocks.drawing.structure_faces import control_ports
+from armblocks.drawing.wire_routing import Net, Obstacle, Point, RoutedNet, WireEnd, route
+from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.pictures.picture import Curve, Disc, Group, Mark, Picture, Polyline, Text, moved, turned
+from armblocks.pictures.style import Theme, Tone
+from armblocks.pictures.svg import svg_file
+from armblocks.pictures.text_width import shorten, text_width
+from armblocks.simulation.result import SimulationResult
+
+_MARGIN = 22.0
+_ROUNDING = 5.0
+NOTE_SIZE = 12.0
+NOTE_LINE = 17.0
+"""px: type size and line height of notes."""
+_TRENDS = (ViewKind.TRACES, ViewKind.PATH, ViewKind.VALUE)
+_STUB = 16.0
+"""px of wire at the ports of a block that is drawn alone."""
+
+
+def diagram_picture(
+    diagram: Diagram, result: SimulationResult | None = None, *, sheet: str = "", rates: bool = False
+) -> Picture:
+    """A sheet of the diagram, its sinks showing what the run gave them if a result is given.
+
+    ``sheet``: the path of the subsystem that is drawn instead of the top. A drawing in progress, which cannot
+    be traced yet, has thin wires only. ``rates``: sampled blocks and their wires show their clocks, which a
+    legend names. Raises UnknownNameError for a sheet that is not there, DiagramError for unknown rates.
+    """
+    carried = _Carried.of(diagram)
+    clocks = Rates.of(diagram) if rates else Rates()
+    if sheet not in carried.levels:
+        known = [path for path in carried.levels if path]
+        raise UnknownNameError("sheet", sheet, known, where=f"diagram '{diagram.name}'")
+    level = carried.levels[sheet]
+    path = f"{sheet}/" if sheet else ""
+    placed = boxes(level)
+    nets, wires = wire_nets(level, placed)
+    routed = route([obstacle(box) for box in placed.values()], nets)
+    marks: list[Mark] = []
+    for (source, _), net in zip(wires.items(), routed):
+        kind = carried.kind(PortRef(path + source.block, source.port))
+        _, tone = clocks.mark(path + source.block) or ("", Tone.WIRE)
+        marks += _wire(net, kind, _wire_title(source, wires[source]), tone)
+    for name, box in placed.items():
+        trend = _trend(path + name, carried.views.get(path + name), result)
+        block = _block(box, trend)
+        if (mark := clocks.mark(path + name)) is not None:
+            place = box.x + box.width, box.y - 4
+            block.append(Text(*place, mark[0], NAME_SIZE - 1.5, mark[1], "end", bold=True))
+        marks.append(Group(tuple(block), title=_block_title(name, box)))
+    marks += _notes(level)
+    left, top, right, bottom = _extent(placed, routed, level)
+    picture = Picture(
+        width=right - left + 2 * _MARGIN,
+        height=bottom - top + 2 * _MARGIN,
+        title=f"Diagram {diagram.name}" + (f", sheet {sheet}" if sheet else ""),
+        description=_in_words(level),
+    )
+    drawn = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(drawn, _MARGIN - left, _MARGIN - top)
+    clocks.add_legend(picture)
+    return picture
+
+
+def sheets(diagram: Diagram) -> dict[str, tuple[str, ...]]:
+    """The subsystems of a diagram by path, in order, each with the others that are the same inside."""
+    found: dict[Diagram, list[str]] = {}
+    for path, level in sorted(levels_of(diagram).items(), key=lambda entry: entry[0].split("/")):
+        if path:
+            found.setdefault(level, []).append(path)
+    return {paths[0]: tuple(paths[1:]) for paths in found.values()}
+
+
+def diagram_svg(
+    diagram: Diagram, result: SimulationResult | None = None, *, theme: Theme | None = None
+) -> str:
+    """:func:`diagram_picture` as an SVG document; ``theme`` ``None`` follows the reader's preference."""
+    return svg_file(diagram_picture(diagram, result), theme=theme)
+
+
+def block_picture(block: Block) -> Picture:
+    """One block alone, with stubs of its wires: the symbol that stands for it."""
+    box = sized_box("", block)
+    marks: list[Mark] = []
+    for spot in (*box.inputs, *box.outputs):
+        enters = spot in box.inputs
+        reach = -_STUB if enters else _STUB
+        port, outside = (spot.x, spot.y), (spot.x + reach * spot.dx, spot.y + reach * spot.dy)
+        path = (outside, port) if enters else (port, outside)
+        marks.append(Curve(_rounded(path), stroke=Tone.WIRE, width=1.2))
+        if enters:
+            marks.append(_arrow_head(path))
+    marks += [mark for mark in _block(box, None) if not isinstance(mark, Text) or mark.text]
+    above, below = (any(spot.dy == way for spot in box.inputs) for way in (1, -1))
+    picture = Picture(
+        width=box.width + 2 * (_STUB + 2),
+        height=box.height + 8 + _STUB * (above + below),
+        title=f"Symbol of {block.title}",
+    )
+    drawn = Picture(width=0, height=0, title="", marks=marks)
+    picture.place(drawn, _STUB + 2 - box.x, 4 + _STUB * above - box.y)
+    return picture
+
+
+def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
+    """What is to be laid out: a net for every output that is connected, and its targets by source."""
+    wires: dict[PortRef, list[PortRef]] = {}
+    for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
+        wires.setdefault(wire.source, []).append(wire.target)
+    drawn: Mapping[Connection, tuple[float, ...]] = {}
+    if set(diagram.layout) >= set(diagram.blocks):
+        drawn = diagram.bends
+    nets = [
+        Net(
+            _end(placed[source.block].outputs, source.port),
+            tuple(_end(placed[target.block].inputs, target.port) for target in targets),
+            tuple(drawn.get(Connection(source, target), ()) for target in targets),
+        )
+        for source, targets in wires.items()
+    ]
+    return nets, wires
+
+
+def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
+    spot = next(spot for spot in spots if spot.name == port)
+    return WireEnd(spot.x, spot.y, spot.dx, spot.dy)
+
+
+def obstacle(box: Box) -> Obstacle:
+    """The room of a block and its name, which wires go around."""
+    return Obstacle(box.x, box.y, box.width, box.height, _label(box))
+
+
+def _label(box: Box) -> tuple[float, float, float, float]:
+    """The rectangle of the block's name: below it; above for round sums, which wires enter from below."""
+    width = box.name_width
+    if not box.upright:  # wires leave above and below
+        return box.x + box.width + 5, box.y + box.height / 2 - 7, width, NAME_ROOM - 4
+    if _shape(box) is FaceShape.CIRCLE:
+        return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
+    return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
+
+
+def _shape(box: Box) -> FaceShape:
+    return block_faces.face_size(box.block)[0]
+
+
+def _trend(path: str, view: View | None, result: SimulationResult | None) -> Trend | None:
+    if result is None or view is None:
+        return None
+    count = len(result.time)
+    return Trend(
+        time=result.time, inputs=tuple(result[f"{path}/{s}"].reshape(count, -1) for s in view.signals)
+    )
+
+
+def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
+    """A block without its name: outline, port names and face, where its box stands.
+
+    A block that is turned has its outline turned, and its drawing upright.
+    """
+    shape, block = _shape(box), box.block
+    marks: list[Mark] = [_outline(box)]
+    room = Room(box.x, box.y, box.width, box.height)
+    if shape in (FaceShape.CARD, FaceShape.BUS):
+        names, room = _port_names(box)
+        marks += names
+    elif shape is FaceShape.CIRCLE:
+        marks += _signs(box)
+    if shape is FaceShape.BAR:
+        return marks
+    flipped = box.flipped != (box.rotation == 180)
+    if not box.upright and shape is FaceShape.TRIANGLE:
+        # The number stands in the wide half, which is the upper one of a triangle that points down.
+        points_down = (box.rotation == 90) != box.flipped
+        way = -1 if points_down else 1
+        room = Room(room.x + 0.14 * room.width, room.y + way * 0.14 * room.height, room.width, room.height)
+        flipped = False
+    above = set(control_ports(block))
+    if box.upright:
+        heights = tuple(spot.y for spot in box.inputs if spot.name not in above)
+    else:
+        count = len(box.inputs)
+        heights = tuple(room.y + room.height * (k + 0.5) / count for k in range(count))
+    tops = tuple((spot.name, spot.x) for spot in box.inputs if spot.name in above and not box.rotation)
+    own = block_faces.face_at_ports(block, room, heights, tops, flipped=flipped)
+    return marks + (own if own is not None else block_faces.face(block, room, trend, flipped=flipped))
+
+
+def _outline(box: Box) -> Mark:
+    width, height = (box.width, box.height) if box.upright else (box.height, box.width)
+    drawn = block_faces.outline(box.block, 0.0, 0.0, width, height, box.flipped)
+    for _ in range(box.rotation // 90):
+        drawn, width, height = turned(drawn, height), height, width
+    return moved(drawn, box.x, box.y)
+
+
+def _block(box: Box, trend: Trend | None) -> list[Mark]:
+    shape, marks = _shape(box), block_marks(box, trend)
+    lx, ly, lw, _ = _label(box)
+    name = shorten(box.name, NAME_SIZE, lw + 1)
+    if shape is FaceShape.CIRCLE or not box.upright:
+        marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
+    else:
+        marks.append(Text(lx + lw / 2, ly + NAME_SIZE + 1, name, NAME_SIZE, Tone.MUTED, "middle"))
+    return marks
+
+
+def _port_names(box: Box) -> tuple[list[Mark], Room]:
+    """Names inside the edges where a side has more than one port, and the room that they leave."""
+    if not box.upright:
+        return _port_names_above_and_below(box)
+    marks: list[Mark] = []
+    taken = {"left": 0.0, "right": 0.0}
+    into, out = block_faces.port_labels(box.block)
+    flipped = box.flipped != (box.rotation == 180)
+    for spots, labels, side in (
+        (box.inputs, into, "right" if flipped else "left"),
+        (box.outputs, out, "left" if flipped else "right"),
+    ):
+        if not any(labels):
+            continue
+        taken[side] = max(text_width(label, PORT_TEXT) for label in labels) + 5
+        for spot, label in zip(spots, labels):
+            if not label:
+                continue
+            x = box.x + 5 if side == "left" else box.x + box.width - 5
+            anchor = "start" if side == "left" else "end"
+            marks.append(Text(x, spot.y + 3.2, label, PORT_TEXT, Tone.MUTED, anchor))
+    width = box.width - taken["left"] - taken["right"]
+    return marks, Room(box.x + taken["left"], box.y, width, box.height)
+
+
+def _port_names_above_and_below(box: Box) -> tuple[list[Mark], Room]:
+    marks: list[Mark] = []
+    top, bottom = box.y, box.y + box.height
+    for spots, labels in zip((box.inputs, box.outputs), block_faces.port_labels(box.block)):
+        named = [(spot, label) for spot, label in zip(spots, labels) if label]
+        above = any(spot.y == box.y for spot, _ in named)
+        for spot, label in named:
+            y = box.y + PORT_TEXT + 3 if above else box.y + box.height - 5
+            marks.append(Text(spot.x, y, label, PORT_TEXT, Tone.MUTED, "middle"))
+        if named and above:
+            top += PORT_TEXT_ROOM
+        elif named:
+            bottom -= PORT_TEXT_ROOM
+    return marks, Room(box.x, top, box.width, bottom - top)
+
+
+def _signs(box: Box) -> list[Mark]:
+    """Plus and minus of a sum beside its ports, inside the circle."""
+    signs = str(getattr(box.block, "signs", ""))
+    marks: list[Mark] = []
+    for sign, spot in zip(signs, box.inputs):
+        x, y = spot.x + 8.0 * spot.dx, spot.y + 8.0 * spot.dy
+        marks.append(Polyline([(x - 3, y), (x + 3, y)], stroke=Tone.INK, width=1.3))
+        if sign == "+":
+            marks.append(Polyline([(x, y - 3), (x, y + 3)], stroke=Tone.INK, width=1.3))
+    return marks
+
+
+class WireKind(IntEnum):
+    """What a wire carries."""
+
+    SCALAR = 0
+    VECTOR = 1
+    MATRIX = 2
+    BUS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Carried:
+    """The sheets of a diagram, and what their wires carry as far as it is known."""
+
+    levels: Mapping[str, Diagram]
+    views: Mapping[str, View]
+    carried: Mapping[PortRef, PortRef | Bus]
+    outputs: Mapping[str, Shapes]
+
+    @classmethod
+    def of(cls, diagram: Diagram) -> _Carried:
+        try:
+            form = flatten_hierarchy(diagram)
+            outputs = infer_shapes(form.diagram).outputs
+        except DiagramError:
+            return cls(levels_of(diagram), {}, {}, {})
+        views = {name: view for name, view in diagram_views(diagram) if view.kind in _TRENDS}
+        return cls(form.levels, views, form.carried, outputs)
+
+    def kind(self, source: PortRef) -> WireKind:
+        """What leaves an output port of the hierarchy."""
+        carried = self.carried.get(source, source)
+        if isinstance(carried, Bus):
+            return WireKind.BUS
+        return WireKind(min(len(self.outputs.get(carried.block, {}).get(carried.port, ())), 2))
+
+
+def _wire(net: RoutedNet, kind: WireKind, title: str, tone: Tone) -> list[Mark]:
+    """A scalar is a thin line, a vector a heavy one, a matrix a double one, a bus three lines."""
+    marks: list[Mark] = []
+    weight = (1.2, 2.3, 3.8, 5.4)[kind]
+    lines = [_rounded(_shortened(path, 5.0)) for path in net.paths]
+    marks += [Curve(line, stroke=tone, width=weight) for line in lines]
+    if kind is WireKind.MATRIX:
+        marks += [Curve(line, stroke=Tone.SURFACE, width=1.5) for line in lines]
+    if kind is WireKind.BUS:
+        marks += [Curve(line, stroke=Tone.SURFACE, width=3.2) for line in lines]
+        marks += [Curve(line, stroke=tone, width=1.0) for line in lines]
+    marks += [_arrow_head(path, tone) for path in net.paths]
+    marks += [Disc(x, y, 2.6 + 0.3 * kind, fill=tone) for x, y in net.dots]
+    return [Group(tuple(marks), title=title)]
+
+
+def _shortened(path: tuple[Point, ...], by: float) -> tuple[Point, ...]:
+    """The path without its last px, which the arrow's head covers."""
+    (ax, ay), (bx, by_) = path[-2], path[-1]
+    length = abs(bx - ax) + abs(by_ - ay)
+    share = max(length - by, 0.0) / length if length else 0.0
+    return (*path[:-1], (ax + (bx - ax) * share, ay + (by_ - ay) * share))
+
+
+def _rounded(path: tuple[Point, ...]) -> tuple[tuple[str | float, ...], ...]:
+    """Straight pieces with small round corners."""
+    commands: list[tuple[str | float, ...]] = [("M", *path[0])]
+    for before, corner, after in zip(path, path[1:], path[2:]):
+        radius = min(_ROUNDING, _distance(before, corner) / 2, _distance(corner, after) / 2)
+        commands.append(("L", *_towards(corner, before, radius)))
+        commands.append(("Q", *corner, *_towards(corner, after, radius)))
+    commands.append(("L", *path[-1]))
+    return tuple(commands)
+
+
+def _distance(a: Point, b: Point) -> float:
+    return abs(a[0] - b[0]) + abs(a[1] - b[1])
+
+
+def _towards(a: Point, b: Point, length: float) -> Point:
+    total = _distance(a, b)
+    share = length / total if total else 0.0
+    return a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
+
+
+def _arrow_head(path: tuple[Point, ...], tone: Tone = Tone.WIRE) -> Mark:
+    (ax, ay), (bx, by) = path[-2], path[-1]
+    length = _distance((ax, ay), (bx, by)) or 1.0
+    dx, dy = (bx - ax) / length, (by - ay) / length
+    back = (bx - 8 * dx, by - 8 * dy)
+    corners = [(bx, by), (back[0] - 3.7 * dy, back[1] + 3.7 * dx), (back[0] + 3.7 * dy, back[1] - 3.7 * dx)]
+    return Polyline(corners, stroke=None, fill=tone, closed=True)
+
+
+def _notes(diagram: Diagram) -> list[Mark]:
+    return [
+        Text(note.x, note.y + NOTE_SIZE + NOTE_LINE * row, line, NOTE_SIZE, Tone.INK)
+        for note in diagram.notes.values()
+        for row, line in enumerate(note.text.split("\n"))
+        if line
+    ]
+
+
+def _extent(
+    placed: dict[str, Box], routed: list[RoutedNet], diagram: Diagram
+) -> tuple[float, float, float, float]:
+    xs: list[float] = []
+    ys: list[float] = []
+    for note in diagram.notes.values():
+        lines = note.text.split("\n")
+        xs += [note.x, note.x + max(text_width(line, NOTE_SIZE) for line in lines)]
+        ys += [note.y, note.y + NOTE_LINE * len(lines)]
+    for box in placed.values():
+        lx, ly, lw, lh = _label(box)
+        xs += [box.x, box.x + box.width, lx, lx + lw]
+        ys += [box.y, box.y + box.height, ly, ly + lh]
+    for net in routed:
+        for path in net.paths:
+            xs += [x for x, _ in path]
+            ys += [y for _, y in path]
+    return min(xs, default=0.0), min(ys, default=0.0), max(xs, default=1.0), max(ys, default=1.0)
+
+
+def _wire_title(source: PortRef, targets: list[PortRef]) -> str:
+    return f"{source} to {', '.join(str(target) for target in targets)}"
+
+
+def _block_title(name: str, box: Box) -> str:
+    return f"{name} ({box.block.title})"
+
+
+def _in_words(diagram: Diagram) -> str:
+    """The drawing for those who cannot see it: every wire once."""
+
+    def words(wire: Connection) -> str:
+        return f"{wire.source} to {wire.target}"
+
+    listed = "; ".join(words(wire) for wire in diagram.connections)
+    return f"{len(diagram.blocks)} blocks. Wires: {listed}." if listed else f"{len(diagram.blocks)} blocks."

@@ -1,0 +1,66 @@
+"""A sheet of a diagram as a file: what the command line, Python and the studio export."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from armblocks.diagram import Diagram
+from armblocks.drawing.diagram_drawing import diagram_picture
+from armblocks.errors import UnknownNameError
+from armblocks.files import write_atomically
+from armblocks.pictures.style import Theme
+from armblocks.pictures.svg import svg_file
+from armblocks.simulation.result import SimulationResult
+
+DRAWING_FORMATS = ("svg", "png", "pdf")
+"""SVG and PDF are drawn with lines and text; PNG has 192 dots per inch. PDF and PNG hold DejaVu Sans."""
+
+
+def draw_diagram(
+    path: str | os.PathLike[str],
+    diagram: Diagram,
+    result: SimulationResult | None = None,
+    *,
+    sheet: str = "",
+    theme: Theme | None = None,
+    rates: bool = False,
+) -> Path:
+    """Write a sheet as ``….svg``, ``….png`` or ``….pdf``, all or nothing; returns the path.
+
+    What is drawn is said at :func:`drawing_bytes`. Raises UnknownNameError for another suffix or sheet.
+    """
+    place = Path(path)
+    kind = place.suffix.removeprefix(".").lower()
+    write_atomically(place, drawing_bytes(diagram, kind, result, sheet=sheet, theme=theme, rates=rates))
+    return place
+
+
+def drawing_bytes(
+    diagram: Diagram,
+    kind: str,
+    result: SimulationResult | None = None,
+    *,
+    sheet: str = "",
+    theme: Theme | None = None,
+    rates: bool = False,
+) -> bytes:
+    """A sheet in one of ``DRAWING_FORMATS``.
+
+    ``sheet``: the path of a subsystem, ``""`` the top. ``result``: what the sinks show. ``rates``: clocks in
+    colours, with a legend. ``theme`` ``None``:
+    SVG follows the reader's preference, the others are light. A drawing in progress, whose inputs are not all
+    connected, is drawn as well. Raises UnknownNameError for another format or sheet.
+    """
+    if kind not in DRAWING_FORMATS:
+        raise UnknownNameError("drawing format", kind, DRAWING_FORMATS)
+    picture = diagram_picture(diagram, result, sheet=sheet, rates=rates)
+    if kind == "svg":
+        return svg_file(picture, theme=theme).encode()
+    if kind == "png":
+        from armblocks.pictures.png import picture_png
+
+        return picture_png(picture, theme=theme or "light")
+    from armblocks.pictures.pdf import picture_pdf
+
+    return picture_pdf(picture, theme=theme or "light")

@@ -1,0 +1,49 @@
+"""The clocks of a diagram on its drawing: a colour and a mark for each, and a legend that says its period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from armblocks.diagram import Diagram, sampling_of
+from armblocks.equations import SampleClock
+from armblocks.pictures.numbers import axis_number, si_prefix
+from armblocks.pictures.picture import Picture, Text
+from armblocks.pictures.style import SMALL_SIZE, Tone, trace_tone
+from armblocks.pictures.text_width import text_width
+
+_ROW = 22.0
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Which clock each sampled block of the flat diagram obeys, the fastest first: D1, D2, …"""
+
+    clocks: tuple[SampleClock, ...] = ()
+    clock_of: Mapping[str, int] | None = None
+
+    @classmethod
+    def of(cls, diagram: Diagram) -> Rates:
+        """The clocks of a diagram. Raises ``DiagramError`` where they are not known yet."""
+        sampling = sampling_of(diagram)
+        return cls(sampling.clocks, sampling.clock_of)
+
+    def mark(self, block: str) -> tuple[str, Tone] | None:
+        """Text and colour for a block of this path; ``None`` for one that works all the time."""
+        number = (self.clock_of or {}).get(block)
+        return None if number is None else (f"D{number + 1}", trace_tone(number))
+
+    def add_legend(self, picture: Picture) -> None:
+        """A line below the drawing for every clock."""
+        for number, clock in enumerate(self.clocks):
+            said = f"D{number + 1}: {_period(clock.period)}"
+            if clock.offset:
+                said += f", first at {_period(clock.offset)}"
+            picture.add(Text(22.0, picture.height + 4, said, SMALL_SIZE, trace_tone(number), bold=True))
+            picture.width = max(picture.width, 44.0 + text_width(said, SMALL_SIZE, bold=True))
+            picture.height += _ROW
+
+
+def _period(seconds: float) -> str:
+    factor, prefix = si_prefix(seconds)
+    return f"{axis_number(float(f'{seconds * factor:.6g}'))} {prefix}s"

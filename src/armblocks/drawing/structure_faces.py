@@ -1,0 +1,211 @@
+"""The faces of what gives a diagram its structure: ends, tags, buses, switches, subsystems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armblocks import blocks as kinds
+from armblocks.diagram import Block, Diagram
+from armblocks.drawing.face_marks import Room, words
+from armblocks.pictures.picture import Disc, Mark, Polyline, Rectangle, Text
+from armblocks.pictures.style import Tone
+from armblocks.pictures.text_width import text_width
+
+CONTROLS = ("enable", "trigger", "reset", "action")
+"""Inputs that say when a subsystem works: they stand on its upper edge, under them their symbol."""
+CONTROL_ROOM = 18.0
+"""px below the upper edge of a conditional subsystem that the symbol of its control takes."""
+BAR = 6.0
+"""px: how thick the bar of a bus block is."""
+_CONDITIONAL = (
+    kinds.EnabledSubsystem,
+    kinds.TriggeredSubsystem,
+    kinds.EnabledTriggeredSubsystem,
+    kinds.ResettableSubsystem,
+    kinds.ActionSubsystem,
+)
+_SYMBOL = 15.0
+"""px: height of the symbols of controls."""
+_MASK_SIZE = 10.5
+_MASK_LINE = 84.0
+_MOST_MASK = 140.0
+"""px: type size of what a mask says, the length that begins another line, and the longest line."""
+Stroke = list[tuple[float, float]]
+_RISING: Stroke = [(0, 1), (0.5, 1), (0.5, 0), (1, 0)]
+_FALLING: Stroke = [(0, 0), (0.5, 0), (0.5, 1), (1, 1)]
+
+
+def is_subsystem(block: Block) -> bool:
+    """Whether a block holds a diagram."""
+    return isinstance(block, (kinds.Subsystem, *_CONDITIONAL))
+
+
+def control_ports(block: Block) -> tuple[str, ...]:
+    """The inputs on the upper edge."""
+    if not isinstance(block, _CONDITIONAL):
+        return ()
+    return tuple(port.name for port in block.input_ports() if port.name in CONTROLS)
+
+
+def tag_text(block: kinds.Goto | kinds.From) -> str:
+    """The tag, in brackets that say how far it is known: [local], {scoped}, global; a From does not know."""
+    scope = block.visibility if isinstance(block, kinds.Goto) else "local"
+    return {"local": f"[{block.tag}]", "scoped": f"{{{block.tag}}}", "global": block.tag}[scope]
+
+
+def tag_outline(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
+    """A Goto points to where the signal goes; a From has the notch that the point fits into."""
+    tip = 9.0
+    if isinstance(block, kinds.Goto):
+        corners = [(0.0, 0.0), (width - tip, 0.0), (width, height / 2), (width - tip, height), (0.0, height)]
+    else:
+        corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height), (tip, height / 2)]
+    placed = [(x + (width - u if flipped else u), y + v) for u, v in corners]
+    return Polyline(placed, stroke=Tone.WIRE, width=1.2, fill=Tone.SURFACE, closed=True)
+
+
+def bus_bar(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
+    """The bar at the end where the bus is."""
+    at_inputs = isinstance(block, kinds.BusSelector)
+    left = x if at_inputs != flipped else x + width - BAR
+    return Rectangle(left, y, BAR, height, radius=1.5, fill=Tone.WIRE)
+
+
+def subsystem_marks(block: Block, room: Room, tops: tuple[tuple[str, float], ...]) -> list[Mark]:
+    """A small diagram, or what a mask says; above, symbols of its controls under their ports (name, x)."""
+    down = CONTROL_ROOM if tops else 0.0
+    below = Room(room.x, room.y + down, room.width, room.height - down)
+    inner: object = block.parameter_value("diagram")
+    marks = _lines(below, mask_text(inner)) if isinstance(inner, Diagram) and inner.mask else _sheet(below)
+    for name, x in tops:
+        marks += _control(block, name, x, room.y + 5.0)
+    return marks
+
+
+def mask_width(block: Block) -> float:
+    """px that a subsystem's drawing needs between the names of its ports."""
+    inner: object = block.parameter_value("diagram")
+    if not (isinstance(inner, Diagram) and inner.mask):
+        return 44.0
+    widest = max(text_width(line, _MASK_SIZE) for line in mask_text(inner))
+    return min(max(widest + 12, 44.0), _MOST_MASK)
+
+
+def mask_text(diagram: Diagram) -> tuple[str, ...]:
+    """The lines on the face of a masked subsystem: its name, broken where words end if it is long."""
+    lines = [""]
+    for word in diagram.name.replace("_", " ").split():
+        together = f"{lines[-1]} {word}".strip()
+        if lines[-1] and text_width(together, _MASK_SIZE) > _MASK_LINE:
+            lines.append(word)
+        else:
+            lines[-1] = together
+    return tuple(lines)
+
+
+def _lines(room: Room, texts: Sequence[str]) -> list[Mark]:
+    """Lines in the middle of a room, each in a type that fits."""
+    height = _MASK_SIZE * 1.3
+    top = room.middle[1] - height * len(texts) / 2
+    rows = [Room(room.x, top + k * height, room.width, height) for k in range(len(texts))]
+    return [mark for row, text in zip(rows, texts) for mark in words(row, text, size=_MASK_SIZE)]
+
+
+def _sheet(room: Room) -> list[Mark]:
+    """A small diagram: what is inside a block."""
+    x, y = room.middle
+    boxes = [(x - 17, y - 9), (x + 5, y + 1)]
+    wire = [(x - 5, y - 4.5), (x, y - 4.5), (x, y + 5.5), (x + 5, y + 5.5)]
+    return [
+        Polyline(wire, stroke=Tone.MUTED, width=1.1),
+        *(Rectangle(left, top, 12, 9, 2, Tone.SUNKEN, Tone.MUTED, 1.1) for left, top in boxes),
+    ]
+
+
+def _control(block: Block, name: str, x: float, y: float) -> list[Mark]:
+    if name == "action":
+        return [Text(x, y + 10, "action", 9.0, Tone.INK, "middle")]
+    if name == "enable":
+        pulse: Stroke = [(0, 1), (0.3, 1), (0.3, 0), (0.7, 0), (0.7, 1), (1, 1)]
+        return [_stroke(pulse, x, y)]
+    edge = str(getattr(block, "edge", "rising"))
+    strokes = {"rising": [_RISING], "falling": [_FALLING], "either": [_RISING, _FALLING]}[edge]
+    marks: list[Mark] = []
+    for k, stroke in enumerate(strokes):
+        at = x + (k - (len(strokes) - 1) / 2) * 17
+        marks += [_stroke(stroke, at, y), _edge_arrow(at, y, up=stroke is _RISING)]
+    if name == "reset":
+        marks.append(Text(x + 11 + 8 * (len(strokes) - 1), y + 11, "R", 9.0, Tone.INK))
+    return marks
+
+
+def _stroke(points: Stroke, x: float, y: float) -> Mark:
+    width = 18.0 if len(points) > 4 else 14.0
+    line = [(x + (u - 0.5) * width, y + v * (_SYMBOL - 4)) for u, v in points]
+    return Polyline(line, stroke=Tone.TRACE_0, width=1.6)
+
+
+def _edge_arrow(x: float, y: float, *, up: bool) -> Mark:
+    middle, way = y + (_SYMBOL - 4) / 2, -1.0 if up else 1.0
+    corners = [(x - 3, middle - 1.6 * way), (x, middle + 2.4 * way), (x + 3, middle - 1.6 * way)]
+    return Polyline(corners, stroke=None, fill=Tone.TRACE_0, closed=True)
+
+
+def lever_marks(block: Block, room: Room, heights: tuple[float, ...], flipped: bool) -> list[Mark]:
+    """Contacts at the heights of the inputs, the output's contact, and a lever between two of them."""
+    inner, outer = room.x + 0.2 * room.width, room.x + 0.8 * room.width
+    begin, end = (outer, inner) if flipped else (inner, outer)
+    middle = room.middle[1]
+    chosen = heights[0]
+    if isinstance(block, kinds.ManualSwitch):
+        chosen = heights[0] if block.position < 1.5 else heights[-1]
+    marks: list[Mark] = [
+        Polyline([(begin, chosen), (end, middle)], stroke=Tone.INK, width=1.6),
+        *(Disc(begin, y, 2.4, Tone.SURFACE, Tone.INK, 1.2) for y in heights),
+        Disc(end, middle, 2.4, Tone.SURFACE, Tone.INK, 1.2),
+    ]
+    return marks
+
+
+def stop_marks(room: Room) -> list[Mark]:
+    """The sign at the road that every reader knows."""
+    x, y = room.middle
+    r = 17.0
+    near = 0.41421356 * r
+    corners = [
+        (x - near, y - r), (x + near, y - r), (x + r, y - near), (x + r, y + near),
+        (x + near, y + r), (x - near, y + r), (x - r, y + near), (x - r, y - near),
+    ]  # fmt: skip
+    sign = Polyline(corners, stroke=Tone.ERROR, width=1.6, fill=Tone.ERROR_WASH, closed=True)
+    return [sign, Text(x, y + 3.4, "STOP", 9.5, Tone.ERROR, "middle", bold=True)]
+
+
+def port_number(block: kinds.Inport | kinds.Outport, room: Room) -> list[Mark]:
+    """Its place among the ports."""
+    return words(room, str(block.port or 1), size=11.0)
+
+
+def tag_width(block: kinds.Goto | kinds.From) -> float:
+    """px that a tag needs."""
+    return min(max(52.0, text_width(tag_text(block), 11.0) + 28), 150.0)
+
+
+def oval(x: float, y: float, width: float, height: float) -> Mark:
+    """The round end of a diagram."""
+    return Rectangle(x, y, width, height, height / 2, Tone.SURFACE, Tone.WIRE, 1.2)
+
+
+def bus_outline(
+    block: Block, x: float, y: float, width: float, height: float, flipped: bool
+) -> tuple[Mark, ...]:
+    """A card whose one edge is the bar."""
+    card = Rectangle(x, y, width, height, 2, Tone.SURFACE, Tone.HAIRLINE, 1.0)
+    return card, bus_bar(block, x, y, width, height, flipped)
+
+
+def branch_labels(block: kinds.If | kinds.SwitchCase) -> tuple[str, ...]:
+    """What stands beside the outputs: the conditions themselves."""
+    if isinstance(block, kinds.If):
+        texts = [text.strip() for text in block.expressions.split(";")]
+        return (*(f"{'else' * (k > 0)}if {text}" for k, text in enumerate(texts)), "else")
+    return (*(f"case {text.strip()}" for text in block.cases.split(";")), "default")

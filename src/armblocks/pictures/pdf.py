@@ -1,0 +1,30 @@
+"""Pictures as PDF: one page of the picture's size, lines and text as such, fonts inside."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import Any
+
+from armblocks.pictures.painter import Painter
+from armblocks.pictures.picture import Picture
+from armblocks.pictures.style import Theme
+
+_POINTS_PER_PX = 0.75
+"""Picture px are CSS px (1/96 inch), the unit of a page is 1/72 inch."""
+
+
+def picture_pdf(picture: Picture, *, theme: Theme = "light") -> bytes:
+    """The picture as a PDF file; the same picture gives the same bytes, whatever the date."""
+    from matplotlib.backends.backend_pdf import PdfFile, RendererPdf
+
+    width, height = picture.width * _POINTS_PER_PX, picture.height * _POINTS_PER_PX
+    target = BytesIO()
+    said = {"Title": picture.title, "Creator": "armblocks", "CreationDate": None}
+    file: Any = PdfFile(target, metadata=said)  # untyped in matplotlib's stubs
+    file.newPage(width / 72.0, height / 72.0)
+    renderer = RendererPdf(file, 72.0, height / 72.0, width / 72.0)
+    Painter(renderer, height, theme, _POINTS_PER_PX).picture(picture)
+    renderer.finalize()
+    file.finalize()
+    file.close()
+    return target.getvalue()

@@ -1,0 +1,291 @@
+"""Drawings of an arm: one pose, or moments of a motion with the tool's path (the paper's Figures 10, 11)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.pictures.numbers import axis_number, nice_step
+from armblocks.pictures.picture import Disc, Picture, Polyline, Raster, Rectangle, Text
+from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Theme, Tone
+from armblocks.pictures.svg import svg_file
+from armblocks.rendering.camera import Camera
+from armblocks.rendering.render import Rendering, cropped, faded, over, render, shadow
+from armblocks.robot import Robot
+from armblocks.robot.geometry import Body, link_frames, reach, robot_bodies
+from armblocks.robot.shapes import Housing, Material
+from armblocks.robot.triangles import TriangleMesh, triangles
+
+_Array = NDArray[np.float64]
+
+RASTER_SCALE = 2.0
+"""Pixels of the shaded bodies per px of the figure."""
+GHOST = 0.26
+"""Opacity of the start pose."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stage:
+    """What all panels of one figure share: the bodies, the floor, the camera and the panel's size in px."""
+
+    bodies: tuple[Body, ...]
+    pedestal: tuple[TriangleMesh, ...]
+    camera: Camera
+    floor: float
+    grid: tuple[float, float, float, float, float]
+    """Spacing, then lowest x, highest x, lowest y, highest y of the floor grid, m."""
+    width: float
+    height: float
+
+    @classmethod
+    def framing(
+        cls, robot: Robot, poses: _Array, path: _Array, width: float, height: float, *, margin: float = 10.0
+    ) -> Stage:
+        """The stage on which all ``poses`` (K, L+2, 4, 4) and the ``path`` (N, 3) m can be seen."""
+        bodies = robot_bodies(robot)
+        clouds = [
+            body.mesh.corners.reshape(-1, 3) @ pose[body.row, :3, :3].T + pose[body.row, :3, 3]
+            for pose in poses
+            for body in bodies
+        ]
+        points = np.concatenate([*clouds, path])
+        low, high = points.min(axis=0), points.max(axis=0)
+        spacing = nice_step(float((high - low).max()) / 8)
+        feet = [c for c, body in zip(clouds, bodies) if body.row == 0]
+        foot = float(np.concatenate(feet)[:, 2].min()) if feet else float(low[2])
+        # The arm stands on the floor; where it reaches below its own foot, it stands on a pedestal.
+        floor = foot
+        if low[2] < foot - 0.02 * reach(robot):
+            floor = math.floor(float(low[2]) / (spacing / 2)) * (spacing / 2)
+        x0, y0 = ((math.floor(float(v) / spacing) - 8) * spacing for v in low[:2])
+        x1, y1 = ((math.ceil(float(v) / spacing) + 8) * spacing for v in high[:2])
+        under = np.array([(x, y, floor) for x in (low[0], high[0]) for y in (low[1], high[1])])
+        # The corners of the floor below the arm may touch the edge, the arm may not.
+        camera = Camera.framing(np.concatenate([points, under]), width, height, margin=margin)
+        return cls(
+            bodies=bodies,
+            pedestal=_pedestal(robot, foot, floor),
+            camera=camera,
+            floor=floor,
+            grid=(spacing, x0, x1, y0, y1),
+            width=width,
+            height=height,
+        )
+
+    def meshes(self, pose: _Array) -> list[TriangleMesh]:
+        """The bodies in the world at one pose (L+2, 4, 4), with the pedestal."""
+        return [*(body.mesh.moved(pose[body.row]) for body in self.bodies), *self.pedestal]
+
+    def render(self, meshes: Sequence[TriangleMesh]) -> Rendering:
+        """Bodies in the world, shaded."""
+        return render(meshes, self.camera, self.width, self.height, RASTER_SCALE)
+
+
+def moments_picture(
+    robot: Robot, time: _Array, poses: _Array, *, moments: int = 6, columns: int = 3
+) -> Picture:
+    """The robot at moments spread evenly over a run, with the tool's path so far; the start as a ghost.
+
+    ``time`` (N,) s, ``poses`` (N, L+2, 4, 4): base, links and tool in the world.
+    """
+    instants: _Array = np.linspace(float(time[0]), float(time[-1]), moments)
+    picked = [int(np.argmin(np.abs(time - instant))) for instant in instants.tolist()]
+    path = poses[:, -1, :3, 3]
+    gap = 12.0
+    width = (FIGURE_WIDTH - gap * (columns - 1)) / columns
+    width = math.floor(width)
+    height, caption = round(width * 0.84), 34.0
+    stage = Stage.framing(robot, poses[picked], path, width, height, margin=16.0)
+    ghost = stage.render(stage.meshes(poses[picked[0]]))
+    floor = _floor(stage)
+    rows = math.ceil(moments / columns)
+    picture = Picture(
+        width=FIGURE_WIDTH,
+        height=rows * (height + caption) + (rows - 1) * gap + 22,
+        title=f"{robot.name} at {moments} moments",
+        description=(
+            f"The arm {robot.name} at "
+            + ", ".join(f"{axis_number(float(time[k]))} s" for k in picked)
+            + f"; the tool goes from {_position(path[picked[0]])} to {_position(path[picked[-1]])}."
+        ),
+    )
+    for number, k in enumerate(picked):
+        left = (number % columns) * (width + gap)
+        top = (number // columns) * (height + caption + gap)
+        panel = Picture(width=width, height=height + caption, title="")
+        panel.add(Rectangle(0.5, 0.5, width - 1, height - 1, radius=6, fill=Tone.SUNKEN))
+        panel.extend(floor)
+        meshes = stage.meshes(poses[k])
+        body = ghost if number == 0 else stage.render(meshes)
+        panel.add(_raster(stage, meshes, body, None if number == 0 else ghost))
+        panel.extend(_path_marks(stage, body, path, k))
+        panel.add(
+            Text(2, height + 16, f"t = {axis_number(float(time[k]))} s", size=TEXT_SIZE, bold=True),
+            Text(width - 2, height + 16, _position(path[k]), size=SMALL_SIZE, tone=Tone.MUTED, anchor="end"),
+        )
+        picture.place(panel, left, top)
+    note = f"Floor grid {axis_number(stage.grid[0])} m, floor at z = {axis_number(stage.floor, 3)} m"
+    if len(picked) > 1:
+        note += "; pale: the pose at the start"
+    picture.add(Text(2, picture.height - 6, note, size=SMALL_SIZE, tone=Tone.MUTED))
+    return picture
+
+
+def arm_picture(robot: Robot, q: Sequence[float], *, width: float = 420.0, height: float = 340.0) -> Picture:
+    """The robot at joint coordinates ``q`` (n,) rad or m, on its floor."""
+    poses = link_frames(robot, q)
+    stage = Stage.framing(robot, poses[None], poses[None, -1, :3, 3], width, height)
+    picture = Picture(
+        width=width,
+        height=height,
+        title=robot.name,
+        description=f"The arm {robot.name} with its tool at {_position(poses[-1, :3, 3])}.",
+    )
+    picture.extend(_floor(stage))
+    meshes = stage.meshes(poses)
+    picture.add(_raster(stage, meshes, stage.render(meshes), None))
+    picture.add(
+        Text(
+            8,
+            height - 8,
+            f"grid {axis_number(stage.grid[0])} m",
+            size=SMALL_SIZE,
+            tone=Tone.MUTED,
+        )
+    )
+    return picture
+
+
+def arm_picture_svg(
+    robot: Robot, q: Sequence[float], size: tuple[float, float] = (420.0, 340.0), theme: Theme | None = None
+) -> str:
+    """:func:`arm_picture` as an SVG document; ``theme`` ``None`` follows the reader's preference."""
+    return svg_file(arm_picture(robot, q, width=size[0], height=size[1]), theme=theme)
+
+
+def _raster(stage: Stage, meshes: Sequence[TriangleMesh], body: Rendering, ghost: Rendering | None) -> Raster:
+    """Shadow of the meshes, ghost and body as one image over the panel, without its empty margin."""
+    rows, columns = round(stage.height * RASTER_SCALE), round(stage.width * RASTER_SCALE)
+    canvas = np.zeros((rows, columns, 4), dtype=np.uint8)
+    half = RASTER_SCALE / 2
+    soft = shadow(meshes, stage.camera, stage.floor, stage.width, stage.height, half)
+    doubled = np.repeat(np.repeat(soft, 2, axis=0), 2, axis=1)[:rows, :columns]
+    canvas[: doubled.shape[0], : doubled.shape[1]] = doubled
+    for layer, strength in ((ghost, GHOST), (body, 1.0)):
+        if layer is None:
+            continue
+        pixels = layer.pixels if strength == 1.0 else faded(layer.pixels, strength)
+        window = canvas[layer.top : layer.top + pixels.shape[0], layer.left : layer.left + pixels.shape[1]]
+        window[:] = over(pixels, window)
+    pixels, left, top = cropped(canvas)
+    return Raster(
+        left / RASTER_SCALE,
+        top / RASTER_SCALE,
+        pixels.shape[1] / RASTER_SCALE,
+        pixels.shape[0] / RASTER_SCALE,
+        pixels,
+    )
+
+
+def _floor(stage: Stage) -> list[Polyline]:
+    """The floor grid, one line each spacing, out to the panel's edge."""
+    spacing, x0, x1, y0, y1 = stage.grid
+    xs = [x0 + k * spacing for k in range(round((x1 - x0) / spacing) + 1)]
+    ys = [y0 + k * spacing for k in range(round((y1 - y0) / spacing) + 1)]
+    ends = [*(((x, y0), (x, y1)) for x in xs), *(((x0, y), (x1, y)) for y in ys)]
+    marks: list[Polyline] = []
+    for a, b in ends:
+        line = stage.camera.flat(np.array([(*a, stage.floor), (*b, stage.floor)]))
+        shown = _clipped(line, stage.width, stage.height)
+        if shown is not None:
+            marks.append(Polyline(shown, stroke=Tone.HAIRLINE, width=0.7, sharp=True))
+    return marks
+
+
+def _clipped(line: _Array, width: float, height: float) -> _Array | None:
+    """The part of a straight line (2, 2) inside the panel, None if there is none (Liang and Barsky 1984)."""
+    start, step = line[0], line[1] - line[0]
+    enter, leave = 0.0, 1.0
+    for axis, limit in ((0, width), (1, height)):
+        inset = 1.0
+        if step[axis] == 0:
+            if not inset <= start[axis] <= limit - inset:
+                return None
+            continue
+        t0, t1 = sorted(((inset - start[axis]) / step[axis], (limit - inset - start[axis]) / step[axis]))
+        enter, leave = max(enter, float(t0)), min(leave, float(t1))
+    return np.stack([start + enter * step, start + leave * step]) if enter < leave else None
+
+
+def _path_marks(stage: Stage, body: Rendering, path: _Array, now: int) -> list[Polyline | Disc]:
+    """The path to come as a dotted line, the path so far fading with age, dim behind bodies."""
+    x, y, nearness = stage.camera.project(path)
+    points = np.column_stack([x, y])
+    hidden = body.nearness_at(x, y) > nearness * 1.01
+    marks: list[Polyline | Disc] = []
+    if now < len(path) - 1:
+        marks.append(
+            Polyline(_thinned(points[now:]), stroke=Tone.MUTED, width=1.0, dash=(1.5, 3.0), opacity=0.8)
+        )
+    pieces = 14
+    bounds = np.unique(np.linspace(0, now, pieces + 1).astype(int))
+    for first, last in pairwise(bounds.tolist()):
+        age = 1.0 - last / max(now, 1)
+        for a, b, behind in _runs(hidden, first, last):
+            opacity = (0.18 if behind else 1.0) * (1.0 - 0.62 * age)
+            marks.append(
+                Polyline(_thinned(points[a : b + 1]), stroke=Tone.TRACE_0, width=2.0, opacity=opacity)
+            )
+    (x0, y0), (x1, y1) = points[0].tolist(), points[now].tolist()
+    marks.append(Disc(x0, y0, 3.0, fill=Tone.SURFACE, stroke=Tone.TRACE_0, stroke_width=1.5))
+    marks.append(Disc(x1, y1, 3.6, fill=Tone.TRACE_0, stroke=Tone.SURFACE, stroke_width=1.0))
+    return marks
+
+
+def _runs(flags: NDArray[np.bool_], first: int, last: int) -> list[tuple[int, int, bool]]:
+    """Maximal stretches ``a..b`` of equal flags within ``first..last``, sharing their end points."""
+    runs: list[tuple[int, int, bool]] = []
+    start = first
+    for k in range(first, last):
+        if k + 1 == last or flags[k + 1] != flags[start]:
+            runs.append((start, k + 1, bool(flags[start])))
+            start = k + 1
+    return runs
+
+
+def _thinned(points: _Array, tolerance: float = 0.6) -> _Array:
+    """The points at least ``tolerance`` px apart along the line, first and last kept."""
+    if len(points) < 3:
+        return points
+    walked = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    keep = np.unique(np.searchsorted(walked, np.arange(0.0, walked[-1], 4 * tolerance)))
+    return points[np.unique(np.concatenate([[0], keep, [len(points) - 1]]))]
+
+
+def _pedestal(robot: Robot, foot: float, floor: float) -> tuple[TriangleMesh, ...]:
+    """A column from the robot's foot down to the floor, where there is a gap and the base stands upright."""
+    gap = foot - floor
+    if gap < 0.01 * reach(robot) or robot.base.rotation[2][2] < 0.7:
+        return ()
+    r = 0.06 * reach(robot)
+    x, y, _ = robot.base.translation
+    column = _cone(1.15 * r, 1.05 * r, gap)
+    plate = _cone(1.9 * r, 1.8 * r, 0.15 * r)
+    stand = np.eye(4)
+    stand[:3, 3] = (x, y, floor)
+    return tuple(triangles(shape).moved(stand) for shape in (column, plate))
+
+
+def _cone(lower: float, upper: float, length: float) -> Housing:
+    start, end = (lower, lower), (upper, upper)
+    return Housing(start=start, end=end, length=length, roundness=1.0, material=Material.BASE)
+
+
+def _position(p: _Array) -> str:
+    x, y, z = (axis_number(round(float(v), 2) + 0.0) for v in p)
+    return f"x {x}  y {y}  z {z} m"

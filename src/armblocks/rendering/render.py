@@ -1,0 +1,301 @@
+"""A small software renderer: triangles with normals to shaded pixels with transparency and depth.
+
+All triangles are rasterised at once with array operations: every triangle becomes rows, every row becomes
+pixels, and the nearest fragment of each pixel is shaded. Passes are numbered in :func:`render`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.pictures.style import rgb
+from armblocks.rendering.camera import Camera
+from armblocks.robot.shapes import Material
+from armblocks.robot.triangles import TriangleMesh
+
+_Array = NDArray[np.float64]
+_Index = NDArray[np.intp]
+
+SUPERSAMPLES = 2
+"""Rendered pixels per output pixel, each way."""
+
+# Colour (sRGB), strength and sharpness of the highlight.
+_FINISH: dict[Material, tuple[str, float, float]] = {
+    Material.PAINT: ("#f0701a", 0.22, 26.0),
+    Material.JOINT: ("#4a4f58", 0.16, 14.0),
+    Material.FLANGE: ("#b9bfc7", 0.30, 22.0),
+    Material.BASE: ("#6a7079", 0.12, 12.0),
+}
+_MATERIALS = tuple(Material)
+
+# Directions towards the lights in camera axes (right, up, towards the viewer), with their strengths.
+_KEY, _KEY_STRENGTH = np.array([-0.48, 0.74, 0.58]), 0.98
+_FILL, _FILL_STRENGTH = np.array([0.85, 0.10, 0.50]), 0.20
+_SKY, _GROUND = 0.40, 0.17
+
+
+@dataclass(frozen=True, eq=False)
+class Rendering:
+    """The pixels that a set of bodies covers, as a window of the panel.
+
+    ``pixels`` (rows, columns, 4) uint8, straight alpha; ``nearness`` (rows, columns) 1/depth of what is seen
+    there, or 0; ``left`` and ``top``: the window's first column and row; ``scale``: pixels per px.
+    """
+
+    pixels: NDArray[np.uint8]
+    nearness: _Array
+    left: int
+    top: int
+    scale: float
+
+    def nearness_at(self, x: _Array, y: _Array) -> _Array:
+        """1/depth of the bodies at points of the panel (px), 0 where there is none."""
+        column = np.floor(x * self.scale).astype(np.intp) - self.left
+        row = np.floor(y * self.scale).astype(np.intp) - self.top
+        rows, columns = self.nearness.shape
+        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        found = self.nearness[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)]
+        return np.where(inside, found, 0.0)
+
+
+def render(
+    meshes: Sequence[TriangleMesh], camera: Camera, width: float, height: float, scale: float
+) -> Rendering:
+    """Shaded pixels of world-frame meshes over ``width`` x ``height`` px, ``scale`` pixels each px.
+
+    Lambert shading with a key and a fill light and a sky dome, a Blinn highlight, dark lines where a body
+    ends before another; after Foley et al., *Computer Graphics*, chapter 16.
+    """
+    corners = np.concatenate([mesh.corners for mesh in meshes])
+    normals = np.concatenate([mesh.normals for mesh in meshes]) @ camera.axes.T
+    counts = [len(mesh.corners) for mesh in meshes]
+    material = np.repeat([_MATERIALS.index(mesh.material) for mesh in meshes], counts)
+
+    # Pass 1: project, drop what faces away, and keep to the window that the bodies cover.
+    x, y, nearness = camera.project(corners)
+    x, y = x * scale, y * scale
+    left, right = _extent(x, round(width * scale))
+    top, bottom = _extent(y, round(height * scale))
+    columns, rows = (right - left) * SUPERSAMPLES, (bottom - top) * SUPERSAMPLES
+    x, y = (x - left) * SUPERSAMPLES, (y - top) * SUPERSAMPLES
+    doubled_area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    seen = doubled_area < -1e-9  # y runs downwards: anticlockwise is negative
+    x, y, nearness, doubled_area = x[seen], y[seen], nearness[seen], doubled_area[seen]
+    normals, material = normals[seen], material[seen]
+
+    # Pass 2: fragments, and the nearest of each pixel.
+    triangle, column, row = _fragments(x, y, columns, rows)
+    pixel = row * columns + column
+    depth = _linear_in_pixels(x, y, doubled_area, nearness)(triangle, column, row)
+    nearest = np.zeros(rows * columns)
+    np.maximum.at(nearest, pixel, depth)
+    visible = np.flatnonzero(depth == nearest[pixel])
+    triangle, column, row, pixel = triangle[visible], column[visible], row[visible], pixel[visible]
+
+    # Pass 3: shade, in camera axes.
+    normal = np.stack(
+        [_linear_in_pixels(x, y, doubled_area, normals[:, :, k])(triangle, column, row) for k in range(3)]
+    )
+    normal /= np.sqrt(np.einsum("ij,ij->j", normal, normal)) + 1e-12
+    linear = np.zeros((4, rows * columns))
+    linear[:3, pixel] = _shade(normal, material[triangle])
+    linear[3, pixel] = 1.0
+    facing = np.zeros((3, rows * columns))
+    facing[:, pixel] = normal
+    nearest = nearest.reshape(rows, columns)
+    linear[:3] *= _outlines(nearest, facing.reshape(3, rows, columns)).ravel()
+
+    # Pass 4: average the supersamples (colours weighted by coverage) and encode.
+    n = SUPERSAMPLES
+    planes = linear.reshape(4, rows, columns)
+    averaged = _block_means(planes, n)
+    alpha = averaged[3]
+    pixels = np.empty((rows // n, columns // n, 4), dtype=np.uint8)
+    for k in range(3):
+        pixels[..., k] = _SRGB[np.rint(averaged[k] / np.maximum(alpha, 1e-9) * _SRGB_STEPS).astype(np.intp)]
+    pixels[..., 3] = np.rint(alpha * 255)
+    return Rendering(pixels=pixels, nearness=nearest[::n, ::n], left=left, top=top, scale=scale)
+
+
+def _block_means(planes: _Array, n: int) -> _Array:
+    """Means over n x n blocks of the last two axes."""
+    total = planes[:, ::n, ::n].copy()
+    for k in range(1, n * n):
+        total += planes[:, k // n :: n, k % n :: n]
+    return total / n**2
+
+
+def _extent(values: _Array, limit: int) -> tuple[int, int]:
+    """First pixel and the one after the last of what is seen along one side of the panel; at least one."""
+    low = min(max(int(np.floor(values.min())) - 1, 0), limit - 1)
+    return low, max(min(int(np.ceil(values.max())) + 1, limit), low + 1)
+
+
+def shadow(
+    meshes: Sequence[TriangleMesh],
+    camera: Camera,
+    floor: float,
+    width: float,
+    height: float,
+    scale: float,
+    *,
+    blur: int = 3,
+) -> NDArray[np.uint8]:
+    """A soft black shadow on the floor ``z = floor`` (m), pixels (rows, columns, 4), at ``scale`` a px.
+
+    The sun stands high over the left shoulder of the viewer: the shadow lies behind and right of the arm.
+    """
+    columns, rows = round(width * scale), round(height * scale)
+    right, up = camera.axes[0], np.array([0.0, 0.0, 1.0])
+    away = np.cross(up, right)  # horizontal, away from the viewer
+    fall = -up + 0.30 * right + 0.26 * away
+    corners = np.concatenate([mesh.corners for mesh in meshes])
+    drop = np.maximum(corners[..., 2:] - floor, 0.0)
+    x, y, _ = camera.project(corners + drop * fall)
+    mask = np.zeros(rows * columns)
+    x, y = x * scale, y * scale
+    _, column, row = _fragments(x, y, columns, rows)
+    mask[row * columns + column] = 1.0
+    soft = mask.reshape(rows, columns)
+    for _ in range(3):  # three box filters make a smooth bell (central limit theorem)
+        soft = _box_filter(_box_filter(soft, blur).T, blur).T
+    pixels = np.zeros((rows, columns, 4), dtype=np.uint8)
+    pixels[..., 3] = np.rint(soft * 72)
+    return pixels
+
+
+def over(front: NDArray[np.uint8], back: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """``front`` laid over ``back``, both straight alpha (Porter and Duff 1984)."""
+    result = back.copy()
+    result[back[..., 3] == 0] = 0
+    covered = front[..., 3] > 0  # elsewhere the back stays as it is
+    f, b = front[covered] / 255, back[covered] / 255
+    alpha = f[:, 3:] + b[:, 3:] * (1 - f[:, 3:])
+    colour = (f[:, :3] * f[:, 3:] + b[:, :3] * b[:, 3:] * (1 - f[:, 3:])) / np.maximum(alpha, 1e-9)
+    result[covered] = np.rint(np.concatenate([colour, alpha], axis=-1) * 255).astype(np.uint8)
+    return result
+
+
+def faded(pixels: NDArray[np.uint8], strength: float) -> NDArray[np.uint8]:
+    """The same pixels with their opacity multiplied by ``strength``, 0..1."""
+    result = pixels.copy()
+    result[..., 3] = np.rint(pixels[..., 3] * strength).astype(np.uint8)
+    return result
+
+
+def cropped(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int, int]:
+    """The part of the pixels that is not transparent, with its first column and row."""
+    rows, columns = np.any(pixels[..., 3], axis=1), np.any(pixels[..., 3], axis=0)
+    if not rows.any():
+        return pixels[:1, :1], 0, 0
+    top, bottom = int(np.argmax(rows)), len(rows) - int(np.argmax(rows[::-1]))
+    left, right = int(np.argmax(columns)), len(columns) - int(np.argmax(columns[::-1]))
+    return pixels[top:bottom, left:right], left, top
+
+
+def _fragments(x: _Array, y: _Array, columns: int, rows: int) -> tuple[_Index, _Index, _Index]:
+    """Triangle, column and row of every pixel centre inside a triangle; corners (F, 3) in pixels."""
+    first = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, rows).astype(np.intp)
+    last = np.clip(np.floor(y.max(axis=1) - 0.5), -1, rows - 1).astype(np.intp)
+    triangle, row = _ranges(first, np.maximum(last - first + 1, 0))
+    centre = row + 0.5
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        xi, yi, xj, yj = x[triangle, i], y[triangle, i], x[triangle, j], y[triangle, j]
+        crossed = ((yi <= centre) & (centre < yj)) | ((yj <= centre) & (centre < yi))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = xi + (xj - xi) * (centre - yi) / (yj - yi)
+        left = np.where(crossed, np.minimum(left, at), left)
+        right = np.where(crossed, np.maximum(right, at), right)
+    some = right >= left
+    triangle, row, left, right = triangle[some], row[some], left[some], right[some]
+    first = np.clip(np.ceil(left - 0.5), 0, columns).astype(np.intp)
+    last = np.clip(np.ceil(right - 0.5) - 1, -1, columns - 1).astype(np.intp)
+    span, column = _ranges(first, np.maximum(last - first + 1, 0))
+    return triangle[span], column, row[span]
+
+
+def _ranges(first: _Index, counts: _Index) -> tuple[_Index, _Index]:
+    """For ranges ``first[k] .. first[k] + counts[k] - 1`` laid end to end: which range, and the number."""
+    owner = np.repeat(np.arange(len(first)), counts)
+    begin = np.cumsum(counts) - counts
+    return owner, np.arange(len(owner)) - begin[owner] + first[owner]
+
+
+def _linear_in_pixels(
+    x: _Array, y: _Array, doubled_area: _Array, values: _Array
+) -> Callable[[_Index, _Index, _Index], _Array]:
+    """Interpolation of corner values (F, 3): a plane for each triangle, evaluated at pixel centres."""
+    d1, d2 = values[:, 1] - values[:, 0], values[:, 2] - values[:, 0]
+    gx = (d1 * (y[:, 2] - y[:, 0]) - d2 * (y[:, 1] - y[:, 0])) / doubled_area
+    gy = (d2 * (x[:, 1] - x[:, 0]) - d1 * (x[:, 2] - x[:, 0])) / doubled_area
+    at_origin = values[:, 0] + gx * (0.5 - x[:, 0]) + gy * (0.5 - y[:, 0])
+
+    def evaluate(triangle: _Index, column: _Index, row: _Index) -> _Array:
+        return at_origin[triangle] + gx[triangle] * column + gy[triangle] * row
+
+    return evaluate
+
+
+def _shade(normal: _Array, material: _Index) -> _Array:
+    """Linear colours (3, P) of surface points with unit normals (3, P) in camera axes."""
+    key, fill = _KEY / np.linalg.norm(_KEY), _FILL / np.linalg.norm(_FILL)
+    halfway = key + np.array([0.0, 0.0, 1.0])
+    halfway /= np.linalg.norm(halfway)
+    light = _GROUND + (_SKY - _GROUND) * (0.5 + 0.5 * normal[1])
+    light += _KEY_STRENGTH * np.maximum(key @ normal, 0.0)
+    light += _FILL_STRENGTH * np.maximum(fill @ normal, 0.0)
+    # Dark bodies keep a rim of light, so that graphite stands off a dark ground.
+    white = 0.10 * (1.0 - np.clip(normal[2], 0.0, 1.0)) ** 3
+    white += _GLOSS[material] * np.exp(_SHARPNESS[material] * np.log(np.maximum(halfway @ normal, 1e-6)))
+    return np.clip(_BASE[:, material] * light + white, 0.0, 1.0)
+
+
+def _outlines(nearness: _Array, facing: _Array) -> _Array:
+    """A factor (rows, columns) below 1 where depth or direction jumps between neighbouring pixels."""
+    factor = np.ones_like(nearness)
+    views = (
+        (factor[:-1], nearness[:-1], nearness[1:], facing[:, :-1], facing[:, 1:]),
+        (factor[:, :-1], nearness[:, :-1], nearness[:, 1:], facing[:, :, :-1], facing[:, :, 1:]),
+    )
+    for target, here, there, facing_here, facing_there in views:
+        both = (here > 0) & (there > 0)
+        jump = both & (np.abs(there - here) > 0.006 * here)
+        aligned = facing_here[0] * facing_there[0]
+        aligned += facing_here[1] * facing_there[1]
+        aligned += facing_here[2] * facing_there[2]
+        target[both & (aligned < 0.55)] *= 0.72
+        target[jump] *= 0.6
+    return factor
+
+
+def _box_filter(values: _Array, radius: int) -> _Array:
+    padded = np.pad(values, ((radius + 1, radius), (0, 0)))
+    total = np.cumsum(padded, axis=0)
+    return (total[2 * radius + 1 :] - total[: -2 * radius - 1]) / (2 * radius + 1)
+
+
+def _to_linear(colour: tuple[float, float, float]) -> _Array:
+    c = np.array(colour)
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+_GLOSS = np.array([_FINISH[m][1] for m in _MATERIALS])
+_SHARPNESS = np.array([_FINISH[m][2] for m in _MATERIALS])
+_BASE = np.stack([_to_linear(rgb(_FINISH[m][0])) for m in _MATERIALS], axis=1)
+
+_SRGB_STEPS = 4095
+"""Linear light in twelve bits: finer than eight bits of sRGB everywhere."""
+
+
+def _srgb_table() -> NDArray[np.uint8]:
+    linear = np.arange(_SRGB_STEPS + 1) / _SRGB_STEPS
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.rint(encoded * 255).astype(np.uint8)
+
+
+_SRGB = _srgb_table()

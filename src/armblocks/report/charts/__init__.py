@@ -1,0 +1,1 @@
+"""Charts: time, frequency, responses, poles and zeros, paths, spectra."""

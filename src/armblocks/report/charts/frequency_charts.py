@@ -1,0 +1,294 @@
+"""Bode and Nyquist diagrams of linear systems."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.frequency import (
+    Margins,
+    as_continuous,
+    evaluate,
+    frequency_grid,
+    frequency_range,
+    frequency_response,
+    gain_and_phase,
+)
+from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.shown_values import shown_margins
+from armblocks.pictures.numbers import MINUS, table_number
+from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Text
+from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, Tone, trace_dash, trace_tone
+from armblocks.pictures.text_width import text_width
+from armblocks.report.charts.axes import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    Field,
+    equal_box,
+    headed,
+    log_field,
+    straight_field,
+    within,
+)
+from armblocks.report.charts.scale import padded
+
+_Array = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+
+_PANEL = 210.0
+_MOST_CHANNELS = 8
+_FLOOR = 1e-12
+"""Gains below this beside the largest are shown as this: a zero on the axis has no decibels."""
+
+
+def channels(system: LinearSystem) -> list[tuple[int, int, str]]:
+    """Row, column and name of what is drawn: every output from every input, the first ones."""
+    several_in, several_out = len(system.inputs) > 1, len(system.outputs) > 1
+    found: list[tuple[int, int, str]] = []
+    for row, output in enumerate(system.outputs):
+        for column, entry in enumerate(system.inputs):
+            name = f"{output} from {entry}" if several_in or not several_out else output
+            found.append((row, column, name))
+    return found[:_MOST_CHANNELS]
+
+
+def bode_picture(
+    system: LinearSystem, *, margins: bool = False, hertz: bool = False, width: float = FIGURE_WIDTH
+) -> Picture:
+    """Gain in dB and phase in degrees over the frequency; ``margins``: with those of the loop ``1 + L``.
+
+    The phase is continuous; for a sampled system up to the Nyquist frequency, which is marked.
+    """
+    low, high = frequency_range(system)
+    found = shown_margins(system) if margins else None
+    if found is not None:
+        marked = [w for w in (found.gain_frequency, found.phase_frequency) if 0.0 < w < math.inf]
+        low = min([low, *(w / 3.0 for w in marked)])
+        high = max([high, *(w * 3.0 for w in marked)])
+    high = min(high, math.pi / system.dt) if system.is_discrete else high
+    grid = frequency_grid(system, low, high, 700)
+    magnitude, phase = gain_and_phase(system, grid)
+    shown = channels(system)
+    largest = float(magnitude[np.isfinite(magnitude)].max(initial=1e-300))
+    decibels = 20.0 * np.log10(np.clip(magnitude, _FLOOR * largest, 1e300))
+    unit = 2.0 * math.pi if hertz else 1.0
+    x = (low / unit, high / unit)
+    names = [name for _, _, name in shown]
+    picture = Picture(
+        width=width,
+        height=2 * (TOP + _PANEL) + BOTTOM,
+        title=f"Bode diagram of {system.name or 'a linear system'}",
+        description=f"Gain and phase of {', '.join(names)}."
+        + (f" {margins_text(found)}" if found is not None else ""),
+    )
+    right = width - RIGHT
+    upper_box = (LEFT, TOP, right, TOP + _PANEL)
+    lower_box = (LEFT, 2 * TOP + _PANEL, right, 2 * (TOP + _PANEL))
+    above = log_field(x, _decibel_range(decibels, shown), upper_box, degrees=False)
+    below = log_field(x, _phase_range(phase, shown), lower_box, degrees=True)
+    label = f"Frequency, {'Hz' if hertz else 'rad/s'}"
+    picture.extend(above.frame(x_label="", y_label="Gain, dB", numbers=False))
+    picture.extend(below.frame(x_label=label, y_label="Phase, deg"))
+    for index, (row, column, _) in enumerate(shown):
+        for field, values in ((above, decibels), (below, phase)):
+            points = within(field.points(grid / unit, values[:, row, column]), field.box)
+            picture.add(Polyline(points, trace_tone(index), 1.8, trace_dash(index)))
+    if found is not None:
+        picture.extend(_margin_marks(found, above, below, unit, grid, phase[:, 0, 0]))
+    return headed(picture, names)
+
+
+def margins_text(found: Margins) -> str:
+    """Both margins in one line."""
+    parts: list[str] = []
+    if math.isfinite(found.gain):
+        parts.append(f"Gain margin {table_number(found.gain_decibels, 3)} dB")
+    if math.isfinite(found.phase):
+        parts.append(f"phase margin {table_number(found.phase, 3)} deg")
+    loop = "closed loop stable" if found.stable else "closed loop unstable"
+    return (", ".join([*parts, loop]) + ".").capitalize() if not parts else ", ".join([*parts, loop]) + "."
+
+
+def _decibel_range(decibels: _Array, shown: list[tuple[int, int, str]]) -> tuple[float, float]:
+    values = np.concatenate([decibels[:, row, column] for row, column, _ in shown])
+    low, high = padded(values, 0.06)
+    if high - low < 12.0:
+        middle = (low + high) / 2.0
+        low, high = middle - 6.0, middle + 6.0
+    return max(low, high - 220.0), high
+
+
+def _phase_range(phase: _Array, shown: list[tuple[int, int, str]]) -> tuple[float, float]:
+    values = np.concatenate([phase[:, row, column] for row, column, _ in shown])
+    finite = values[np.isfinite(values)]
+    low = 45.0 * math.floor((float(finite.min(initial=0.0)) - 4.0) / 45.0)
+    high = 45.0 * math.ceil((float(finite.max(initial=-1e9)) + 4.0) / 45.0)
+    return (low, high) if high - low >= 90.0 else (low - 45.0, low + 45.0)
+
+
+def _margin_marks(
+    found: Margins, above: Field, below: Field, unit: float, grid: _Array, phase: _Array
+) -> list[Mark]:
+    """Strokes from the curves to 0 dB and to the nearest odd multiple of 180 degrees, with their numbers."""
+    marks: list[Mark] = []
+    left, _, right, _ = above.box
+    if 0.0 < found.gain_frequency < math.inf:
+        x = above.across(found.gain_frequency / unit)
+        ends = (above.up(0.0), above.up(-found.gain_decibels))
+        word = f"gain margin {table_number(found.gain_decibels, 3)} dB"
+        marks += _margin_stroke(x, ends, above.up(0.0) - 7, word, (left, right))
+    if math.isfinite(found.phase):
+        x = below.across(found.phase_frequency / unit)
+        value = float(np.interp(found.phase_frequency, grid, phase))
+        ends = (below.up(value - found.phase), below.up(value))
+        word = f"phase margin {table_number(found.phase, 3)} deg"
+        level = below.up(value - found.phase)
+        # The curve falls: what is below it to the left is free.
+        base = level + (15 if found.phase > 0.0 else -7)
+        marks += _margin_stroke(x, ends, base, word, (left, right), to_the_left=True)
+        marks.append(Polyline([(left, level), (right, level)], Tone.ACCENT, 1.0, (5.0, 4.0)))
+    marks.append(Polyline([(left, above.up(0.0)), (right, above.up(0.0))], Tone.ACCENT, 1.0, (5.0, 4.0)))
+    box = (*above.box[:2], *below.box[2:])
+    return [mark for mark in marks if _inside(mark, box)]
+
+
+def _inside(mark: Mark, box: tuple[float, float, float, float]) -> bool:
+    if not isinstance(mark, Polyline):
+        return True
+    points = np.asarray(mark.points)
+    return bool((points[:, 1] >= box[1] - 1).all() and (points[:, 1] <= box[3] + 1).all())
+
+
+def _margin_stroke(
+    x: float,
+    ends: tuple[float, float],
+    base: float,
+    word: str,
+    span: tuple[float, float],
+    *,
+    to_the_left: bool = False,
+) -> list[Mark]:
+    width = text_width(word, SMALL_SIZE, bold=True)
+    fits = x + 10 + width < span[1] and not (to_the_left and x - 10 - width > span[0])
+    return [
+        Polyline([(x, ends[0]), (x, ends[1])], Tone.ACCENT, 2.2),
+        Disc(x, ends[1], 3.4, fill=Tone.ACCENT),
+        Text(
+            x + 9 if fits else x - 9,
+            base,
+            word,
+            SMALL_SIZE,
+            Tone.ACCENT,
+            "start" if fits else "end",
+            bold=True,
+        ),
+    ]
+
+
+def nyquist_picture(system: LinearSystem, *, width: float = 620.0) -> Picture:
+    """The response in the complex plane, for positive frequencies and mirrored (dashed), with -1 marked.
+
+    Poles on the edge of stability are passed at a distance, on the outside; what would be a half circle at
+    infinity leaves the picture.
+    """
+    height = width * 0.86
+    box = (LEFT, TOP, width - RIGHT, height - BOTTOM)
+    lines: list[tuple[str, _Complex]] = [
+        (name, _nyquist_line(system, row, column)) for row, column, name in channels(system)
+    ]
+    every = np.concatenate([values for _, values in lines])
+    x, y = _plane_range(every)
+    x, y = equal_box(x, y, box)
+    field = straight_field(x, y, box)
+    found = shown_margins(system) if system.is_siso else None
+    names = [name for name, _ in lines]
+    picture = Picture(
+        width=width,
+        height=height,
+        title=f"Nyquist diagram of {system.name or 'a linear system'}",
+        description=f"Response of {', '.join(names)} in the complex plane."
+        + (f" {margins_text(found)}" if found is not None else ""),
+    )
+    picture.extend(field.frame(x_label="Real part", y_label="Imaginary part"))
+    turn = np.linspace(0.0, 2.0 * math.pi, 181, dtype=np.float64)
+    picture.add(
+        Polyline(within(field.points(np.cos(turn), np.sin(turn)), box), Tone.HAIRLINE, 1.0, (3.0, 3.0))
+    )
+    for index, (_, values) in enumerate(lines):
+        tone = trace_tone(index)
+        for sign, dash in ((1.0, trace_dash(index)), (-1.0, (5.0, 4.0))):
+            points = within(field.points(values.real, sign * values.imag), box)
+            picture.add(Polyline(points, tone, 1.8 if sign > 0.0 else 1.2, dash))
+        picture.extend(_heads(field.points(values.real, values.imag), box, tone))
+    cross = (field.across(-1.0), field.up(0.0))
+    picture.extend(_cross(*cross, Tone.ERROR))
+    picture.add(Text(cross[0] - 8, cross[1] + 16, f"{MINUS}1", SMALL_SIZE, Tone.ERROR, "end", bold=True))
+    return headed(picture, names)
+
+
+def _nyquist_line(system: LinearSystem, row: int, column: int) -> _Complex:
+    """The response along the edge of stability, with detours to the right of the poles upon it."""
+    part = system.select([system.outputs[row]], [system.inputs[column]]).minimal()
+    low, high = frequency_range(part)
+    high = high if part.is_discrete else 100.0 * high
+    grid = frequency_grid(part, low / 30.0, high, 3000)
+    poles = part.poles()
+    edge = as_continuous(part, poles)
+    size = max(float(np.abs(edge).max(initial=0.0)), 1e-300)
+    on_edge = edge[(np.abs(edge.real) <= 1e-9 * size) & (edge.imag >= -1e-9 * size)]
+    if not on_edge.size:
+        return frequency_response(part, grid)[:, 0, 0]
+    places = 1j * np.concatenate([[0.0], grid])
+    radius = low / 30.0
+    for pole in on_edge.imag.tolist():
+        r = radius if abs(pole) <= 1e-7 * size else 1e-4 * abs(pole)
+        arc = 1j * pole + r * np.exp(1j * np.linspace(-math.pi / 2, math.pi / 2, 121))
+        places = np.concatenate([places[places.imag < pole - r], arc, places[places.imag > pole + r]])
+    places = places[places.imag >= 0.0]
+    values = np.exp(places * part.dt) if part.is_discrete else places
+    return evaluate(part, values)[:, 0, 0]
+
+
+def _plane_range(values: _Complex) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The part of the plane to show: all of a bounded curve, else what is around -1 and the bounded part."""
+    size = np.abs(values)
+    typical = float(np.quantile(size[np.isfinite(size)], 0.5))
+    limit = max(8.0, 3.0 * typical) if float(size.max()) > max(20.0, 12.0 * typical) else math.inf
+    kept = values[size <= limit]
+    x = padded(np.concatenate([kept.real, [-1.3, 0.2]]), 0.08)
+    reach = max(float(np.abs(kept.imag).max(initial=0.0)), 0.6)
+    return x, (-1.08 * reach, 1.08 * reach)
+
+
+def _cross(x: float, y: float, tone: Tone, size: float = 4.5) -> list[Mark]:
+    return [
+        Polyline([(x - size, y - size), (x + size, y + size)], tone, 2.0),
+        Polyline([(x - size, y + size), (x + size, y - size)], tone, 2.0),
+    ]
+
+
+def _heads(points: _Array, box: tuple[float, float, float, float], tone: Tone) -> list[Mark]:
+    """Arrow heads in the direction of rising frequency, on what is inside the box."""
+    left, top, right, bottom = box
+    x, y = points[:, 0], points[:, 1]
+    inside = (x > left) & (x < right) & (y > top) & (y < bottom)
+    steps = np.where(inside[1:] & inside[:-1], np.hypot(np.diff(x), np.diff(y)), 0.0)
+    walked: _Array = np.concatenate([[0.0], np.cumsum(steps)])
+    marks: list[Mark] = []
+    for share in (0.3, 0.7) if walked[-1] > 90 else (0.5,) if walked[-1] > 30 else ():
+        k = min(max(int(np.searchsorted(walked, share * float(walked[-1]))), 1), len(points) - 1)
+        back = int(np.searchsorted(walked, float(walked[k]) - 6.0))
+        heading = points[k] - points[min(back, k - 1)]
+        length = float(np.hypot(*heading))
+        if length == 0.0:
+            continue
+        along = heading / length
+        side = np.array([-along[1], along[0]])
+        tip = points[k] + 5 * along
+        wings = np.stack([tip, tip - 10 * along + 4.4 * side, tip - 10 * along - 4.4 * side])
+        marks.append(Polyline(wings, stroke=None, fill=tone, closed=True))
+    return marks

@@ -1,0 +1,183 @@
+"""Poles and zeros in the complex plane, and root loci."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.root_locus import extent, root_locus
+from armblocks.analysis.shown_values import shown_poles, shown_zeros
+from armblocks.pictures.numbers import axis_number
+from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Text
+from armblocks.pictures.style import SMALL_SIZE, Tone, trace_tone
+from armblocks.report.charts.axes import BOTTOM, LEFT, RIGHT, TOP, Field, equal_box, straight_field, within
+from armblocks.report.charts.scale import padded
+
+_Array = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+
+_DAMPINGS = (0.2, 0.4, 0.6, 0.8)
+
+
+def pole_zero_picture(system: LinearSystem, *, width: float = 560.0) -> Picture:
+    """Poles as crosses, zeros as rings, over lines of equal damping and equal frequency."""
+    poles, zeros = shown_poles(system), shown_zeros(system)
+    field, box = _plane(np.concatenate([poles, zeros]), system, width)
+    picture = _framed(system, field, box, width, "Poles and zeros")
+    picture.description = f"{len(poles)} poles (crosses) and {len(zeros)} zeros (rings)."
+    picture.extend(_roots(field, poles, zeros))
+    return picture
+
+
+def root_locus_picture(system: LinearSystem, *, gains: _Array | None = None, width: float = 620.0) -> Picture:
+    """The poles of the loop ``1 + gain L`` from gain 0 on, one colour a branch; arrows to higher gains."""
+    locus = root_locus(system, gains)
+    loop, poles = locus.system, locus.roots[0]
+    reach = extent(loop, locus.zeros)
+    seen = locus.roots[np.abs(locus.roots) < reach]
+    field, box = _plane(np.concatenate([seen, poles, locus.zeros]), loop, width)
+    picture = _framed(loop, field, box, width, "Root locus")
+    picture.description = (
+        f"{locus.roots.shape[1]} branches for gains up to {axis_number(float(locus.gains[-1]), 3)}; crosses "
+        "are poles of the open loop, rings its zeros."
+    )
+    for branch in range(locus.roots.shape[1]):
+        values = locus.roots[:, branch]
+        points = field.points(values.real, values.imag)
+        picture.add(Polyline(within(points, box), trace_tone(branch), 1.8))
+        picture.extend(_head(points, box, branch))
+    picture.extend(_roots(field, poles, locus.zeros))
+    picture.extend(_crossings(locus.gains, locus.roots, loop, field, box))
+    return picture
+
+
+def _plane(
+    roots: _Complex, system: LinearSystem, width: float
+) -> tuple[Field, tuple[float, float, float, float]]:
+    height = width * 0.86
+    box = (LEFT, TOP, width - RIGHT, height - BOTTOM)
+    if system.is_discrete:
+        reach = max(1.12, 1.12 * float(np.abs(roots).max(initial=0.0)))
+        x, y = (-reach, reach), (-reach, reach)
+    else:
+        size = max(float(np.abs(roots).max(initial=0.0)), 1e-12)
+        x = padded(np.concatenate([roots.real, [0.0, -0.3 * size, 0.12 * size]]), 0.1)
+        tall = max(1.12 * float(np.abs(roots.imag).max(initial=0.0)), 0.3 * size)
+        y = (-tall, tall)
+    return straight_field(*equal_box(x, y, box), box), box
+
+
+def _framed(
+    system: LinearSystem,
+    field: Field,
+    box: tuple[float, float, float, float],
+    width: float,
+    what: str,
+) -> Picture:
+    picture = Picture(width=width, height=width * 0.86, title=f"{what} of {system.name or 'a linear system'}")
+    unit = "" if system.is_discrete else ", rad/s"
+    picture.extend(field.frame(x_label=f"Real part{unit}", y_label=f"Imaginary part{unit}"))
+    picture.extend(_edge(system, field, box))
+    picture.extend(_damping_grid(system, field, box))
+    return picture
+
+
+def _edge(system: LinearSystem, field: Field, box: tuple[float, float, float, float]) -> list[Mark]:
+    """The edge of stability: the imaginary axis, or the unit circle."""
+    if system.is_discrete:
+        turn = np.linspace(0.0, 2.0 * math.pi, 361, dtype=np.float64)
+        return [Polyline(within(field.points(np.cos(turn), np.sin(turn)), box), Tone.MUTED, 1.2)]
+    x = field.across(0.0)
+    return [Polyline([(x, box[1]), (x, box[3])], Tone.MUTED, 1.2, sharp=True)]
+
+
+def _damping_grid(system: LinearSystem, field: Field, box: tuple[float, float, float, float]) -> list[Mark]:
+    """Dotted lines of equal damping ratio with their numbers where they leave the picture."""
+    marks: list[Mark] = []
+    for damping in _DAMPINGS:
+        if system.is_discrete:
+            # s dt from 0 to where the frequency is that of Nyquist.
+            turn = np.linspace(0.0, math.pi, 121)
+            line: _Complex = np.exp(turn * complex(-damping / math.sqrt(1.0 - damping**2), 1.0))
+        else:
+            far = 4.0 * max(abs(field.across.low), abs(field.up.high))
+            line = np.array([0.0, far * complex(-damping, math.sqrt(1.0 - damping**2))])
+        for sign in (1.0, -1.0):
+            points = within(field.points(line.real, sign * line.imag), box)
+            marks.append(Polyline(points, Tone.HAIRLINE, 1.0, (2.0, 3.0)))
+        ends = within(field.points(line.real, line.imag), box)
+        if len(ends) > 1 and (not system.is_discrete or abs(field.across.factor) > 120.0):
+            x, y = ends[len(ends) // 2 if system.is_discrete else -1].tolist()
+            x = min(max(x, box[0] + 14), box[2] - 14)
+            place = y + 12 if y < box[1] + 12 else y - 4
+            marks.append(Text(x, place, f"ζ {damping:g}", SMALL_SIZE, Tone.MUTED, "middle"))
+    return marks
+
+
+def _roots(field: Field, poles: _Complex, zeros: _Complex) -> list[Mark]:
+    marks: list[Mark] = []
+    size = 4.6
+    left, top, right, bottom = field.box
+    for root in zeros.tolist():
+        x, y = field.across(root.real), field.up(root.imag)
+        if left <= x <= right and top <= y <= bottom:
+            marks.append(Disc(x, y, size, fill=Tone.SURFACE, stroke=Tone.INK, stroke_width=1.8))
+    for root in poles.tolist():
+        x, y = field.across(root.real), field.up(root.imag)
+        marks.append(Polyline([(x - size, y - size), (x + size, y + size)], Tone.INK, 2.0))
+        marks.append(Polyline([(x - size, y + size), (x + size, y - size)], Tone.INK, 2.0))
+    return marks
+
+
+def _head(points: _Array, box: tuple[float, float, float, float], branch: int) -> list[Mark]:
+    """An arrow half way along what is seen of a branch."""
+    left, top, right, bottom = box
+    x, y = points[:, 0], points[:, 1]
+    inside = (x > left) & (x < right) & (y > top) & (y < bottom)
+    steps = np.where(inside[1:] & inside[:-1], np.hypot(np.diff(x), np.diff(y)), 0.0)
+    walked: _Array = np.concatenate([[0.0], np.cumsum(steps)])
+    if walked[-1] < 24:
+        return []
+    k = min(max(int(np.searchsorted(walked, 0.5 * float(walked[-1]))), 1), len(points) - 1)
+    heading = points[k] - points[k - 1]
+    length = float(np.hypot(*heading))
+    if length == 0.0:
+        return []
+    along = heading / length
+    side = np.array([-along[1], along[0]])
+    tip = points[k] + 4 * along
+    wings = np.stack([tip, tip - 9 * along + 4 * side, tip - 9 * along - 4 * side])
+    return [Polyline(wings, stroke=None, fill=trace_tone(branch), closed=True)]
+
+
+def _crossings(
+    gains: _Array,
+    roots: _Complex,
+    loop: LinearSystem,
+    field: Field,
+    box: tuple[float, float, float, float],
+) -> list[Mark]:
+    """Where branches cross the edge of stability, with the gain."""
+    beyond = np.abs(roots) - 1.0 if loop.is_discrete else roots.real
+    marks: list[Mark] = []
+    named: list[tuple[float, float]] = []
+    for k, branch in np.argwhere((beyond[1:] > 0.0) != (beyond[:-1] > 0.0)).tolist():
+        if k == 0:
+            continue
+        share = beyond[k, branch] / (beyond[k, branch] - beyond[k + 1, branch])
+        place = roots[k, branch] + share * (roots[k + 1, branch] - roots[k, branch])
+        gain = float(gains[k] + share * (gains[k + 1] - gains[k]))
+        x, y = field.across(place.real), field.up(place.imag)
+        if not (box[0] < x < box[2] and box[1] < y < box[3]):
+            continue
+        marks.append(Disc(x, y, 3.6, fill=Tone.ACCENT))
+        if place.imag >= 0.0 and all(math.hypot(x - u, y - v) > 18.0 for u, v in named):
+            named.append((x, y))
+            word = f"gain {axis_number(gain, 3)}"
+            fits = x + 80 < box[2]
+            side = "start" if fits else "end"
+            marks.append(Text(x + (9 if fits else -9), y - 5, word, SMALL_SIZE, Tone.ACCENT, side, bold=True))
+    return marks

@@ -1,0 +1,88 @@
+"""Spectra of signals: amplitudes or power densities over the frequency in Hz."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.spectrum import SignalSpectrum
+from armblocks.pictures.picture import Picture, Polyline
+from armblocks.pictures.style import FIGURE_WIDTH, trace_dash, trace_tone
+from armblocks.pictures.thinning import thin_out
+from armblocks.report.charts.axes import BOTTOM, LEFT, RIGHT, TOP, headed, log_field, straight_field, within
+from armblocks.report.charts.scale import padded
+
+_Array = NDArray[np.float64]
+
+_PANEL = 230.0
+_DEEPEST = 140.0
+"""dB below the highest line that are shown: further down is the rounding of the numbers."""
+
+
+def spectrum_chart(
+    spectra: Sequence[tuple[str, str, SignalSpectrum]],
+    *,
+    title: str,
+    decibels: bool = True,
+    logarithmic: bool = False,
+    width: float = FIGURE_WIDTH,
+) -> Picture:
+    """One line for each (label, unit, spectrum of one signal), named in a legend where there are several.
+
+    With ``decibels`` 0 dB is an amplitude of 1, or a density of 1, in the signal's own SI unit.
+    """
+    units = {unit for _, unit, _ in spectra}
+    density = spectra[0][2].quantity == "power density"
+    lines = [(found.frequency, _shown(found, decibels, density)) for _, _, found in spectra]
+    names = [label for label, _, _ in spectra]
+    low = min(float(frequency[1]) for frequency, _ in lines) if logarithmic else 0.0
+    high = max(float(frequency[-1]) for frequency, _ in lines)
+    seen = np.concatenate([values[frequency >= low] for frequency, values in lines])
+    box = (LEFT, TOP, width - RIGHT, TOP + _PANEL)
+    span = _range(seen, decibels)
+    quantity = "Power density" if density else "Amplitude"
+    picture = Picture(
+        width=width,
+        height=TOP + _PANEL + BOTTOM,
+        title=title,
+        description=f"{quantity} over the frequency of {', '.join(names)}.",
+    )
+    x = (low, high)
+    field = log_field(x, span, box, degrees=False) if logarithmic else straight_field(x, span, box)
+    label = _label(units.pop() if len(units) == 1 else "", decibels, density)
+    picture.extend(field.frame(x_label="Frequency, Hz", y_label=label))
+    for index, (frequency, values) in enumerate(lines):
+        kept = frequency >= low
+        places = field.points(
+            frequency[kept], np.where(np.isfinite(values[kept]), values[kept], span[0] - 1e3)
+        )
+        across, up = thin_out(places[:, 0], places[:, 1], round(box[2] - box[0]))
+        points = within(np.column_stack([across, up]), field.box)
+        picture.add(Polyline(points, trace_tone(index), 1.6, trace_dash(index)))
+    return headed(picture, names)
+
+
+def _shown(found: SignalSpectrum, decibels: bool, density: bool) -> _Array:
+    values = found.values[:, 0]
+    if not decibels:
+        return values
+    with np.errstate(divide="ignore"):
+        return (10.0 if density else 20.0) * np.log10(values)
+
+
+def _range(values: _Array, decibels: bool) -> tuple[float, float]:
+    finite = values[np.isfinite(values)]
+    if decibels:
+        return padded(np.maximum(finite, finite.max(initial=-_DEEPEST) - _DEEPEST), 0.06)
+    return 0.0, padded(finite, 0.06)[1]
+
+
+def _label(unit: str, decibels: bool, density: bool) -> str:
+    square = f"({unit})²" if " " in unit or "/" in unit else f"{unit}²"
+    shown = (f"{square}/Hz" if unit else "1/Hz") if density else unit
+    quantity = "Power density" if density else "Amplitude"
+    if decibels:
+        return f"{quantity}, dB" + (f" of 1 {shown}" if unit else "")
+    return f"{quantity}, {shown}" if shown else quantity

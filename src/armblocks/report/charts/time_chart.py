@@ -1,0 +1,224 @@
+"""Quantities over time, in panels under one another over one time axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.pictures.numbers import axis_number, nice_ticks
+from armblocks.pictures.picture import Mark, Picture, Polyline, Text
+from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, TEXT_SIZE, Tone, trace_dash, trace_tone
+from armblocks.pictures.text_width import shorten, text_width
+from armblocks.pictures.thinning import thin_out
+from armblocks.report.charts.scale import Scale, padded
+
+_Array = NDArray[np.float64]
+
+PANEL_HEIGHT = 148.0
+_LABEL_ROOM = 132.0
+_HEAD = 26.0
+_GAP = 18.0
+_WITHIN_REACH = 0.6
+"""A limit is drawn where the signal comes at least this near to it (share of the limit)."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trace:
+    """One line: ``values`` (N,) in the panel's unit, ``index`` of its colour, ``limits`` to stay in."""
+
+    label: str
+    values: _Array
+    index: int
+    limits: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Panel:
+    """Lines that share one quantity and unit."""
+
+    quantity: str
+    unit: str
+    traces: tuple[Trace, ...]
+
+    @property
+    def heading(self) -> str:
+        """``Joint angle, deg``."""
+        return f"{self.quantity}, {self.unit}" if self.unit else self.quantity
+
+
+def time_chart(
+    time: _Array,
+    panels: Sequence[Panel],
+    *,
+    title: str,
+    description: str,
+    height: float = PANEL_HEIGHT,
+    width: float = FIGURE_WIDTH,
+) -> Picture:
+    """Panels under one another over one time axis (s), each line named at its right end."""
+    spans = [_value_range(panel) for panel in panels]
+    ticks = [
+        nice_ticks(low, high, 4, degrees=panel.unit == "deg") for panel, (low, high) in zip(panels, spans)
+    ]
+    left = 14 + max(text_width(axis_number(v), SMALL_SIZE) for values in ticks for v in values)
+    left = max(left, 48.0)
+    right = width - _LABEL_ROOM
+    bottom = len(panels) * (_HEAD + height) + (len(panels) - 1) * _GAP
+    picture = Picture(width=width, height=bottom + 44, title=title, description=description)
+    across = Scale(float(time[0]), _end_of(time), left, right)
+    time_ticks = nice_ticks(across.low, across.high, 10 if width >= FIGURE_WIDTH else 6)
+    for number, (panel, span, values) in enumerate(zip(panels, spans, ticks)):
+        top = number * (_HEAD + height + _GAP) + _HEAD
+        up = Scale(*span, top + height, top)
+        picture.add(Text(left, top - 10, panel.heading, size=TEXT_SIZE, bold=True))
+        picture.extend(_grid(across, up, time_ticks, values, last=number == len(panels) - 1))
+        picture.extend(_traces(time, panel, across, up))
+        picture.extend(_end_labels(panel, up, right))
+    picture.add(Text((left + right) / 2, bottom + 36, "Time, s", size=TEXT_SIZE, anchor="middle"))
+    return picture
+
+
+def fits_beside(label: str) -> bool:
+    """Whether there is room for the label at the right end of a line."""
+    return text_width(label, SMALL_SIZE) <= _LABEL_ROOM - 31
+
+
+def _end_of(time: _Array) -> float:
+    return float(time[-1]) if time[-1] > time[0] else float(time[0]) + 1.0
+
+
+def _value_range(panel: Panel) -> tuple[float, float]:
+    values = np.concatenate([trace.values for trace in panel.traces]) if panel.traces else np.zeros(1)
+    shown = [bound for trace in panel.traces for bound in _drawn_limits(trace)]
+    return padded(np.concatenate([values, np.array(shown)]), 0.08)
+
+
+def _drawn_limits(trace: Trace) -> list[float]:
+    """Those of the trace's limits that it comes near or breaks."""
+    if trace.limits is None:
+        return []
+    finite = trace.values[np.isfinite(trace.values)]
+    if len(finite) == 0:
+        return []
+    low, high = trace.limits
+    near: list[float] = []
+    if math.isfinite(high) and finite.max() >= _WITHIN_REACH * high > 0:
+        near.append(high)
+    if math.isfinite(low) and finite.min() <= _WITHIN_REACH * low < 0:
+        near.append(low)
+    return near
+
+
+def _grid(
+    across: Scale, up: Scale, times: Sequence[float], values: Sequence[float], *, last: bool
+) -> list[Mark]:
+    marks: list[Mark] = []
+    for value in times:
+        x = across(value)
+        marks.append(Polyline([(x, up.end), (x, up.start)], stroke=Tone.GRID, sharp=True))
+        if last:
+            marks.append(Text(x, up.start + 17, axis_number(value), SMALL_SIZE, Tone.MUTED, "middle"))
+    for value in values:
+        y = up(value)
+        tone = Tone.HAIRLINE if value == 0 else Tone.GRID
+        marks.append(Polyline([(across.start, y), (across.end, y)], stroke=tone, sharp=True))
+        marks.append(Text(across.start - 7, y + 3.5, axis_number(value), SMALL_SIZE, Tone.MUTED, "end"))
+    frame = [(across.start, up.end), (across.start, up.start), (across.end, up.start)]
+    marks.append(Polyline(frame, stroke=Tone.HAIRLINE, sharp=True))
+    return marks
+
+
+def _traces(time: _Array, panel: Panel, across: Scale, up: Scale) -> list[Mark]:
+    columns = round(across.end - across.start)
+    marks: list[Mark] = []
+    over: list[Mark] = []
+    for trace in panel.traces:
+        for bound in _drawn_limits(trace):
+            y = up(bound)
+            marks.append(
+                Polyline(
+                    [(across.start, y), (across.end, y)],
+                    stroke=trace_tone(trace.index),
+                    dash=(7.0, 4.0),
+                    opacity=0.9,
+                )
+            )
+    for trace in panel.traces:
+        t, v = thin_out(time, trace.values, columns)
+        points = np.column_stack([across.array(t), up.array(v)])
+        marks.append(
+            Polyline(points, stroke=trace_tone(trace.index), width=1.8, dash=trace_dash(trace.index))
+        )
+        beyond = _beyond(trace, v)
+        if beyond.any():
+            # Neighbours stay in, so that a single sample beyond the limit shows as a stroke.
+            wide = beyond | np.roll(beyond, 1) | np.roll(beyond, -1)
+            wide[0], wide[-1] = beyond[:2].any(), beyond[-2:].any()
+            over.append(Polyline(np.where(wide[:, None], points, np.nan), stroke=Tone.ERROR, width=4.2))
+    return [*marks, *over]
+
+
+def _beyond(trace: Trace, values: _Array) -> NDArray[np.bool_]:
+    if trace.limits is None:
+        return np.zeros(len(values), dtype=np.bool_)
+    low, high = trace.limits
+    return (values > high + 1e-9 * abs(high)) | (values < low - 1e-9 * abs(low))
+
+
+def _end_labels(panel: Panel, up: Scale, right: float) -> list[Mark]:
+    """Names at the lines' right ends, moved apart where they would overlap, with a short line as key."""
+    step = SMALL_SIZE + 4.0
+    wanted: list[float] = []
+    for trace in panel.traces:
+        finite = trace.values[np.isfinite(trace.values)]
+        wanted.append(up(float(finite[-1])) if len(finite) else up.start)
+    order = sorted(range(len(wanted)), key=lambda k: (wanted[k], k))
+    places = spread([wanted[k] for k in order], step, up.end - 4, up.start + 4)
+    marks: list[Mark] = []
+    for k, y in zip(order, places):
+        trace = panel.traces[k]
+        tone, dash = trace_tone(trace.index), trace_dash(trace.index)
+        broken = trace.limits is not None and bool(
+            np.any(
+                (trace.values > trace.limits[1] * (1 + 1e-9)) | (trace.values < trace.limits[0] * (1 + 1e-9))
+            )
+        )
+        label = trace.label + (" over limit" if broken else "")
+        marks.append(
+            Polyline(
+                [(right + 3, wanted[k]), (right + 10, y), (right + 24, y)], stroke=tone, width=1.8, dash=dash
+            )
+        )
+        marks.append(
+            Text(
+                right + 29,
+                y + 3.8,
+                shorten(label, SMALL_SIZE, _LABEL_ROOM - 31),
+                SMALL_SIZE,
+                Tone.ERROR if broken else Tone.INK,
+                bold=broken,
+            )
+        )
+    return marks
+
+
+def spread(wanted: Sequence[float], step: float, low: float, high: float) -> list[float]:
+    """Places near ascending ``wanted`` ones, at least ``step`` apart, within ``low`` .. ``high`` if they fit.
+
+    Groups that collide are centred on their mean wish (pool adjacent violators, Ayer et al. 1955).
+    """
+    groups: list[tuple[float, int]] = []  # mean of wish less own offset, count
+    for k, wish in enumerate(wanted):
+        mean, count = wish - k * step, 1
+        while groups and groups[-1][0] > mean:
+            other, size = groups.pop()
+            mean = (mean * count + other * size) / (count + size)
+            count += size
+        groups.append((mean, count))
+    flat = [mean for mean, count in groups for _ in range(count)]
+    top = max(low, high - step * (len(wanted) - 1))
+    return [min(max(mean, low), top) + k * step for k, mean in enumerate(flat)]

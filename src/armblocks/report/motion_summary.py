@@ -1,0 +1,297 @@
+"""What a motion asks of its arm: ranges, peaks, loads, work, and every limit that it breaks.
+
+Signals are taken as straight between their samples, and integrals of that are exact: a linear power that
+changes sign, for instance, gives its positive and its negative work without error.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import LimitWarning
+from armblocks.pictures.numbers import table_number
+from armblocks.robot import Robot
+
+_Array = NDArray[np.float64]
+
+_TOLERANCE = 1e-9
+"""Share of a limit that rounding may exceed: a trajectory planned to the limit itself does not break it."""
+
+
+class LimitKind(Enum):
+    """Which limit of a joint."""
+
+    POSITION = "position"
+    SPEED = "speed"
+    TORQUE = "torque"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitFinding:
+    """One limit that a motion breaks. Values are SI: rad, rad/s, N m, or m, m/s, N."""
+
+    joint: str
+    kind: LimitKind
+    limit: float
+    first_time: float
+    """s: where the straight line between two samples crosses the limit; the start if it is beyond there."""
+    worst_time: float
+    worst: float
+    text: str
+    """One sentence for people with joint, limit, first time and worst value."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointSummary:
+    """One joint over a run, SI units, ``None`` where the run does not tell (no torque, no limit, no motor).
+
+    ``position_margin`` least distance to the nearer end of the range, negative beyond it; ``speed_share``
+    peak speed over its limit; ``*_rms`` root mean square over time; ``motor_*`` at the motor's side of the
+    gear: ``tau / G`` and ``G qd``; ``work_done`` and ``work_taken`` J: the time integrals of the positive
+    and of the negative part of ``tau qd``, both as positive numbers.
+    """
+
+    name: str
+    unit: str
+    position_min: float
+    position_max: float
+    position_limits: tuple[float, float] | None
+    position_margin: float | None
+    speed_peak: float
+    speed_peak_time: float
+    speed_limit: float | None
+    acceleration_peak: float
+    torque_peak: float | None
+    torque_rms: float | None
+    torque_limit: float | None
+    motor_torque_peak: float | None
+    motor_torque_rms: float | None
+    motor_speed_peak: float | None
+    power_peak: float | None
+    work_done: float | None
+    work_taken: float | None
+
+    @property
+    def speed_share(self) -> float | None:
+        """Peak speed as a share of its limit."""
+        return None if self.speed_limit is None else self.speed_peak / self.speed_limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionSummary:
+    """All joints, the arm as a whole, its tool, and the limits that are broken.
+
+    ``power_peak`` W of the sum over joints; ``tool_path_length`` m; positions (x, y, z) m in the world.
+    """
+
+    joints: tuple[JointSummary, ...]
+    power_peak: float | None
+    tool_path_length: float
+    tool_start: tuple[float, float, float]
+    tool_end: tuple[float, float, float]
+    tool_speed_peak: float
+    findings: tuple[LimitFinding, ...]
+
+
+def summarise(
+    robot: Robot, time: _Array, q: _Array, qd: _Array, qdd: _Array, tau: _Array | None, tool: _Array
+) -> MotionSummary:
+    """The summary of a motion: ``time`` (N,) s, ``q``, ``qd``, ``qdd``, ``tau`` (N, n), ``tool`` (N, 3) m."""
+    power = None if tau is None else tau * qd
+    joints: list[JointSummary] = []
+    for j, (name, joint, motor) in enumerate(zip(robot.joint_names, robot.joints, robot.motors)):
+        limits = joint.limits
+        k = int(np.argmax(np.abs(qd[:, j])))
+        low, high = float(q[:, j].min()), float(q[:, j].max())
+        ends = limits.position
+        torque = None if tau is None else tau[:, j]
+        peak = None if torque is None else float(np.abs(torque).max())
+        rms = None if torque is None else root_mean_square(time, torque)
+        work = (None, None) if power is None else signed_integrals(time, power[:, j])
+        gear = abs(motor.gear_ratio) if motor else None
+        speed_peak = float(abs(qd[k, j]))
+        joints.append(
+            JointSummary(
+                name=name,
+                unit=joint.unit,
+                position_min=low,
+                position_max=high,
+                position_limits=ends,
+                position_margin=None if ends is None else min(low - ends[0], ends[1] - high),
+                speed_peak=speed_peak,
+                speed_peak_time=float(time[k]),
+                speed_limit=limits.speed,
+                acceleration_peak=float(np.abs(qdd[:, j]).max()),
+                torque_peak=peak,
+                torque_rms=rms,
+                torque_limit=limits.torque,
+                motor_torque_peak=None if peak is None or gear is None else peak / gear,
+                motor_torque_rms=None if rms is None or gear is None else rms / gear,
+                motor_speed_peak=None if gear is None else speed_peak * gear,
+                power_peak=None if power is None else float(np.abs(power[:, j]).max()),
+                work_done=work[0],
+                work_taken=work[1],
+            )
+        )
+    strides = np.linalg.norm(np.diff(tool, axis=0), axis=1)
+    spans = np.diff(time)
+    return MotionSummary(
+        joints=tuple(joints),
+        power_peak=None if power is None else float(np.abs(power.sum(axis=1)).max()),
+        tool_path_length=float(strides.sum()),
+        tool_start=_triple(tool[0]),
+        tool_end=_triple(tool[-1]),
+        tool_speed_peak=float((strides / spans).max()) if len(spans) else 0.0,
+        findings=limit_findings(robot, time, q, qd, tau),
+    )
+
+
+SHOWN_AS_ZERO = 64.0 * float(np.finfo(np.float64).eps)
+"""Share of the largest joint's value below which a value of another joint is rounding."""
+_COMPARED = (
+    ("position_min", "position_max"),
+    ("position_margin",),
+    ("speed_peak",),
+    ("acceleration_peak",),
+    ("torque_peak", "torque_rms"),
+    ("motor_torque_peak", "motor_torque_rms"),
+    ("motor_speed_peak",),
+    ("power_peak",),
+    ("work_done", "work_taken"),
+)
+"""Quantities of joints that are computed from those of all joints alike."""
+
+
+def shown_summary(summary: MotionSummary) -> MotionSummary:
+    """The same summary as it is shown: 0 for what is a rounding error beside the same quantity of the joint,
+    of those with its unit, where it is largest.
+
+    The torque of a joint is a sum over forces that act on the whole arm: where they cancel, what is left has
+    the rounding errors of the largest.
+    """
+    joints: list[JointSummary] = []
+    for joint in summary.joints:
+        alike = [other for other in summary.joints if other.unit == joint.unit]
+        changes: dict[str, float] = {}
+        for names in _COMPARED:
+            sizes = [abs(getattr(other, name) or 0.0) for other in alike for name in names]
+            if names == ("position_margin",):  # the difference of a position and its limit
+                sizes += [abs(end) for other in alike for end in other.position_limits or ()]
+            for name in names:
+                value: float | None = getattr(joint, name)
+                if value is not None and abs(value) <= SHOWN_AS_ZERO * max(sizes):
+                    changes[name] = 0.0
+        joints.append(dataclasses.replace(joint, **changes))
+    return dataclasses.replace(summary, joints=tuple(joints))
+
+
+def limit_findings(
+    robot: Robot, time: _Array, q: _Array, qd: _Array | None = None, tau: _Array | None = None
+) -> tuple[LimitFinding, ...]:
+    """Every limit of a joint that a motion breaks, in the order of joints; arrays as in :func:`summarise`."""
+    findings: list[LimitFinding] = []
+    for j, (name, joint) in enumerate(zip(robot.joint_names, robot.joints)):
+        limits = joint.limits
+        if limits.position is not None:
+            low, high = limits.position
+            findings += _beyond(name, LimitKind.POSITION, joint.unit, time, q[:, j], low, high)
+        for kind, values, limit in (
+            (LimitKind.SPEED, qd, limits.speed),
+            (LimitKind.TORQUE, tau, limits.torque),
+        ):
+            if values is not None and limit is not None:
+                findings += _beyond(name, kind, joint.unit, time, values[:, j], -limit, limit)
+    return tuple(findings)
+
+
+def warn_of_limits(findings: Sequence[LimitFinding]) -> None:
+    """Issue a :class:`LimitWarning` for each finding."""
+    for finding in findings:
+        warnings.warn(finding.text, LimitWarning, stacklevel=2)
+
+
+def _beyond(
+    name: str, kind: LimitKind, unit: str, time: _Array, values: _Array, low: float, high: float
+) -> list[LimitFinding]:
+    slack = _TOLERANCE * max(abs(low), abs(high))
+    excess = np.maximum(low - values, values - high)
+    outside = np.flatnonzero(excess > slack)
+    if len(outside) == 0:
+        return []
+    first, worst = int(outside[0]), int(np.argmax(excess))
+    first_time = float(time[first])
+    if first > 0:
+        before, after = float(excess[first - 1]), float(excess[first])
+        share = min(max(-before / (after - before), 0.0), 1.0)
+        first_time = float(time[first - 1]) + share * float(time[first] - time[first - 1])
+    limit = high if values[worst] > high else low
+    convert, shown_unit = people_unit(kind, unit)
+    what = {
+        LimitKind.POSITION: "leaves its range",
+        LimitKind.SPEED: "is faster than allowed",
+        LimitKind.TORQUE: "needs more torque than allowed",
+    }[kind]
+    allowed = (
+        f"{table_number(low * convert)} … {table_number(high * convert)}"
+        if kind is LimitKind.POSITION
+        else f"at most {table_number(high * convert)}"
+    )
+    reached = table_number(float(values[worst]) * convert)
+    finding = LimitFinding(
+        joint=name,
+        kind=kind,
+        limit=limit,
+        first_time=first_time,
+        worst_time=float(time[worst]),
+        worst=float(values[worst]),
+        text=(
+            f"joint '{name}' {what} ({allowed} {shown_unit}) from t = {table_number(first_time)} s on: "
+            f"{reached} {shown_unit} at t = {table_number(float(time[worst]))} s"
+        ),
+    )
+    return [finding]
+
+
+def people_unit(kind: LimitKind, unit: str) -> tuple[float, str]:
+    """Factor and unit in which people read a joint's quantity: degrees for rad, N m or N for torques."""
+    factor, base = (180 / math.pi, "deg") if unit == "rad" else (1.0, unit)
+    if kind is LimitKind.POSITION:
+        return factor, base
+    if kind is LimitKind.SPEED:
+        return factor, f"{base}/s"
+    return 1.0, "N m" if unit == "rad" else "N"
+
+
+def signed_integrals(time: _Array, values: _Array) -> tuple[float, float]:
+    """Time integrals of the positive part and of the negative part (as a positive number) of a signal."""
+    a, b, h = values[:-1], values[1:], np.diff(time)
+    crossing = a * b < 0
+    span = np.where(crossing, np.abs(a) + np.abs(b), 1.0)
+    # Where the sign changes, each side is a triangle of height a or b over its share of the interval.
+    positive = np.where(
+        crossing, np.maximum(a, b) ** 2 / (2 * span), np.maximum(a, 0) / 2 + np.maximum(b, 0) / 2
+    )
+    negative = np.where(
+        crossing, np.minimum(a, b) ** 2 / (2 * span), -np.minimum(a, 0) / 2 - np.minimum(b, 0) / 2
+    )
+    return float(np.sum(positive * h)), float(np.sum(negative * h))
+
+
+def root_mean_square(time: _Array, values: _Array) -> float:
+    """Root of the time average of the square of a signal."""
+    if len(time) < 2:
+        return float(np.abs(values).max(initial=0.0))
+    a, b, h = values[:-1], values[1:], np.diff(time)
+    return math.sqrt(float(np.sum(h * (a * a + a * b + b * b)) / 3) / float(time[-1] - time[0]))
+
+
+def _triple(p: _Array) -> tuple[float, float, float]:
+    return float(p[0]), float(p[1]), float(p[2])

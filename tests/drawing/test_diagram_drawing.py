@@ -1,0 +1,335 @@
+"""Drawings of diagrams: no wire through a block, no block on another, every wire there."""
+
+import dataclasses
+import itertools
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+
+import armblocks as ab
+from armblocks.blocks import (
+    BLOCKS,
+    PID,
+    Clock,
+    Constant,
+    Demux,
+    Display,
+    EnabledSubsystem,
+    Gain,
+    Inport,
+    Integrator,
+    MathFunction,
+    Mux,
+    Outport,
+    Product,
+    Saturation,
+    Scope,
+    SineWave,
+    StateSpace,
+    Step,
+    Subsystem,
+    Sum,
+    TransferFunction,
+    Trigonometry,
+)
+from armblocks.diagram import Block, Diagram, DiagramBuilder, Note, Placement, PortRef, formula
+from armblocks.drawing.block_faces import face_size
+from armblocks.drawing.diagram_drawing import (
+    block_marks,
+    block_picture,
+    diagram_picture,
+    diagram_svg,
+    obstacle,
+    wire_nets,
+)
+from armblocks.drawing.diagram_layout import boxes, sized_box, standing_box
+from armblocks.drawing.face_symbols import SIGNS
+from armblocks.drawing.wire_routing import Net, Obstacle, RoutedNet, WireEnd, bent, route
+from armblocks.face.block_examples import example_block
+from armblocks.pictures.picture import Curve, Picture, text_marks
+from armblocks.pictures.text_width import text_width
+
+EXAMPLES = ("kr180model", "falling_pendulum", "puma560_computed_torque", "van_der_pol_pid")
+
+
+def feedback_loop() -> Diagram:
+    builder = DiagramBuilder("loop <&>")
+    reference = builder.add("reference", Step())
+    error = builder.add("error", Sum(signs="+-"), reference)
+    control = builder.add("a controller with quite a long name", PID(), error)
+    plant = builder.add(
+        "plant", TransferFunction(numerator=(1.0, -2.5), denominator=(1.0, 0.0, 3.0, 1.0)), control
+    )
+    builder.connect(plant, error["u2"])
+    builder.add("scope", Scope(inputs=2), reference, plant)
+    builder.add("clock", Clock())
+    return builder.build()
+
+
+def many_kinds() -> Diagram:
+    builder = DiagramBuilder("many kinds")
+    a, b = builder.add("a", Constant(value=(1.0, 2.0))), builder.add("b", SineWave())
+    mux = builder.add("mux", Mux(inputs=2), a, b)
+    gain = builder.add("gain", Gain(gain=-12345.678), mux)
+    parts = builder.add("demux", Demux(parts=3), gain)
+    product = builder.add("ratio", Product(operators="*/*"), parts["y1"], parts["y2"], parts["y3"])
+    total = builder.add("sum of four", Sum(signs="+-+-"), product, b, parts["y1"], parts["y2"])
+    bounded = builder.add("bounded", Saturation(), total)
+    sine = builder.add("sine", Trigonometry(function="cos"), bounded)
+    square = builder.add("square", MathFunction(function="exp"), sine)
+    memory = builder.add("memory", Integrator(), square)
+    space = builder.add("space", StateSpace(), memory)
+    builder.add("shown", Display(), space)
+    return builder.build()
+
+
+def without_layout(name: str) -> Diagram:
+    return dataclasses.replace(ab.load_diagram(name), layout={})
+
+
+CASES: dict[str, Callable[[], Diagram]] = {
+    **{f"{name}-placed": partial(ab.load_diagram, name) for name in EXAMPLES},
+    **{f"{name}-layered": partial(without_layout, name) for name in EXAMPLES},
+    "feedback loop": feedback_loop,
+    "many kinds": many_kinds,
+}
+
+
+@pytest.fixture(params=CASES.values(), ids=list(CASES), scope="module")
+def diagram(request: pytest.FixtureRequest) -> Diagram:
+    return request.param()
+
+
+def routed(
+    diagram: Diagram,
+) -> tuple[dict[PortRef, list[PortRef]], list[Net], list[RoutedNet], list[Obstacle]]:
+    placed = boxes(diagram)
+    nets, wires = wire_nets(diagram, placed)
+    obstacles = [obstacle(box) for box in placed.values()]
+    return wires, nets, route(obstacles, nets), obstacles
+
+
+def test_blocks_do_not_overlap(diagram: Diagram) -> None:
+    for a, b in itertools.combinations(boxes(diagram).values(), 2):
+        apart = a.x + a.width <= b.x or b.x + b.width <= a.x or a.y + a.height <= b.y or b.y + b.height <= a.y
+        assert apart, (a.name, b.name)
+
+
+def test_no_wire_passes_through_a_block(diagram: Diagram) -> None:
+    _, _, nets, obstacles = routed(diagram)
+    for net in nets:
+        for path in net.paths:
+            for (ax, ay), (bx, by) in itertools.pairwise(path):
+                for box in obstacles:
+                    clear = (
+                        max(ax, bx) <= box.x + 1e-6
+                        or min(ax, bx) >= box.x + box.width - 1e-6
+                        or max(ay, by) <= box.y + 1e-6
+                        or min(ay, by) >= box.y + box.height - 1e-6
+                    )
+                    assert clear, (path, box)
+
+
+def test_wires_are_orthogonal_and_reach_their_ports(diagram: Diagram) -> None:
+    _, nets, found, _ = routed(diagram)
+    for net, wires in zip(nets, found):
+        assert len(wires.paths) == len(net.targets)
+        for target, path in zip(net.targets, wires.paths):
+            assert path[-1] == (target.x, target.y)
+            assert all(ax == bx or ay == by for (ax, ay), (bx, by) in itertools.pairwise(path))
+        assert any(path[0] == (net.source.x, net.source.y) for path in wires.paths)
+
+
+def test_branches_start_on_their_own_net(diagram: Diagram) -> None:
+    _, nets, found, _ = routed(diagram)
+    for net, wires in zip(nets, found):
+        for path in wires.paths:
+            if path[0] == (net.source.x, net.source.y):
+                continue
+            assert any(_on(path[0], other) for other in wires.paths if other is not path)
+
+
+def test_wires_of_different_nets_never_lie_on_each_other(diagram: Diagram) -> None:
+    _, _, found, _ = routed(diagram)
+    runs = [
+        (number, a, b)
+        for number, wires in enumerate(found)
+        for path in wires.paths
+        for a, b in itertools.pairwise(path)
+    ]
+    for (i, a, b), (j, c, d) in itertools.combinations(runs, 2):
+        if i == j:
+            continue
+        for axis in (0, 1):
+            if a[axis] == b[axis] == c[axis] == d[axis]:
+                low = max(min(a[1 - axis], b[1 - axis]), min(c[1 - axis], d[1 - axis]))
+                high = min(max(a[1 - axis], b[1 - axis]), max(c[1 - axis], d[1 - axis]))
+                assert high - low < 1e-6, (a, b, c, d)
+
+
+def test_a_drawing_is_valid_and_repeatable(diagram: Diagram) -> None:
+    text = diagram_svg(diagram)
+    assert text == diagram_svg(diagram)
+    root = ET.fromstring(text)
+    width, height = float(root.get("width") or 0), float(root.get("height") or 0)
+    assert width > 0 and height > 0
+    for mark in text_marks(diagram_picture(diagram)):
+        assert 0 <= mark.x <= width and 0 <= mark.y <= height
+    names = {element.text for element in root.iter("{http://www.w3.org/2000/svg}title")}
+    for name, block in diagram.blocks.items():
+        assert f"{name} ({block.title})" in names
+
+
+def test_every_shipped_block_has_a_face_of_sensible_size() -> None:
+    for name in BLOCKS:
+        kind = BLOCKS[name]
+        if any(rule.required for rule in kind.parameters()):
+            continue
+        _, width, height = face_size(kind())
+        assert 5 <= width <= 160 and 20 <= height <= 160
+
+
+@pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+def test_a_block_alone_is_drawn_within_its_picture(kind: type[Block]) -> None:
+    block = example_block(kind)
+    picture = block_picture(block)
+    ports = len(block.input_ports()) + len(block.output_ports())
+    assert picture.title == f"Symbol of {block.title}"
+    assert sum(isinstance(mark, Curve) for mark in picture.marks) >= ports
+    for mark in text_marks(picture):
+        assert -1 <= mark.x <= picture.width + 1
+        assert 0 <= mark.y <= picture.height
+
+
+@pytest.mark.parametrize("kind", BLOCKS.values(), ids=BLOCKS)
+def test_a_face_is_read_whole(kind: type[Block]) -> None:
+    """No text is cut, too small, beside the block, or over another one."""
+    block = example_block(kind)
+    box = sized_box("", block)
+    faces = [(block, box), (block, dataclasses.replace(box, flipped=True))]
+    for _, drawn in faces[:1] if isinstance(block, Display) else faces:
+        texts = text_marks(Picture(width=0, height=0, title="", marks=block_marks(drawn)))
+        places: list[tuple[float, float, float, float]] = []
+        for mark in texts:
+            assert mark.size >= 8.0, mark.text
+            assert "…" not in mark.text or isinstance(block, Display)
+            wide = text_width(mark.text, mark.size, mono=mark.mono)
+            left = mark.x - {"start": 0.0, "middle": 0.5, "end": 1.0}[mark.anchor] * wide
+            assert box.x - 0.5 <= left and left + wide <= box.x + box.width + 0.5, mark.text
+            assert box.y <= mark.y - 0.6 * mark.size and mark.y <= box.y + box.height, mark.text
+            places.append((left + 0.5, left + wide - 0.5, mark.y - 0.6 * mark.size, mark.y))
+        for (a, b, c, d), (e, f, g, h) in itertools.combinations(places, 2):
+            assert b <= e or f <= a or d <= g or h <= c, [mark.text for mark in texts]
+
+
+def test_signs_stand_for_blocks_that_exist() -> None:
+    assert set(SIGNS) <= set(BLOCKS)
+
+
+def test_a_mask_shows_its_name() -> None:
+    inner = DiagramBuilder("Servo")
+    stiffness = inner.parameter("K", 3.0, doc="stiffness")
+    inner.add("y", Outport(), inner.add("spring", Gain(gain=stiffness), inner.add("u", Inport())))
+    masked = inner.build()
+    for kind in (Subsystem, EnabledSubsystem):
+        shown = {mark.text for mark in text_marks(block_picture(kind(diagram=masked)))}
+        assert {"Servo", "u", "y"} <= shown
+
+
+@pytest.mark.parametrize(
+    "name", ["JointServo", "ServoWithGearAndBrake", "a servo with its gear", "two_words_more"]
+)
+def test_a_mask_s_name_is_not_cut(name: str) -> None:
+    inner = DiagramBuilder(name)
+    stiffness = inner.parameter("K", 3.0, doc="stiffness")
+    inner.add("y", Outport(), inner.add("spring", Gain(gain=stiffness), inner.add("u", Inport())))
+    shown = [mark.text for mark in text_marks(block_picture(Subsystem(diagram=inner.build())))]
+    assert name.replace("_", " ") in " ".join(shown)
+
+
+def test_faces_show_formulas_that_are_short() -> None:
+    for text, shown in (("1/K", "1/K"), ("K*K*K*K*K*K*K*K*K*K", "5.9e4")):
+        block = Gain(gain=formula(text)).in_scope({"K": 3.0}, "spring")
+        assert shown in {mark.text for mark in text_marks(block_picture(block))}
+    constant = Constant(value=formula("[K 2]")).in_scope({"K": 3.0}, "spring")
+    assert "[K 2]" in {mark.text for mark in text_marks(block_picture(constant))}
+
+
+def test_a_run_shows_on_the_sinks_faces() -> None:
+    diagram = ab.load_diagram("kr180model")
+    result = ab.simulate(diagram)
+    texts = [mark.text for mark in text_marks(diagram_picture(diagram, result))]
+    assert {"−2.9493", "1.2547", "2.3479"} <= set(texts)
+
+
+def test_wires_that_find_no_way_are_still_drawn() -> None:
+    """Two blocks that touch leave the grid no room."""
+    left, right = (Obstacle(x, 0.0, 50.0, 50.0, (x, 52.0, 50.0, 16.0)) for x in (0.0, 55.0))
+    net = Net(WireEnd(50.0, 25.0, 1, 0), (WireEnd(55.0, 20.0, 1, 0),))
+    (wires,) = route([left, right], [net])
+    assert wires.paths[0][0] == (50.0, 25.0) and wires.paths[0][-1] == (55.0, 20.0)
+
+
+def test_an_empty_diagram_has_a_drawing() -> None:
+    assert "0 blocks." in diagram_picture(Diagram(name="empty", blocks={})).description
+
+
+def _on(point: tuple[float, float], path: tuple[tuple[float, float], ...]) -> bool:
+    x, y = point
+    return any(
+        min(ax, bx) - 1e-6 <= x <= max(ax, bx) + 1e-6 and min(ay, by) - 1e-6 <= y <= max(ay, by) + 1e-6
+        for (ax, ay), (bx, by) in itertools.pairwise(path)
+    )
+
+
+# -- ways that somebody has drawn, turned blocks, notes ------------------------------------------------------
+
+
+@pytest.mark.parametrize("rotation", [0, 90, 180, 270])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_every_block_can_be_turned_and_its_ports_stay_on_its_edge(rotation: int, flipped: bool) -> None:
+    for kind in BLOCKS.values():
+        block = example_block(kind)
+        upright = standing_box("b", block, Placement(x=30, y=40, flipped=flipped))
+        box = standing_box("b", block, Placement(x=30, y=40, flipped=flipped, rotation=rotation))
+        assert block_marks(box)
+        for was, spot, way in (
+            *((was, spot, -1) for was, spot in zip(upright.inputs, box.inputs)),
+            *((was, spot, 1) for was, spot in zip(upright.outputs, box.outputs)),
+        ):
+            dx, dy = was.dx, was.dy
+            for _ in range(rotation // 90):
+                dx, dy = -dy, dx
+            assert (spot.dx, spot.dy) == (dx, dy)
+            edge = {
+                (-1, 0): spot.x - box.x,
+                (1, 0): box.x + box.width - spot.x,
+                (0, -1): spot.y - box.y,
+                (0, 1): box.y + box.height - spot.y,
+            }[way * dx, way * dy]
+            assert abs(edge) < 1e-9
+
+
+def test_a_drawn_way_is_kept_and_branches_leave_it() -> None:
+    source, near, far = WireEnd(0, 0, 1, 0), WireEnd(200, 0, 1, 0), WireEnd(200, 100, 1, 0)
+    bends = (60.0, 50.0, 120.0)
+    path = bent(source, bends, far)
+    assert path == ((0, 0), (60, 0), (60, 50), (120, 50), (120, 100), (200, 100))
+    (laid,) = route([], [Net(source, (near, far), ((), bends))])
+    assert laid.paths[1] == path
+    assert laid.paths[0][0] in ((0, 0), (60, 0))
+    assert laid.dots == ((60, 0),)
+    # Where the block is turned the way no longer leads into its port, and is chosen anew.
+    assert bent(source, bends, WireEnd(200, 100, 0, 1)) is None
+    assert bent(source, (), far) is None
+
+
+def test_notes_stand_on_the_drawing_line_by_line() -> None:
+    builder = DiagramBuilder("noted")
+    builder.add("clock", BLOCKS["Clock"]())
+    builder.place("clock", 0, 0)
+    builder.note("/1", Note(x=0, y=120, text="what it shows\nand why"))
+    texts = {mark.text: mark for mark in text_marks(diagram_picture(builder.draft()))}
+    assert texts["and why"].y - texts["what it shows"].y == 17
