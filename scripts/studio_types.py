@@ -13,10 +13,10 @@ import tempfile
 from pathlib import Path
 
 from armblocks.pictures.style import FONT_STACK, MONO_STACK, PALETTE
-from armblocks.studio.schema import message_schema
+from armblocks.studio.protocol.schema import message_schema
 
 FRONTEND = Path(__file__).resolve().parent.parent / "frontend"
-BANNER = "/* Made from src/armblocks/studio/messages.py by scripts/studio_types.py: do not edit. */"
+BANNER = "/* Made from src/armblocks/studio/protocol/messages.py by scripts/studio_types.py: do not edit. */"
 
 
 def types() -> str:

@@ -1,4 +1,4 @@
-/* Made from src/armblocks/studio/messages.py by scripts/studio_types.py: do not edit. */
+/* Made from src/armblocks/studio/protocol/messages.py by scripts/studio_types.py: do not edit. */
 
 export interface Messages {
   envelope: Envelope;

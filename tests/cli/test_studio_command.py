@@ -53,11 +53,11 @@ def test_a_model_that_is_not_there(refused: Refused) -> None:
 
 def test_an_installation_without_the_page(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> Path:
-        from armblocks.studio import server
+        from armblocks.studio.server import web_app as server
 
         return server.built_page(Path("nowhere"))
 
-    monkeypatch.setattr("armblocks.studio.launch.built_page", missing)
+    monkeypatch.setattr("armblocks.studio.server.launch.built_page", missing)
     text = said(refused("studio", "--no-browser"))
     assert "this installation has no studio page" in text
     assert "install Node.js" in text

@@ -39,6 +39,6 @@ def test_data_files_are_written_without_pandas() -> None:
 
 
 def test_the_page_of_the_studio_is_served_before_anything_heavy_is_imported() -> None:
-    loaded = loaded_by("import armblocks.studio.launch")
+    loaded = loaded_by("import armblocks.studio.server.launch")
     assert "starlette" in loaded
     assert loaded & (HEAVY - {"starlette"} | BEHIND_THE_PAGE) == set()

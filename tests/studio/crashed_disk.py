@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from armblocks.formats import load_robot
-from armblocks.studio.open_documents import OpenDocuments
-from armblocks.studio.open_robots import OpenRobots
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.state_folder import StateFolder
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.robots.open_robots import OpenRobots
+from armblocks.studio.sheet.open_documents import OpenDocuments
 
 
 class Disk:

@@ -8,9 +8,9 @@ from typing import Any
 
 from armblocks.diagram import Diagram, DiagramBlock, ParameterKind
 from armblocks.formats import load_robot
-from armblocks.studio import edit_messages as do
-from armblocks.studio.clipping import clipped
-from armblocks.studio.document import Document
+from armblocks.studio.protocol import edit_messages as do
+from armblocks.studio.sheet.clipping import clipped
+from armblocks.studio.sheet.document import Document
 
 TYPES = ("Gain", "Integrator", "Sum", "Scope", "Constant", "SineWave", "Mux")
 NEW_NAMES = tuple(f"new {k}" for k in range(12))

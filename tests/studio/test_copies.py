@@ -14,10 +14,17 @@ from armblocks.blocks import BLOCKS, Gain
 from armblocks.diagram import Diagram, Note, diagram_difference, formula, mask_parameter
 from armblocks.errors import DiagramError, FormatError, InputError
 from armblocks.formats import diagram_from_bytes, load_diagram, load_robot
-from armblocks.studio.clipping import clipped
-from armblocks.studio.document import Document
-from armblocks.studio.edit_messages import BendWires, MoveBlocks, PasteBlocks, Place, RemoveBlocks, Wire
-from armblocks.studio.placing import placed
+from armblocks.studio.protocol.edit_messages import (
+    BendWires,
+    MoveBlocks,
+    PasteBlocks,
+    Place,
+    RemoveBlocks,
+    Wire,
+)
+from armblocks.studio.sheet.clipping import clipped
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.placing import placed
 
 EXAMPLES = ("kr180model", "puma560_servos", "puma560_payload_drop", "dc_motor_sampled_pid")
 

@@ -14,8 +14,8 @@ from run_frames import read_frame
 from armblocks.blocks import BLOCKS
 from armblocks.face.model import CompiledDiagram
 from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio import run_worker
-from armblocks.studio.frames import sample_frame, thinned
+from armblocks.studio.protocol.frames import sample_frame, thinned
+from armblocks.studio.runs import worker as run_worker
 
 Array = Any
 

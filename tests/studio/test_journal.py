@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from armblocks.errors import FormatError
-from armblocks.studio import journal as journal_module
-from armblocks.studio.journal import Journal, in_use, read_journal
+from armblocks.studio.documents import journal as journal_module
+from armblocks.studio.documents.journal import Journal, in_use, read_journal
 
 RECORDS = [{"edit": k, "text": "ä\n" * k} for k in range(6)]
 

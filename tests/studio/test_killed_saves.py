@@ -13,14 +13,14 @@ from time import sleep
 import pytest
 
 from armblocks.errors import FormatError
-from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.documents.project_folder import ProjectFolder
 
 TRIALS = int(os.environ.get("ARMBLOCKS_KILLED_SAVES", "12"))
 """500 for the long version."""
 SIZE = 4 * 2**20
 SAVE_WITHOUT_END = """
 import sys
-from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.documents.project_folder import ProjectFolder
 folder = ProjectFolder(sys.argv[1])
 number = int(sys.argv[2])
 while True:

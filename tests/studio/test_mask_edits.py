@@ -17,10 +17,10 @@ from armblocks.diagram import Diagram, DiagramBlock, DiagramBuilder, formula
 from armblocks.diagram.expression_language import Formula
 from armblocks.errors import ArmblocksError, DiagramError, InputError, UnknownNameError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio.document import Document
-from armblocks.studio.edit_messages import BreakLink, MaskParameter, SetMask, SetParameters
-from armblocks.studio.mask_edits import mask_of, renamed_in
-from armblocks.studio.placing import placed
+from armblocks.studio.protocol.edit_messages import BreakLink, MaskParameter, SetMask, SetParameters
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.mask_edits import mask_of, renamed_in
+from armblocks.studio.sheet.placing import placed
 
 
 def spring() -> Diagram:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from armblocks.errors import ArmblocksError
-from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.documents.project_folder import ProjectFolder
 
 
 @pytest.fixture

@@ -13,11 +13,18 @@ from crashed_disk import Disk, going
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
-from armblocks.studio import messages as say
-from armblocks.studio import open_files
-from armblocks.studio.document import Document
-from armblocks.studio.edit_messages import AddBlocks, Edit, MoveBlocks, NewBlock, Place, SetParameters
-from armblocks.studio.open_documents import OpenDocument, OpenDocuments
+from armblocks.studio.documents import open_files
+from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.edit_messages import (
+    AddBlocks,
+    Edit,
+    MoveBlocks,
+    NewBlock,
+    Place,
+    SetParameters,
+)
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments
 
 
 @pytest.fixture

@@ -17,10 +17,10 @@ from numpy.testing import assert_allclose
 import armblocks as ab
 from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats import DocumentKind, kind_of_data, load_robot, read_robots, write_robot
-from armblocks.studio.hub import Hub, Page
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.robot_messages import MOST_DROPPED
-from armblocks.studio.robot_readings import readings, singularity
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.robot_messages import MOST_DROPPED
+from armblocks.studio.robots.readings import readings, singularity
+from armblocks.studio.server.hub import Hub, Page
 
 PRINTED = Path(__file__).parents[1] / "formats" / "kr180_as_printed.m"
 

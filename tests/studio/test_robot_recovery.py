@@ -11,11 +11,11 @@ from crashed_disk import Disk, going
 
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
-from armblocks.studio import messages as say
-from armblocks.studio import open_files
-from armblocks.studio import robot_messages as say_robot
-from armblocks.studio.open_robots import OpenRobot, OpenRobots
-from armblocks.studio.robot_edits import SetCell
+from armblocks.studio.documents import open_files
+from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol import robot_messages as say_robot
+from armblocks.studio.robots.edits import SetCell
+from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
 
 
 @pytest.fixture

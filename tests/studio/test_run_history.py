@@ -14,11 +14,11 @@ from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError
 from armblocks.face.model import CompiledDiagram
 from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio import run_messages as say
-from armblocks.studio.run_history import RunHistory
-from armblocks.studio.run_process import RunProcess
-from armblocks.studio.tunables import tunables
-from armblocks.studio.workers import Worker
+from armblocks.studio.protocol import run_messages as say
+from armblocks.studio.runs.history import RunHistory
+from armblocks.studio.runs.process import RunProcess
+from armblocks.studio.runs.tunables import tunables
+from armblocks.studio.runs.workers import Worker
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_going_back_changes_nothing_of_what_follows(name: str) -> None:
 
 
 def test_marks_stay_few_and_every_instant_can_still_be_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armblocks.studio.run_history.MOST_BYTES", 20_000)
+    monkeypatch.setattr("armblocks.studio.runs.history.MOST_BYTES", 20_000)
     history = RunHistory(CompiledDiagram(load_diagram("falling_pendulum", BLOCKS)))
     for _ in range(200):
         history.step()

@@ -12,7 +12,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import Diagram, DiagramBuilder
 from armblocks.errors import ArmblocksError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_robot
-from armblocks.studio.run_worker import begun
+from armblocks.studio.runs.worker import begun
 
 
 def open_input() -> Diagram:

@@ -7,7 +7,7 @@ from multiprocessing import Pipe
 import pytest
 
 from armblocks.errors import SimulationError
-from armblocks.studio import run_report
+from armblocks.studio.runs import report as run_report
 
 WAY_OUT = "shorten the run, or use 'armblocks run'"
 

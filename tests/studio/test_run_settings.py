@@ -8,8 +8,8 @@ import pytest
 
 from armblocks.equations import SimulationOptions
 from armblocks.errors import InputError, UnknownNameError
-from armblocks.studio.run_settings import setting_rules, solver_choices
-from armblocks.studio.typed_settings import setting_faults, with_settings
+from armblocks.studio.runs.settings import setting_rules, solver_choices
+from armblocks.studio.sheet.typed_settings import setting_faults, with_settings
 
 
 def test_every_option_of_a_run_has_its_field() -> None:

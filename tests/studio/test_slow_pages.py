@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from armblocks.studio import outbox as outbox_module
-from armblocks.studio.hub import Hub
-from armblocks.studio.outbox import Outbox
-from armblocks.studio.page import Page
-from armblocks.studio.project_folder import ProjectFolder
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.server import outbox as outbox_module
+from armblocks.studio.server.hub import Hub
+from armblocks.studio.server.outbox import Outbox
+from armblocks.studio.server.page import Page
 
 PATIENCE_SECONDS = 180.0
 

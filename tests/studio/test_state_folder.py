@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from armblocks.errors import FormatError
-from armblocks.studio import state_folder
-from armblocks.studio.state_folder import SESSION_SECONDS, StateFolder
+from armblocks.studio.documents import state_folder
+from armblocks.studio.documents.state_folder import SESSION_SECONDS, StateFolder
 
 
 @pytest.fixture

@@ -13,9 +13,7 @@ from armblocks.blocks import BLOCKS, Gain
 from armblocks.diagram import Diagram, DiagramBlock, Placement, diagram_views, formula, mask_parameter
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio.clipping import clipped
-from armblocks.studio.document import Document
-from armblocks.studio.edit_messages import (
+from armblocks.studio.protocol.edit_messages import (
     AddBlocks,
     BendWires,
     Connect,
@@ -37,12 +35,14 @@ from armblocks.studio.edit_messages import (
     Wire,
     summary,
 )
-from armblocks.studio.edits import applied
-from armblocks.studio.nesting import inside
-from armblocks.studio.outline import find, outline
-from armblocks.studio.parameter_values import parameter_value
-from armblocks.studio.placing import placed
-from armblocks.studio.sheet import sheet
+from armblocks.studio.sheet.clipping import clipped
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.edits import applied
+from armblocks.studio.sheet.nesting import inside
+from armblocks.studio.sheet.outline import find, outline
+from armblocks.studio.sheet.parameter_values import parameter_value
+from armblocks.studio.sheet.placing import placed
+from armblocks.studio.sheet.shown import sheet
 
 NAMES = ["sine", "gain", "scope", "Gain 2", "ä"]
 TYPES = ["SineWave", "Gain", "Scope", "Sum", "JTraj", "Integrator"]

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from starlette.routing import Mount, Route, WebSocketRoute
 
-from armblocks.studio.guard import Guard, Keys
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.server import HubToCome, studio_app
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.server.guard import Guard, Keys
+from armblocks.studio.server.web_app import HubToCome, studio_app
 
 HOST = "127.0.0.1:8642"
 ORIGIN = f"http://{HOST}"

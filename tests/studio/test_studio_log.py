@@ -14,8 +14,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from armblocks.studio.guard import Keys
-from armblocks.studio.terminal_log import log_settings
+from armblocks.studio.server.guard import Keys
+from armblocks.studio.server.terminal_log import log_settings
 from conftest import PATIENCE_MS, Studio
 from interruptible import killed_at_the_end
 
@@ -91,7 +91,7 @@ def test_what_breaks_is_said_with_its_place_and_without_words(capsys: pytest.Cap
         try:
             raise ValueError(CONTENT) from KeyError(CONTENT)
         except ValueError:
-            logging.getLogger("armblocks.studio.hub").exception("a request met a defect")
+            logging.getLogger("armblocks.studio.server.hub").exception("a request met a defect")
         logging.getLogger("uvicorn.error").warning("GET /login?key=%s %s %s", login, keys.session, keys.token)
     finally:
         root.handlers[:] = before

@@ -13,11 +13,11 @@ from armblocks.blocks import BLOCKS
 from armblocks.diagram import DiagramBlock
 from armblocks.errors import ArmblocksError, DiagramError, FormatError, InputError
 from armblocks.formats import load_diagram, load_robot
-from armblocks.studio.document import Document
-from armblocks.studio.edit_messages import BreakLink, SetParameters
-from armblocks.studio.placing import placed
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.sheet import sheet
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.edit_messages import BreakLink, SetParameters
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.placing import placed
+from armblocks.studio.sheet.shown import sheet
 
 
 @pytest.fixture

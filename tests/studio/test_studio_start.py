@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from armblocks.errors import FormatError
-from armblocks.studio import launch
-from armblocks.studio import server as studio_server
-from armblocks.studio.guard import Keys
-from armblocks.studio.hub import Hub
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.server import FOREVER, HubToCome, studio_app
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.server import launch
+from armblocks.studio.server import web_app as studio_server
+from armblocks.studio.server.guard import Keys
+from armblocks.studio.server.hub import Hub
+from armblocks.studio.server.web_app import FOREVER, HubToCome, studio_app
 
 HOST = "127.0.0.1:8642"
 
@@ -66,7 +66,7 @@ def test_the_page_is_there_while_the_hub_is_made(
         go_on.wait()
         return Hub(folder)
 
-    monkeypatch.setattr("armblocks.studio.hub.Hub", slow)
+    monkeypatch.setattr("armblocks.studio.server.hub.Hub", slow)
     hub = HubToCome(ProjectFolder(tmp_path))
     hub.begin()
     try:
@@ -93,7 +93,7 @@ def test_a_server_whose_hub_cannot_be_made_ends_with_the_reason(
     def broken(folder: ProjectFolder) -> Hub:
         raise FormatError("the shipped robots are missing", where=str(folder.root))
 
-    monkeypatch.setattr("armblocks.studio.hub.Hub", broken)
+    monkeypatch.setattr("armblocks.studio.server.hub.Hub", broken)
     monkeypatch.setattr(launch, "built_page", lambda: studio_server.built_page(web))
     with pytest.raises(FormatError, match="the shipped robots are missing"):
         launch.serve(tmp_path, "", port=0, open_browser=False, announce=lambda _: None)

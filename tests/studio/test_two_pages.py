@@ -11,10 +11,9 @@ import pytest
 from armblocks.diagram import Diagram
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import load_robot
-from armblocks.studio import messages as say
-from armblocks.studio.aspects import changed_aspects, clash
-from armblocks.studio.document import Document
-from armblocks.studio.edit_messages import (
+from armblocks.studio.documents.aspects import changed_aspects, clash
+from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.edit_messages import (
     AddBlocks,
     Connect,
     Edit,
@@ -27,7 +26,8 @@ from armblocks.studio.edit_messages import (
     SetParameters,
     Wire,
 )
-from armblocks.studio.sheet import sheet, sheet_change
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.shown import sheet, sheet_change
 
 HERE = Place(x=0, y=0)
 

@@ -17,11 +17,14 @@ from typing import Any
 import pytest
 
 from armblocks.errors import SimulationError
-from armblocks.studio import run_process, run_report, run_worker, workers
-from armblocks.studio.hub import Hub
-from armblocks.studio.page import Page
-from armblocks.studio.project_folder import ProjectFolder
-from armblocks.studio.run_history import RunHistory
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.runs import process as run_process
+from armblocks.studio.runs import report as run_report
+from armblocks.studio.runs import worker as run_worker
+from armblocks.studio.runs import workers
+from armblocks.studio.runs.history import RunHistory
+from armblocks.studio.server.hub import Hub
+from armblocks.studio.server.page import Page
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
 PATIENCE_SECONDS = 60.0
@@ -256,7 +259,7 @@ def test_a_run_whose_samples_find_no_room_on_the_disk_is_told(
     async def talking(talk: Talk) -> None:
         document = await talk.ask("open", example="falling_pendulum")
         with monkeypatch.context() as patch:
-            patch.setattr("armblocks.studio.run_record.tempfile.TemporaryFile", full)
+            patch.setattr("armblocks.studio.runs.record.tempfile.TemporaryFile", full)
             run = await talk.ask("run", document=document)
         told = await talk.until(run, "failed", "done")
         assert told["state"] == "failed"

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from armblocks.errors import SimulationError
-from armblocks.studio import workers
-from armblocks.studio.workers import Worker, Workers
+from armblocks.studio.runs import workers
+from armblocks.studio.runs.workers import Worker, Workers
 
 
 def with_workers(going: Callable[[Workers], Awaitable[None]]) -> None:

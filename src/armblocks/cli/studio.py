@@ -30,7 +30,7 @@ def studio(
 ) -> None:
     """Open the studio in the browser: build a diagram, run it, watch scopes and arm. Ctrl-C ends it."""
     from armblocks.formats import list_examples
-    from armblocks.studio.launch import serve
+    from armblocks.studio.server.launch import serve
 
     root = folder or Path.cwd()
     if model and model not in list_examples():

@@ -21,8 +21,8 @@ from armblocks.face.arm import Arm
 from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult
-from armblocks.studio.frames import sample_frame
-from armblocks.studio.robot_scene import link_frames_of, scene_of
+from armblocks.studio.protocol.frames import sample_frame
+from armblocks.studio.robots.scene import link_frames_of, scene_of
 
 if TYPE_CHECKING:
     from anywidget import AnyWidget
@@ -122,7 +122,7 @@ def _widget(title: str, height: int, shown: dict[str, Any], frame: bytes) -> Any
 @cache
 def _page() -> str:
     """The frame's page: one document with its script and its styles inside."""
-    from armblocks.studio.server import built_page  # the server's libraries are slow to import
+    from armblocks.studio.server.web_app import built_page  # the server's libraries are slow to import
 
     folder = built_page() / "notebook"
     script = (folder / "frame.js").read_text(encoding="utf-8").replace("</script", "<\\/script")

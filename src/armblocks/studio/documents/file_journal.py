@@ -1,0 +1,299 @@
+"""What the journal of a drawing or a robot says, and what it gives back.
+
+Records, one JSON object each; ``version`` is the one after it, ``at`` when it was made (s since 1970):
+
+``head``
+    The first: key, path and origin, what was on the disk, and ``armblocks`` that wrote it.
+``whole``
+    The whole canonical drawing or robot of a version: before the first edit, and every
+    :data:`SNAPSHOT_EVERY` edits. It is written when it is ready, which may be some edits later.
+``perform``
+    A request of a page that was carried out, as it came; ``continued`` where it went on with the step before.
+``replace``
+    Another drawing or robot in the place of this one, as one step.
+``saved``
+    The path, and which version the file holds from then on.
+``kept``
+    The file holds something else, or is gone, and this one is to stay.
+
+An edit is a pure function of what is edited and the request, so all follows from a snapshot and the requests
+after it. The latest snapshot is taken after which no version is missing and every undo finds its step; where
+an undo would find none, a snapshot is written in its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from time import time
+from typing import Any, Generic
+
+from pydantic import ValidationError
+
+from armblocks.errors import ArmblocksError, FormatError
+from armblocks.studio.documents.file_kind import EditedT, FileKind
+from armblocks.studio.documents.journal import Journal, Record, read_journal
+from armblocks.studio.documents.project_folder import Fingerprint
+from armblocks.studio.protocol.alteration import Alteration
+
+SNAPSHOT_EVERY = 200
+
+
+@dataclass(kw_only=True)
+class JournaledFile(Generic[EditedT]):
+    """A drawing or a robot as its journal gives it back, and the journal's file."""
+
+    key: str
+    document: EditedT
+    path: str | None
+    origin: str
+    on_disk: Fingerprint | None
+    journal_path: Path
+    whole: int
+    """Bytes of the journal that could be read."""
+    began: float
+    last: float
+    edits: int
+    keys: list[str] = field(default_factory=list[str])
+    """Keys of the requests that were carried out."""
+    missing: str = ""
+    """What could not be given back; ``""`` if nothing."""
+
+
+class FileJournal:
+    """Writes the journal of one drawing or robot. Raises ``OSError`` as the disk does."""
+
+    def __init__(self, journal: Journal, kind: FileKind[Any, Any]) -> None:
+        self._journal = journal
+        self._kind = kind
+        self.since_snapshot = 0
+        self._past = self._future = 0
+
+    @classmethod
+    def begin(
+        cls,
+        path: Path,
+        kind: FileKind[Any, Any],
+        *,
+        key: str,
+        file: str | None,
+        origin: str,
+        on_disk: Fingerprint | None,
+    ) -> FileJournal:
+        """A new journal; what is edited itself has to follow (:meth:`begin_from`)."""
+        made = cls(Journal(path), kind)
+        head = {"key": key, "path": file, "origin": origin, "on_disk": _said(on_disk)}
+        made._journal.append({"head": {**head, "armblocks": version("armblocks")}, "at": _now()})
+        return made
+
+    @classmethod
+    def go_on(cls, found: JournaledFile[Any], kind: FileKind[Any, Any]) -> FileJournal:
+        """Write on in the journal of what it gave back."""
+        return cls(Journal(found.journal_path, whole=found.whole), kind)
+
+    def begin_from(self, value: Any, number: int, done: str = "") -> None:
+        """Add what everything after it begins from: there is none yet, or records are missing.
+
+        ``done``: the key of the request that made it so.
+        """
+        self.snapshot(self._kind.to_text(value), number, done)
+        self.since_snapshot = self._past = self._future = 0
+
+    def snapshot(self, text: str, number: int, done: str = "") -> None:
+        """Add the whole of a version, as text."""
+        self._journal.append({"whole": text, "version": number, "at": _now(), "done": done})
+
+    def performed(self, request: Alteration, number: int, after: Any, *, continued: bool = False) -> None:
+        """Add a request that was carried out."""
+        does = "continue" if continued else request.does
+        past, future = _counted(does, self._past, self._future)
+        if past < 0 or future < 0:
+            self.begin_from(after, number, request.key)
+            return
+        self._past, self._future = past, future
+        said = request.model_dump(mode="json", exclude={"document", "robot", "base"})
+        self._journal.append({"perform": said, "does": does, "version": number, "at": _now()})
+        self.since_snapshot += 1
+
+    def replaced(self, title: str, value: Any, number: int) -> None:
+        """Add that something else has taken the place of this."""
+        self._past, self._future = _counted("change", self._past, self._future)
+        text = self._kind.to_text(value)
+        self._journal.append({"replace": text, "title": title, "version": number, "at": _now()})
+
+    def kept(self, number: int) -> None:
+        """Add that what is edited stays, though its file holds something else."""
+        self._journal.append({"kept": True, "version": number, "at": _now()})
+
+    def saved(self, path: str, of: int, number: int, on_disk: Fingerprint | None) -> None:
+        """Add that the file of this path holds version ``of``."""
+        record = {"saved": path, "of": of, "on_disk": _said(on_disk)}
+        self._journal.append({**record, "version": number, "at": _now()})
+
+    def sync(self) -> None:
+        """Return when the disk has everything; may be called from another thread."""
+        self._journal.sync()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there is something that the disk may not have."""
+        return self._journal.waiting
+
+    def close(self, *, keep: bool) -> None:
+        """End the journal; ``keep`` leaves it for a recovery."""
+        self._journal.close(keep=keep)
+
+
+def journaled_file(path: Path, kind: FileKind[Any, EditedT]) -> JournaledFile[EditedT]:
+    """What a journal gives back, as far as it can be carried out.
+
+    Raises ``FormatError`` where the journal does not say even one whole drawing or robot.
+    """
+    records, whole = read_journal(path)
+    try:
+        return _replayed(records, path, whole, kind)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FormatError(
+            "this is no journal of the studio", where=str(path), fix="open the drawing's own file"
+        ) from error
+
+
+def _replayed(
+    records: Sequence[Record], path: Path, whole: int, kind: FileKind[Any, EditedT]
+) -> JournaledFile[EditedT]:
+    head = records[0]["head"]
+    number, text = _snapshot(records, str(path))
+    found = JournaledFile(
+        key=str(head["key"]),
+        document=kind.edited(kind.from_text(text, path.name), number),
+        path=head["path"],
+        origin=head["origin"],
+        on_disk=_fingerprint(head["on_disk"]),
+        journal_path=path,
+        whole=whole,
+        began=records[0]["at"],
+        last=records[-1]["at"],
+        edits=0,
+    )
+    _Replay(found, kind, first=not any("saved" in r for r in records)).run(records)
+    return found
+
+
+def _snapshot(records: Sequence[Record], where: str) -> tuple[int, str]:
+    """The latest snapshot after which no undo reaches further back than it."""
+    found = [(record["version"], record["whole"]) for record in records if "whole" in record]
+    if not found:
+        raise FormatError("the journal holds no whole drawing", where=where, fix="it can be deleted")
+    for number, text in sorted(found, reverse=True):
+        if _follows(records, number):
+            return number, text
+    return max(found)
+
+
+def _follows(records: Sequence[Record], number: int) -> bool:
+    """Whether all after a version can be repeated: no version is missing, no undo reaches back of it."""
+    past = future = 0
+    for record in records:
+        if record.get("version", 0) <= number or "whole" in record or "kept" in record:
+            continue
+        if record["version"] != number + 1:
+            return False
+        number += 1
+        if "saved" not in record:  # saved under another name, which is a version of its own
+            past, future = _counted(record.get("does", "change"), past, future)
+        if past < 0 or future < 0:
+            return False
+    return True
+
+
+def _counted(does: str, past: int, future: int) -> tuple[int, int]:
+    """How many steps there are to undo and to redo afterwards; negative where it needs one more."""
+    match does:
+        case "undo":
+            return past - 1, future + 1
+        case "redo":
+            return past + 1, future - 1
+        case "continue":
+            return past or -1, future
+        case _:
+            return past + 1, 0
+
+
+class _Replay(Generic[EditedT]):
+    def __init__(self, found: JournaledFile[EditedT], kind: FileKind[Any, EditedT], *, first: bool) -> None:
+        self._found = found
+        self._kind = kind
+        self._start = found.document.version
+        # What a snapshot shows is what the file holds only before the first edit.
+        if not first or self._start > 0:
+            found.document.saved = None
+        self._values = {self._start: found.document.value}
+
+    def run(self, records: Sequence[Record]) -> None:
+        """Carry out what the records say, until one cannot be."""
+        found = self._found
+        for place, record in enumerate(records):
+            number = int(record.get("version", 0))
+            if "perform" in record:
+                found.keys.append(record["perform"]["key"])
+            if record.get("done"):
+                found.keys.append(record["done"])
+            if "saved" in record:
+                self._save(record, number)
+            elif "kept" in record and number >= self._start:
+                found.document.saved = None
+            elif number > self._start and ("perform" in record or "replace" in record):
+                try:
+                    self._step(record)
+                except Exception as error:  # also a defect: what was before it is given back
+                    lost = sum(1 for later in records[place:] if "perform" in later)
+                    what = error.what if isinstance(error, ArmblocksError) else _why(error)
+                    found.missing = f"the last {lost} edits could not be repeated: {what}"
+                    break
+                self._values[found.document.version] = found.document.value
+            found.edits += "perform" in record
+            if found.edits == 1 and "perform" in record:
+                found.began = record["at"]
+
+    def _step(self, record: Record) -> None:
+        document = self._found.document
+        if "perform" in record:
+            document.perform(self._kind.request(record["perform"]))
+            return
+        document.replace(record["title"], self._kind.from_text(record["replace"], "journal"))
+
+    def _save(self, record: Record, number: int) -> None:
+        found = self._found
+        found.path, found.on_disk = record["saved"], _fingerprint(record["on_disk"])
+        found.edits = 0
+        if number < self._start:
+            return
+        holds = self._values.get(record["of"])
+        name = Path(record["saved"]).stem
+        if holds is None:
+            found.document.saved = None
+        elif number > found.document.version:
+            found.document.written(holds, name)
+        else:
+            found.document.saved = holds
+        self._values[found.document.version] = found.document.value
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        return "it is not understood"
+    return f"armblocks has a defect ({type(error).__name__})"
+
+
+def _said(fingerprint: Fingerprint | None) -> dict[str, Any] | None:
+    return None if fingerprint is None else fingerprint.said()
+
+
+def _fingerprint(said: dict[str, Any] | None) -> Fingerprint | None:
+    return None if said is None else Fingerprint(**said)
+
+
+def _now() -> float:
+    return round(time(), 1)

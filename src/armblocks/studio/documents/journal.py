@@ -1,0 +1,174 @@
+"""What is typed is not lost: an append-only record of a drawing or a robot beside its last save.
+
+One file for each of them that was edited, in the studio's own folder and not in the project. A record is a
+line of JSON behind its length and CRC-32, so that a record torn by a crash is recognised and left out::
+
+    <length> <crc32> {"change": …}\n
+
+What the records mean is the matter of :mod:`armblocks.studio.documents.file_journal`; here they are written,
+brought to the disk and read again. While a journal is open its file is locked: another studio that finds it
+leaves it alone, and the lock of one that was killed is gone with it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from armblocks.errors import FormatError
+from armblocks.files import sync_folder
+
+SYNC_SECONDS = 1.0
+"""Whoever appends sees to it that :meth:`Journal.sync` is called within this time."""
+MOST_BYTES = 256 * 2**20
+"""A journal larger than this is not read back."""
+Record = Mapping[str, Any]
+
+
+class Journal:
+    """The open journal of one drawing or robot. Raises ``OSError`` as the disk does."""
+
+    def __init__(self, path: Path, *, whole: int = 0) -> None:
+        """Open the file at ``path``; its first ``whole`` bytes are kept and the rest is cut off."""
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self.path = path
+        self.size = whole
+        self._named = path.exists()
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o600)
+        self._waiting = False
+        self._using = Lock()
+        if not _locked(self._file):
+            os.close(self._file)
+            raise BlockingIOError(f"{path} is the journal of another studio")
+        os.ftruncate(self._file, whole)
+        os.lseek(self._file, whole, os.SEEK_SET)
+
+    def append(self, record: Record) -> None:
+        """Add a record; the disk has it after the next :meth:`sync`. What could not be written whole is cut
+        off again, so that the records after it can be read."""
+        line = _line(record)
+        try:
+            rest = memoryview(line)
+            while rest:
+                rest = rest[os.write(self._file, rest) :]
+        except OSError:
+            os.ftruncate(self._file, self.size)
+            os.lseek(self._file, self.size, os.SEEK_SET)
+            raise
+        self.size += len(line)
+        self._waiting = True
+
+    def sync(self) -> None:
+        """Return when the disk has every record; may be called from another thread."""
+        with self._using:
+            if self._waiting and self._file >= 0:
+                self._waiting = False
+                os.fsync(self._file)
+                if not self._named:
+                    sync_folder(self.path.parent)
+                    self._named = True
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there are records that the disk may not have."""
+        return self._waiting
+
+    def close(self, *, keep: bool) -> None:
+        """End the journal; ``keep`` leaves it for a recovery."""
+        try:
+            if keep:
+                self.sync()
+        finally:
+            with self._using:
+                os.close(self._file)
+                self._file = -1
+            if not keep:
+                self.path.unlink(missing_ok=True)
+
+
+def read_journal(path: Path) -> tuple[list[Record], int]:
+    """The records of a journal up to the first torn one, and how many bytes they are.
+
+    Raises ``FormatError`` if not even the first is whole.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise FormatError(
+                "the journal is too large",
+                where=str(path),
+                allowed=f"{MOST_BYTES} bytes",
+                fix="save the drawing, which starts another journal",
+            )
+        data = path.read_bytes()
+    except OSError as error:
+        raise FormatError(
+            f"the journal cannot be read ({error.strerror})",
+            where=str(path),
+            fix="check the rights of the file, or open the drawing's own file",
+        ) from error
+    records: list[Record] = []
+    whole = 0
+    for record, end in _records(data):
+        records.append(record)
+        whole = end
+    if not records:
+        raise FormatError("the journal holds no whole record", where=str(path), fix="it can be deleted")
+    return records, whole
+
+
+def in_use(path: Path) -> bool:
+    """Whether a studio has this journal open."""
+    try:
+        descriptor = os.open(path, os.O_RDWR)
+    except OSError:
+        return False
+    try:
+        return not _locked(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock an open file until it is closed; ``False`` if somebody else has."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            # A byte far behind the records: a lock of Windows forbids reading what it covers.
+            os.lseek(descriptor, 2**40, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _line(record: Record) -> bytes:
+    text = json.dumps(record, separators=(",", ":"), ensure_ascii=False).encode()
+    return b"%d %08x %s\n" % (len(text), zlib.crc32(text), text)
+
+
+def _records(data: bytes) -> Iterator[tuple[Record, int]]:
+    """Each whole record with the position behind it."""
+    position = 0
+    while position < len(data):
+        length, first, rest = data[position : position + 40].partition(b" ")
+        checksum, second, _ = rest.partition(b" ")
+        start = position + len(length) + len(checksum) + 2
+        if not (first and second and length.isdigit()):
+            return
+        text = data[start : start + int(length)]
+        whole = len(text) == int(length) and data[start + len(text) : start + len(text) + 1] == b"\n"
+        if not whole or b"%08x" % zlib.crc32(text) != checksum:
+            return
+        position = start + len(text) + 1
+        yield json.loads(text), position

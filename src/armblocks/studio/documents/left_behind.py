@@ -1,0 +1,104 @@
+"""Journals that earlier servers left: what they give back waits until somebody wants it, or wants it gone."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from armblocks.errors import ArmblocksError, UnknownNameError
+from armblocks.studio.documents.file_journal import JournaledFile, journaled_file
+from armblocks.studio.documents.file_kind import FileKind
+from armblocks.studio.documents.journal import in_use
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol import messages as say
+
+
+class LeftBehind:
+    """The drawings or the robots of one project folder that can be recovered, by key."""
+
+    def __init__(self, folder: ProjectFolder, journals: Path, kind: FileKind[Any, Any]) -> None:
+        self._folder = folder
+        self._kind = kind
+        self._read: dict[str, JournaledFile[Any]] = {}
+        self._unread: dict[str, Path] = {}
+        """Journals that could not be read, by what names them to pages."""
+        for path in sorted(journals.glob(f"*.{kind.name}")):
+            if in_use(path):  # of another server that still runs
+                continue
+            try:
+                found = journaled_file(path, kind)
+                self._read[found.key] = found
+            except (ArmblocksError, OSError):
+                self._unread[path.stem] = path
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._read or key in self._unread
+
+    def offers(self) -> list[say.Recovery]:
+        """What pages are told of what was not saved."""
+        found = [self._offer(entry) for entry in self._read.values() if entry.document.dirty]
+        return [*found, *(self._unread_offer(key, path) for key, path in self._unread.items())]
+
+    def take(self, key: str) -> JournaledFile[Any]:
+        """What a journal gives back, which waits no more.
+
+        One that could not be read is read again: what it lacked may be there now. Raises
+        ``UnknownNameError``, and ``ArmblocksError`` where it still cannot be read.
+        """
+        self._known(key)
+        if key in self._unread:
+            found = journaled_file(self._unread[key], self._kind)
+            del self._unread[key]
+            return found
+        return self._read.pop(key)
+
+    def discard(self, key: str) -> None:
+        """Delete a journal; raises ``UnknownNameError``."""
+        self._known(key)
+        path = self._read[key].journal_path if key in self._read else self._unread[key]
+        path.unlink(missing_ok=True)
+        self._read.pop(key, None)
+        self._unread.pop(key, None)
+
+    def end(self) -> None:
+        """The studio ends: journals of what is saved go."""
+        for entry in self._read.values():
+            if not entry.document.dirty:
+                with contextlib.suppress(OSError):
+                    entry.journal_path.unlink(missing_ok=True)
+
+    def _known(self, key: str) -> None:
+        if key not in self:
+            raise UnknownNameError(f"{self._kind.name} to recover", key, [*self._read, *self._unread])
+
+    def _offer(self, found: JournaledFile[Any]) -> say.Recovery:
+        disk = self._folder.compared(found.path, found.on_disk)[0] if found.path else "same"
+        return say.Recovery(
+            holds=self._kind.name,
+            document=found.key,
+            title=found.document.value.name,
+            path=found.path,
+            began=found.began,
+            last=found.last,
+            edits=found.edits,
+            parts=self._kind.parts(found.document.value),
+            disk=disk,
+            missing=found.missing,
+        )
+
+    def _unread_offer(self, key: str, path: Path) -> say.Recovery:
+        """What is told of a journal that cannot be read."""
+        last = path.stat().st_mtime if path.exists() else 0.0
+        return say.Recovery(
+            holds=self._kind.name,
+            document=key,
+            title=key,
+            path=None,
+            began=last,
+            last=last,
+            edits=0,
+            parts=0,
+            disk="same",
+            missing="its journal cannot be read: open it to see why",
+        )

@@ -1,0 +1,437 @@
+"""The drawings or the robots that a studio has open: where each comes from, its file, its journal.
+
+Nothing that was edited is lost: every change is in the journal before it is answered, and on the disk within
+:data:`~armblocks.studio.documents.journal.SYNC_SECONDS`. Nothing is overwritten silently: a file that
+somebody else has written is noticed, and what a journal gives back is offered, not put in the file's place.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import secrets
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterator
+from datetime import datetime
+from pathlib import PurePosixPath
+from typing import Any, Generic, TypeVar
+
+from armblocks.errors import FormatError, InputError, UnknownNameError
+from armblocks.studio.documents.file_journal import SNAPSHOT_EVERY, FileJournal, JournaledFile
+from armblocks.studio.documents.file_kind import EditedT, FileKind
+from armblocks.studio.documents.journal import SYNC_SECONDS
+from armblocks.studio.documents.left_behind import LeftBehind
+from armblocks.studio.documents.project_folder import Disk, Fingerprint, ProjectFolder
+from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.alteration import Alteration
+
+MOST_OPEN = 100
+MOST_KEYS = 1000
+"""Keys of requests that are remembered, so that one sent twice is done once."""
+LOOK_SECONDS = 1.0
+"""How often the files are looked at."""
+
+
+@dataclasses.dataclass(eq=False, kw_only=True)
+class OpenFile(Generic[EditedT]):
+    """Something that is edited, with its file and its journal."""
+
+    key: str
+    document: EditedT
+    path: str | None = None
+    origin: str = ""
+    """The shipped example or robot that it began as."""
+    on_disk: Fingerprint | None = None
+    disk: Disk = "same"
+    seen: deque[str] = dataclasses.field(default_factory=lambda: deque(maxlen=MOST_KEYS))
+    journal: FileJournal | None = None
+    journaled: bool = True
+    behind: bool = False
+    """Whether the journal lacks something that has happened."""
+    syncing: asyncio.Task[None] | None = None
+    snapshot: asyncio.Task[None] | None = None
+    saving: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
+
+    def leave(self) -> None:
+        """It is put away: what would be done about it later is not."""
+        for task in (self.syncing, self.snapshot):
+            if task is not None:
+                task.cancel()
+
+
+OpenedT = TypeVar("OpenedT", bound=OpenFile[Any])
+
+
+class OpenFiles(ABC, Generic[OpenedT]):
+    """What is open of one kind in one project folder, by key. Used on one event loop."""
+
+    def __init__(self, folder: ProjectFolder, kept: StateFolder, kind: FileKind[Any, Any]) -> None:
+        self.folder = folder
+        self.kept = kept
+        self.kind = kind
+        self._open: dict[str, OpenedT] = {}
+        self._same: dict[str, str] = {}
+        """Keys under which a page of an earlier server knows what is open under another."""
+        self.left = LeftBehind(folder, kept.journals, kind)
+        self._tell: Callable[[OpenedT], Awaitable[None]] | None = None
+
+    @abstractmethod
+    def _made(self, key: str, document: Any) -> OpenedT:
+        """Something that is open from now on."""
+
+    def __iter__(self) -> Iterator[OpenedT]:
+        return iter(list(self._open.values()))
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def __contains__(self, key: str) -> bool:
+        return self._same.get(key, key) in self._open
+
+    def __getitem__(self, key: str) -> OpenedT:
+        """What is open under this key; raises ``UnknownNameError``."""
+        key = self._same.get(key, key)
+        if key not in self._open:
+            raise UnknownNameError(f"open {self.kind.name}", key, self._open)
+        return self._open[key]
+
+    # -- opening and putting away ----------------------------------------------------------------------------
+
+    def open_path(self, path: str, key: str = "") -> OpenedT:
+        """What a file holds, which is read where it is not open yet."""
+        place = self.folder.path(path)
+        path = place.relative_to(self.folder.root).as_posix()
+        for found in self:
+            if found.path == path:
+                return found
+        data, on_disk = self.folder.read_known(path)
+        value = self.kind.from_file(data, place)
+        self.kept.use(path)
+        return self.add(value, path=path, on_disk=on_disk, key=key)
+
+    def open_shipped(self, name: str, key: str = "") -> OpenedT:
+        """A new one that begins as a shipped one."""
+        return self.add(self.kind.shipped(name), origin=name, key=key)
+
+    def new(self, key: str = "") -> OpenedT:
+        """One that begins as new ones do."""
+        return self.add(self.kind.new(), key=key)
+
+    def attach(self, key: str, path: str | None = None, origin: str = "") -> OpenedT:
+        """What a page showed before, see :class:`~armblocks.studio.protocol.messages.Attach`."""
+        with contextlib.suppress(UnknownNameError):
+            return self[key]
+        if key in self.left:
+            return self._restore(self.left.take(key))
+        if path:
+            found = self.open_path(path, key)
+        else:
+            found = self.open_shipped(origin, key) if origin else self.new(key)
+        if found.key != key:
+            self._same[key] = found.key
+        return found
+
+    def add(
+        self,
+        value: Any,
+        *,
+        path: str | None = None,
+        origin: str = "",
+        on_disk: Fingerprint | None = None,
+        key: str = "",
+    ) -> OpenedT:
+        """Something new that is open, under a key of its own unless one is given."""
+        found = self._add(self.kind.edited(value), key or secrets.token_hex(8))
+        found.path, found.origin, found.on_disk = path, origin, on_disk
+        return found
+
+    def close(self, found: OpenedT, *, discard: bool) -> None:
+        """Put one away; raises ``InputError`` where edits would be lost without a word."""
+        if found.document.dirty and not discard:
+            raise InputError(
+                f"'{found.document.value.name}' has edits that no file holds",
+                where=f"the {found.document.noun}",
+                allowed="to save it, or to discard the edits",
+                fix="choose one of the two",
+            )
+        self._put_away(found, keep=False)
+
+    def end(self) -> None:
+        """The studio ends: journals of what is not saved stay, the others go."""
+        for found in self:
+            with contextlib.suppress(OSError):
+                self._put_away(found, keep=found.document.dirty)
+        self.left.end()
+
+    def _put_away(self, found: OpenedT, *, keep: bool) -> None:
+        del self._open[found.key]
+        found.leave()
+        if found.journal is not None:
+            found.journal.close(keep=keep)
+
+    def bring(self, value: Any) -> OpenedT:
+        """Something from elsewhere: no file of the project holds it, so the journal does from the first."""
+        found = self.add(value)
+        self._hold(found)
+        return found
+
+    def _add(self, document: Any, key: str) -> OpenedT:
+        if len(self._open) >= MOST_OPEN:
+            self._make_room()
+        found = self._open[key] = self._made(key, document)
+        return found
+
+    def _make_room(self) -> None:
+        """Put the one away that was opened first and needs no saving."""
+        for found in self:
+            if not found.document.dirty:
+                self._put_away(found, keep=False)
+                return
+        raise InputError(
+            f"{len(self._open)} {self.kind.name}s with unsaved edits are open",
+            allowed=f"at most {MOST_OPEN}",
+            fix="save or discard some of them",
+            where="studio",
+        )
+
+    # -- changing --------------------------------------------------------------------------------------------
+
+    def perform(self, found: OpenedT, request: Alteration) -> bool:
+        """Carry a request out, once; ``False`` where it was carried out before. Raises ``ArmblocksError``."""
+        if request.key and request.key in found.seen:
+            return False
+        document, before, number = found.document, found.document.value, found.document.version
+        document.perform(request)
+        if request.key:
+            found.seen.append(request.key)
+        after, version = document.value, document.version
+        continued = request.does == "change" and document.continued
+        self._write(
+            found,
+            before,
+            number,
+            lambda journal: journal.performed(request, version, after, continued=continued),
+        )
+        if found.journal is not None and found.journal.since_snapshot >= SNAPSHOT_EVERY:
+            self._snapshot_later(found, found.journal)
+        return True
+
+    def reload(self, found: OpenedT, key: str = "") -> None:
+        """Take what the file holds now, as one step that can be undone; once for each ``key``."""
+        if key and key in found.seen:
+            return
+        if found.path is None:
+            raise self._no_file(found)
+        data, on_disk = self.folder.read_known(found.path)
+        self.replace(found, "reload", self.kind.from_file(data, self.folder.path(found.path)))
+        document = found.document
+        document.saved = document.value
+        found.on_disk, found.disk = on_disk, "same"
+        self._saved(found, found.path, document.version)
+        if key:
+            found.seen.append(key)
+
+    def replace(self, found: OpenedT, title: str, value: Any) -> None:
+        """Put another drawing or robot in the place of this one, as one step that can be undone."""
+        document, before, number = found.document, found.document.value, found.document.version
+        document.replace(title, value)
+        version = document.version
+        self._write(found, before, number, lambda journal: journal.replaced(title, value, version))
+
+    def keep_mine(self, found: OpenedT) -> None:
+        """What somebody else has written to the file is known; the next save overwrites it."""
+        found.disk, found.on_disk = "same", None
+        if found.path is not None and self.folder.exists(found.path):
+            found.on_disk = self.folder.read_known(found.path)[1]
+        self._hold(found)
+
+    def _hold(self, found: OpenedT) -> None:
+        """It is nowhere but here and in its journal: no file holds it any more."""
+        document = found.document
+        document.saved = None
+        self._write(found, document.value, document.version, lambda journal: journal.kept(document.version))
+
+    async def save(self, found: OpenedT, path: str, *, overwrite: bool) -> str:
+        """Write the file, under another path if one is given.
+
+        Raises ``FormatError`` where there is no path, where the file has changed on the disk or another one
+        would be overwritten, unless ``overwrite``, and where the disk refuses.
+        """
+        async with found.saving:
+            path = path or found.path or ""
+            if not path:
+                raise self._no_file(found)
+            place = self.folder.path(path)
+            path = place.relative_to(self.folder.root).as_posix()
+            if not overwrite:
+                self._refuse_overwriting(found, path)
+            document, of = found.document, found.document.version
+            written = document.value
+            value = self.kind.renamed(written, place) if path != found.path else written
+
+            def write() -> Fingerprint:
+                return self.folder.write(path, self.kind.to_file(value, place))
+
+            found.on_disk = await asyncio.to_thread(write)
+            found.path, found.disk = path, "same"
+            document.written(written, value.name)
+            self.kept.use(path)
+            self._saved(found, path, of)
+            return path
+
+    def _no_file(self, found: OpenedT) -> FormatError:
+        return FormatError(
+            f"the {found.document.noun} has no file yet",
+            allowed="a path",
+            fix="save it under a name",
+            where=f"{self.kind.name} '{found.document.value.name}'",
+        )
+
+    def _saved(self, found: OpenedT, path: str, of: int) -> None:
+        """Note in the journal, where there is one, that the file holds version ``of``."""
+        if found.journal is None:
+            return
+        now, version, on_disk = found.document.value, found.document.version, found.on_disk
+        self._write(found, now, version, lambda journal: journal.saved(path, of, version, on_disk))
+
+    def _refuse_overwriting(self, found: OpenedT, path: str) -> None:
+        if path != found.path:
+            if self.folder.exists(path):
+                raise FormatError(
+                    "there is such a file already", where=path, fix="overwrite it, or choose another"
+                )
+            return
+        found.disk, found.on_disk = self.folder.compared(path, found.on_disk)
+        if found.disk == "changed":
+            raise FormatError(
+                "the file has changed on the disk since it was opened",
+                where=path,
+                allowed="to overwrite it, or to save under another name",
+                fix="choose one of the two",
+            )
+
+    # -- the journal -----------------------------------------------------------------------------------------
+
+    def _write(self, found: OpenedT, before: Any, number: int, write: Callable[[FileJournal], None]) -> None:
+        """Write to the journal, which is begun with what was there before the first change.
+
+        A disk that refuses keeps nobody from editing: the pages are told, and the next change tries again.
+        """
+        try:
+            if found.journal is None:
+                found.journal, found.behind = self._begin_journal(found), True
+            if found.behind:
+                found.journal.begin_from(before, number)
+                found.behind = False
+            write(found.journal)
+            found.journaled = True
+            self._sync_later(found)
+        except OSError:
+            found.journaled, found.behind = False, True
+
+    def _begin_journal(self, found: OpenedT) -> FileJournal:
+        return FileJournal.begin(
+            self.kept.journals / f"{found.key}.{self.kind.name}",
+            self.kind,
+            key=found.key,
+            file=found.path,
+            origin=found.origin,
+            on_disk=found.on_disk,
+        )
+
+    def _sync_later(self, found: OpenedT) -> None:
+        """See to it that the disk has the journal soon."""
+        if found.syncing is not None and not found.syncing.done():
+            return
+
+        async def sync() -> None:
+            await asyncio.sleep(SYNC_SECONDS)
+            if found.journal is not None:
+                try:
+                    await asyncio.to_thread(found.journal.sync)
+                except OSError:
+                    found.journaled, found.behind = False, True
+                    if self._tell is not None:
+                        await self._tell(found)
+
+        found.syncing = asyncio.get_running_loop().create_task(sync())
+
+    def _snapshot_later(self, found: OpenedT, journal: FileJournal) -> None:
+        """Write the whole to the journal; it is made ready in a thread, while edits go on."""
+        journal.since_snapshot = 0
+        value, number = found.document.value, found.document.version
+
+        async def snapshot() -> None:
+            text = await asyncio.to_thread(self.kind.to_text, value)
+            if found.journal is journal:
+                with contextlib.suppress(OSError):
+                    journal.snapshot(text, number)
+
+        found.snapshot = asyncio.get_running_loop().create_task(snapshot())
+
+    # -- recovery --------------------------------------------------------------------------------------------
+
+    async def recover(self, request: say.Recover) -> OpenedT | None:
+        """Do with a recovery what the user chose; what is open thereby."""
+        key = request.document
+        if request.action == "discard":
+            self.left.discard(key)
+            return None
+        found = self.left.take(key)
+        opened = self._restore(found)
+        if request.action == "keep_both":
+            await self.save(opened, self._free_path(found), overwrite=False)
+        return opened
+
+    def _free_path(self, found: JournaledFile[Any]) -> str:
+        """The name of a recovered one's own file, beside the one that it came from."""
+        origin = PurePosixPath(found.path or f"{found.document.value.name}.json")
+        when = datetime.fromtimestamp(found.last).strftime("%Y-%m-%d %H.%M.%S")
+        wish = f"{origin.stem} recovered {when}"
+        names = (f"{wish}.json", *(f"{wish} {k}.json" for k in range(2, 1000)))
+        return next(str(p) for name in names if not self.folder.exists(str(p := origin.with_name(name))))
+
+    def _restore(self, found: JournaledFile[Any]) -> OpenedT:
+        """What a journal gives back, open again, with its past; its journal goes on."""
+        path = found.path
+        if path is not None and any(other.path == path for other in self):
+            path = None  # the file is open already: this is another one, to be saved under another name
+        opened = self._add(found.document, found.key)
+        opened.path, opened.origin, opened.on_disk = path, found.origin, found.on_disk
+        opened.seen.extend(found.keys)
+        if path is not None:
+            opened.disk, opened.on_disk = self.folder.compared(path, found.on_disk)
+        if found.missing:
+            # What could not be repeated stays beside, for somebody who can read it.
+            with contextlib.suppress(OSError):
+                found.journal_path.replace(found.journal_path.with_suffix(".unread"))
+                opened.document.saved = None
+            return opened
+        with contextlib.suppress(OSError):
+            opened.journal = FileJournal.go_on(found, self.kind)
+        return opened
+
+    # -- the disk --------------------------------------------------------------------------------------------
+
+    async def watch(self, tell: Callable[[OpenedT], Awaitable[None]]) -> None:
+        """Look at the files again and again; ``tell`` is called for one whose file has changed, and for one
+        whose journal the disk refuses.
+        """
+        self._tell = tell
+        while True:
+            await asyncio.sleep(LOOK_SECONDS)
+            for found in self:
+                if found.path is None or found.saving.locked():
+                    continue
+                path, known, was = found.path, found.on_disk, found.disk
+                disk, now = await asyncio.to_thread(self.folder.compared, path, known)
+                if found.on_disk is not known or found.path != path:
+                    continue  # it was saved meanwhile
+                found.disk, found.on_disk = disk, now
+                if disk != was:
+                    if disk == "gone":
+                        self._hold(found)
+                    await tell(found)

@@ -1,0 +1,1 @@
+"""Robots in the studio: the editor's tables, edits, readings, scenes."""

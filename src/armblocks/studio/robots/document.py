@@ -1,0 +1,52 @@
+"""A robot that is open in the studio, with its past, its future and the pages that edit it."""
+
+from __future__ import annotations
+
+import warnings
+
+from armblocks.errors import ArmblocksWarning
+from armblocks.robot import Link, Robot
+from armblocks.studio.documents.aspects import Aspect
+from armblocks.studio.documents.edited import Edited, Outcome
+from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.robots.columns import ROBOT_COLUMNS
+from armblocks.studio.robots.edits import robot_applied, robot_summary
+from armblocks.studio.robots.link_columns import LINK_COLUMNS
+
+
+class RobotDocument(Edited[Robot]):
+    """One open robot; see :class:`~armblocks.studio.documents.edited.Edited`."""
+
+    noun = "robot"
+
+    def outcome(self, request: say.RobotChange) -> Outcome[Robot]:
+        """What the step is called, the robot after it, and the cell that is being typed into."""
+        with warnings.catch_warnings():  # what it warns of stands among the findings
+            warnings.simplefilter("ignore", ArmblocksWarning)
+            after = robot_applied(request.edit, self.value)
+        return Outcome(robot_summary(request.edit), after, request.gesture)
+
+    def aspects(self, before: Robot, after: Robot) -> set[Aspect]:
+        """The cells that differ, links that came or went, and the order of the links."""
+        found = {
+            ("/", name) for name, column in ROBOT_COLUMNS.items() if column.read(before) != column.read(after)
+        }
+        old, new = ({link.name: link for link in robot.links} for robot in (before, after))
+        if list(old) != list(new):
+            found.add(("/", "links"))
+        for name in old.keys() | new.keys():
+            found |= _of_link(name, old.get(name), new.get(name))
+        return found
+
+    def written(self, value: Robot, name: str) -> None:
+        """The file of this name holds ``value``; a robot keeps its own name whatever its file is called."""
+        self.saved = value
+
+
+def _of_link(name: str, old: Link | None, new: Link | None) -> set[Aspect]:
+    if old is None or new is None:
+        return {(name, "")}
+    if old == new:
+        return set()
+    found = {(name, column.name) for column in LINK_COLUMNS.values() if column.read(old) != column.read(new)}
+    return found or {(name, "parent")}

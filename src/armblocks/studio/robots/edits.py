@@ -1,0 +1,277 @@
+"""What a person does to a robot, as data: each edit is a pure function from one robot to the next.
+
+Texts of cells are read as those of block parameters are (:mod:`armblocks.studio.sheet.parameter_values`):
+numbers and formulas of numbers, by the interpreter of MATLAB scripts. A robot is always whole: an edit that
+no arm could have is refused with the reason, and nothing changes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from armblocks.errors import InputError, RobotError
+from armblocks.robot import DhConvention, DhRow, Link, Robot, link_from_dh, serial_chain
+from armblocks.robot.dh_conversion import converted, reread
+from armblocks.studio.protocol.message import Message
+from armblocks.studio.robots.columns import ROBOT_COLUMNS, Column, Owner, Quantity, Value
+from armblocks.studio.robots.link_columns import LINK_COLUMNS
+from armblocks.studio.sheet.parameter_values import number_value
+
+_OWN_UNIT = re.compile(r"\b(pi|deg|rad)\b|°")
+_UNIT_BEHIND = re.compile(r"(?<=[0-9.)])\s*(deg|rad)\b")
+_DEGREES = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(?:\*?\s*deg|°)\s*")
+
+
+class SetCell(Message):
+    """Type into one cell: of a link, or of the robot where ``link`` is empty."""
+
+    kind: Literal["cell"] = "cell"
+    link: str
+    column: str
+    text: str = Field(max_length=1000)
+    angles: Literal["deg", "rad"]
+    """What a plain number means in a column of angles; a text that says pi, deg or rad says it itself."""
+
+
+class RenameLink(Message):
+    """Give a link another name."""
+
+    kind: Literal["rename"] = "rename"
+    link: str
+    name: str = Field(max_length=200)
+
+
+class AddJoint(Message):
+    """Put a new link behind another one, or at the base where ``after`` is empty."""
+
+    kind: Literal["add"] = "add"
+    after: str
+
+
+class RemoveJoint(Message):
+    """Take a link out; what hangs on it hangs on its parent then."""
+
+    kind: Literal["remove"] = "remove"
+    link: str
+
+
+class MoveJoint(Message):
+    """Let a link of a chain change places with its neighbour."""
+
+    kind: Literal["move"] = "move"
+    link: str
+    by: Literal[-1, 1]
+
+
+class SetConvention(Message):
+    """Read the rows by the other convention, or write the same arm in it (``keep_arm``)."""
+
+    kind: Literal["convention"] = "convention"
+    convention: Literal["standard", "modified"]
+    keep_arm: bool
+
+
+RobotEdit = Annotated[
+    SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention, Field(discriminator="kind")
+]
+
+
+def robot_summary(edit: RobotEdit) -> str:
+    """What undo calls it."""
+    match edit:
+        case SetCell():
+            column = LINK_COLUMNS.get(edit.column) or ROBOT_COLUMNS.get(edit.column)
+            title = column.title if column else edit.column
+            return f"{title} of {edit.link or (column.group.lower() if column and column.group else 'robot')}"
+        case RenameLink():
+            return f"name of {edit.link}"
+        case AddJoint():
+            return "new joint"
+        case RemoveJoint() | MoveJoint():
+            return f"{edit.kind} {edit.link}"
+        case SetConvention():
+            return f"{edit.convention} D-H"
+
+
+def robot_applied(edit: RobotEdit, robot: Robot) -> Robot:
+    """The robot after an edit. Raises ``InputError`` or ``RobotError`` with link and column."""
+    match edit:
+        case SetCell():
+            return _with_cell(robot, edit)
+        case RenameLink():
+            return _renamed(robot, edit.link, edit.name.strip())
+        case AddJoint():
+            return _with_joint(robot, edit.after)
+        case RemoveJoint():
+            return _without_joint(robot, edit.link)
+        case MoveJoint():
+            return _with_joint_moved(robot, edit.link, edit.by)
+        case SetConvention():
+            change = converted if edit.keep_arm else reread
+            return change(robot, DhConvention(edit.convention))
+
+
+# -- cells ---------------------------------------------------------------------------------------------------
+
+
+def _with_cell(robot: Robot, edit: SetCell) -> Robot:
+    if not edit.link:
+        column = _known(ROBOT_COLUMNS, edit.column)
+        return column.write(robot, _typed(column, robot, edit, f"robot '{robot.name}'", turns=False))
+    link = robot.link(edit.link)
+    column = _known(LINK_COLUMNS, edit.column)
+    where = f"link '{link.name}', {column.title}"
+    if why := column.locked(link):
+        raise InputError(
+            "there is nothing to type here", where=where, allowed=why, fix="type into another cell"
+        )
+    changed = column.write(link, _typed(column, link, edit, where, turns=bool(link.joint.turn)))
+    return replace(robot, links=tuple(changed if each is link else each for each in robot.links))
+
+
+def _known(columns: Mapping[str, Column[Owner]], name: str) -> Column[Owner]:
+    if name not in columns:
+        raise InputError(
+            f"there is no column '{name[:40]}'",
+            allowed=", ".join(columns),
+            where="robot table",
+            fix="choose one of these columns",
+        )
+    return columns[name]
+
+
+def _typed(column: Column[Owner], owner: Owner, edit: SetCell, where: str, *, turns: bool) -> Value:
+    """The SI value of what was typed."""
+    text = edit.text.strip()
+    if column.quantity is Quantity.TEXT:
+        return text
+    if column.quantity is Quantity.CHOICE:
+        if text not in column.choices:
+            raise InputError(
+                f"'{text[:40]}' is no choice",
+                where=where,
+                allowed=", ".join(column.choices),
+                fix="take one of the list",
+            )
+        return text
+    if not text:
+        if column.optional:
+            return None
+        raise InputError("the cell is empty", where=where, allowed="a number", fix="type 0 for none")
+    angular = column.quantity is Quantity.ANGLE or (
+        turns and column.quantity in (Quantity.COORDINATE, Quantity.RATE)
+    )
+    value = angle_value(text, where, edit.angles) if angular else _one_number(text, where)
+    if not math.isfinite(value):
+        raise InputError(
+            f"{column.title} is {value}", where=where, allowed="a finite number", fix="type a finite number"
+        )
+    return value
+
+
+def angle_value(text: str, where: str, unit: Literal["deg", "rad"]) -> float:
+    """The angle in rad that a text means; a plain number is in ``unit``.
+
+    A text that says ``pi``, ``deg``, ``°`` or ``rad`` says its unit itself: ``pi/2`` is a right angle also in
+    a table of degrees. Whole degrees give the float that ``math.radians`` gives.
+    """
+    if degrees := _DEGREES.fullmatch(text):
+        return math.radians(_one_number(degrees.group(1), where))
+    if _OWN_UNIT.search(text):
+        return _one_number(_UNIT_BEHIND.sub(r"*\1", text.replace("°", "*deg")), where)
+    value = _one_number(text, where)
+    return math.radians(value) if unit == "deg" else value
+
+
+def _one_number(text: str, where: str) -> float:
+    value = number_value(text, where)
+    if isinstance(value, list):
+        raise InputError(
+            f"{len(value)} numbers were typed", where=where, allowed="one number", fix="type one number"
+        )
+    return value
+
+
+# -- links ---------------------------------------------------------------------------------------------------
+
+
+def _renamed(robot: Robot, old: str, name: str) -> Robot:
+    robot.link(old)
+    links = tuple(
+        replace(
+            link,
+            name=name if link.name == old else link.name,
+            parent=name if link.parent == old else link.parent,
+        )
+        for link in robot.links
+    )
+    return replace(robot, links=links)
+
+
+def _is_chain(robot: Robot) -> bool:
+    return robot.links == serial_chain(robot.links)
+
+
+def _with_joint(robot: Robot, after: str) -> Robot:
+    """A new revolute link of the neighbour's convention between a link and what hangs on it."""
+    links = list(robot.links)
+    place = links.index(robot.link(after)) + 1 if after else 0
+    near = next((link.dh for link in links[place - 1 :: -1] + links if link.dh is not None), None)
+    convention = near.convention if near is not None else DhConvention.STANDARD
+    name = _free_name(links)
+    made = link_from_dh(name, DhRow(a=0.2, convention=convention), parent=after or None)
+    # In a tree what is put at the base is a second foot, and not a new root under all the others.
+    takes_over = bool(after) or _is_chain(robot)
+    hung = [
+        replace(link, parent=name) if takes_over and link.parent == made.parent else link for link in links
+    ]
+    return replace(robot, links=(*hung[:place], made, *hung[place:]))
+
+
+def _free_name(links: Sequence[Link]) -> str:
+    taken = {link.name for link in links}
+    return next(name for k in range(1, len(links) + 2) if (name := f"link{len(links) + k}") not in taken)
+
+
+def _without_joint(robot: Robot, name: str) -> Robot:
+    gone = robot.link(name)
+    if len(robot.links) == 1:
+        raise RobotError(
+            "a robot has one link at least",
+            where=f"robot '{robot.name}'",
+            allowed="more than one link, to take one out",
+            fix="change this link instead",
+        )
+    links = tuple(
+        replace(link, parent=gone.parent) if link.parent == name else link
+        for link in robot.links
+        if link is not gone
+    )
+    return replace(robot, links=links)
+
+
+def _with_joint_moved(robot: Robot, name: str, by: int) -> Robot:
+    links = list(robot.links)
+    place = links.index(robot.link(name))
+    if not _is_chain(robot):
+        raise RobotError(
+            "the links do not form a single chain",
+            where=f"robot '{robot.name}'",
+            allowed="links of a chain change places; those of a tree do not",
+            fix="change the parents of the links",
+        )
+    if not 0 <= place + by < len(links):
+        raise InputError(
+            "there is no neighbour on that side",
+            where=f"link '{name}'",
+            allowed="the other direction",
+            fix="move it the other way",
+        )
+    links[place], links[place + by] = links[place + by], links[place]
+    return replace(robot, links=serial_chain(links))

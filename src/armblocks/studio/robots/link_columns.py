@@ -1,0 +1,276 @@
+"""The columns of the two tables that have a row for each link."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from armblocks.errors import RobotError
+from armblocks.robot import JointLimits, Link, Motor, link_from_dh
+from armblocks.robot.link import inertia_matrix
+from armblocks.studio.robots.columns import Column, Quantity, Value, number_of
+
+JOINT_WORDS = ("revolute", "prismatic")
+
+# -- links: Table 1 ------------------------------------------------------------------------------------------
+
+_NO_ROW = "this link is placed by transforms of its file, not by a D-H row"
+_HOLDS = "this joint is fixed"
+
+
+def _without_row(link: Link) -> str:
+    return "" if link.dh is not None else _NO_ROW
+
+
+def _not_moving(link: Link) -> str:
+    return "" if link.joint.moves else _HOLDS
+
+
+def variable_of(link: Link) -> str:
+    """The D-H number where the joint coordinate stands: ``"theta"`` or ``"d"``, ``""`` without a row."""
+    return "" if link.dh is None else "d" if link.dh.sigma else "theta"
+
+
+def with_row(link: Link, limits: JointLimits | None = None, **changes: object) -> Link:
+    """The link with another D-H row: joint and transforms follow it. ``limits``: its own where left out."""
+    if link.dh is None:
+        raise RobotError(
+            _NO_ROW,
+            where=f"link '{link.name}'",
+            allowed="links with a D-H row",
+            fix="edit its transforms instead",
+        )
+    row = replace(link.dh, **changes)  # pyright: ignore[reportArgumentType] - fields by name
+    return link_from_dh(
+        link.name,
+        row,
+        parent=link.parent,
+        limits=link.joint.limits if limits is None else limits,
+        mass=link.mass,
+        centre_of_mass=link.centre_of_mass,
+        inertia=link.inertia,
+        motor=link.motor,
+        geometry=link.geometry,
+    )
+
+
+def _rownumber_of(name: str, title: str, doc: str, quantity: Quantity, unit: str) -> Column[Link]:
+    def locked(link: Link) -> str:
+        if name == variable_of(link):
+            return "here stands the joint coordinate; what is added to it is the offset"
+        return _without_row(link)
+
+    def read(link: Link) -> Value:
+        return None if link.dh is None else float(getattr(link.dh, name))
+
+    return Column(
+        name=name,
+        title=title,
+        doc=doc,
+        quantity=quantity,
+        unit=unit,
+        group="D-H row",
+        read=read,
+        write=lambda link, value: with_row(link, None, **{name: value}),
+        locked=locked,
+    )
+
+
+def _with_joint_type(link: Link, value: Value) -> Link:
+    sigma = JOINT_WORDS.index(str(value))
+    if link.dh is not None and sigma == link.dh.sigma:
+        return link
+    # Ranges and speeds were angles, or lengths: they mean nothing any more.
+    return with_row(link, JointLimits(torque=None), sigma=sigma)
+
+
+def _with_offset(link: Link, value: Value) -> Link:
+    if link.dh is not None:
+        return with_row(link, offset=value)
+    return replace(link, joint=replace(link.joint, offset=number_of(value)))
+
+
+def _with_limits(link: Link, **changes: object) -> Link:
+    limits = replace(link.joint.limits, **changes)  # pyright: ignore[reportArgumentType] - fields by name
+    return replace(link, joint=replace(link.joint, limits=limits))
+
+
+def _range_end(index: int, name: str, title: str, doc: str) -> Column[Link]:
+    def read(link: Link) -> Value:
+        position = link.joint.limits.position
+        return None if position is None else position[index]
+
+    def write(link: Link, value: Value) -> Link:
+        if value is None:
+            return _with_limits(link, position=None)
+        ends = list(link.joint.limits.position or (-abs(number_of(value)), abs(number_of(value))))
+        ends[index] = number_of(value)
+        return _with_limits(link, position=tuple(ends))
+
+    return Column(
+        name=name,
+        title=title,
+        doc=doc,
+        quantity=Quantity.COORDINATE,
+        unit="rad, m",
+        optional=True,
+        group="Range",
+        read=read,
+        write=write,
+        locked=_not_moving,
+    )
+
+
+KINEMATICS: tuple[Column[Link], ...] = (
+    Column(
+        name="joint",
+        title="joint",
+        doc="whether the joint turns or slides; its range and speed are then to be given anew",
+        quantity=Quantity.CHOICE,
+        choices=JOINT_WORDS,
+        read=lambda link: type(link.joint).__name__.lower(),
+        write=_with_joint_type,
+        locked=_without_row,
+    ),
+    _rownumber_of("alpha", "α", "twist: turn about x between the two joint axes", Quantity.ANGLE, "rad"),
+    _rownumber_of("a", "a", "length of the common normal of the two joint axes", Quantity.NUMBER, "m"),
+    _rownumber_of("d", "d", "way along the joint axis to the common normal", Quantity.NUMBER, "m"),
+    _rownumber_of("theta", "θ", "turn about the joint axis", Quantity.ANGLE, "rad"),
+    Column(
+        name="offset",
+        title="offset",
+        doc="what is added to the joint coordinate before anything is computed from it",
+        quantity=Quantity.COORDINATE,
+        unit="rad, m",
+        group="D-H row",
+        read=lambda link: link.joint.offset,
+        write=_with_offset,
+        locked=_not_moving,
+    ),
+    _range_end(0, "lowest", "from", "lowest joint coordinate; empty where it is not known"),
+    _range_end(1, "highest", "to", "highest joint coordinate; empty where it is not known"),
+    Column(
+        name="speed",
+        title="speed",
+        doc="greatest joint speed; empty where it is not known",
+        quantity=Quantity.RATE,
+        unit="rad/s, m/s",
+        optional=True,
+        group="Greatest",
+        read=lambda link: link.joint.limits.speed,
+        write=lambda link, value: _with_limits(link, speed=value),
+        locked=_not_moving,
+    ),
+    Column(
+        name="torque",
+        title="torque",
+        doc="greatest torque (force) at the joint, after the gear; empty where it is not known",
+        unit="N m",
+        optional=True,
+        group="Greatest",
+        read=lambda link: link.joint.limits.torque,
+        write=lambda link, value: _with_limits(link, torque=value),
+        locked=_not_moving,
+    ),
+)
+
+
+# -- links: Table 2 ------------------------------------------------------------------------------------------
+
+
+def _centre(axis: int) -> Column[Link]:
+    def write(link: Link, value: Value) -> Link:
+        centre = list(link.centre_of_mass)
+        centre[axis] = number_of(value)
+        return replace(link, centre_of_mass=tuple(centre))
+
+    return Column(
+        name=f"r{'xyz'[axis]}",
+        title="xyz"[axis],
+        doc=f"{'xyz'[axis]} of the centre of mass in the link's frame",
+        unit="m",
+        group="Centre of mass r",
+        read=lambda link: link.centre_of_mass[axis],
+        write=write,
+    )
+
+
+INERTIA_PLACES: Mapping[str, tuple[int, int]] = {
+    "Ixx": (0, 0),
+    "Iyy": (1, 1),
+    "Izz": (2, 2),
+    "Ixy": (0, 1),
+    "Iyz": (1, 2),
+    "Ixz": (0, 2),
+}
+"""The six numbers of an inertia in the toolbox's order, and where they stand in the matrix."""
+
+
+def _inertia(name: str, place: tuple[int, int]) -> Column[Link]:
+    def write(link: Link, value: Value) -> Link:
+        six = [link.inertia[i][j] for i, j in INERTIA_PLACES.values()]
+        six[list(INERTIA_PLACES).index(name)] = number_of(value)
+        return replace(link, inertia=inertia_matrix(six, link=link.name))
+
+    return Column(
+        name=name,
+        title=name[1:],
+        doc=f"{name[1:]} of the inertia about the centre of mass, in the link's axes",
+        unit="kg m²",
+        group="Inertia I about the centre of mass",
+        read=lambda link: link.inertia[place[0]][place[1]],
+        write=write,
+    )
+
+
+def _motor(name: str, title: str, doc: str, unit: str, index: int | None = None) -> Column[Link]:
+    """A number of the motor; typing one gives a motor to a link without."""
+
+    def read(link: Link) -> Value:
+        if link.motor is None:
+            return None
+        value = getattr(link.motor, name)
+        return float(value if index is None else value[index])
+
+    def write(link: Link, value: Value) -> Link:
+        if value is None:
+            return replace(link, motor=None)
+        motor = link.motor or Motor()
+        if index is None:
+            return replace(link, motor=replace(motor, **{name: number_of(value)}))  # pyright: ignore
+        pair = list(motor.coulomb_friction)
+        pair[index] = number_of(value)
+        return replace(link, motor=replace(motor, coulomb_friction=(pair[0], pair[1])))
+
+    return Column(
+        name=title,
+        title=title,
+        doc=f"{doc}; empty: the joint has no motor",
+        unit=unit,
+        optional=True,
+        group="Motor, before the gear",
+        read=read,
+        write=write,
+        locked=_not_moving,
+    )
+
+
+DYNAMICS: tuple[Column[Link], ...] = (
+    Column(
+        name="mass",
+        title="m",
+        doc="mass of the link",
+        unit="kg",
+        read=lambda link: link.mass,
+        write=lambda link, value: replace(link, mass=number_of(value)),
+    ),
+    *(_centre(axis) for axis in range(3)),
+    *(_inertia(name, place) for name, place in INERTIA_PLACES.items()),
+    _motor("inertia", "Jm", "inertia of the rotor", "kg m²"),
+    _motor("gear_ratio", "G", "motor turns per joint turn; its sign says the direction", ""),
+    _motor("viscous_friction", "B", "viscous friction", "N m s/rad"),
+    _motor("coulomb_friction", "Tc+", "Coulomb friction of forward motion", "N m", 0),
+    _motor("coulomb_friction", "Tc-", "Coulomb friction of backward motion, not above zero", "N m", 1),
+)
+
+LINK_COLUMNS: Mapping[str, Column[Link]] = {column.name: column for column in (*KINEMATICS, *DYNAMICS)}

@@ -1,0 +1,60 @@
+"""The robots that a studio has open."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+
+from armblocks.face.arm import Arm
+from armblocks.robot import Robot
+from armblocks.studio.documents.file_kind import RobotKind
+from armblocks.studio.documents.open_files import OpenFile, OpenFiles
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.robots.document import RobotDocument
+from armblocks.studio.robots.tables import robot_shown
+
+
+@dataclasses.dataclass(eq=False, kw_only=True)
+class OpenRobot(OpenFile[RobotDocument]):
+    """A robot with its file, its journal, and the compiled arm of its present form."""
+
+    notes: tuple[str, ...] = ()
+    """What was said when the file was read."""
+    reading: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
+    _arm: Arm | None = None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot as it is now."""
+        return self.document.value
+
+    @property
+    def arm(self) -> Arm:
+        """Its equations, compiled when first asked for."""
+        if self._arm is None or self._arm.robot is not self.robot:
+            self._arm = Arm(self.robot)
+        return self._arm
+
+    def shown(self) -> say.RobotShown:
+        """How it stands, for pages."""
+        return robot_shown(
+            self.key,
+            self.document,
+            self.path,
+            self.origin,
+            self.notes,
+            disk=self.disk,
+            journaled=self.journaled,
+        )
+
+
+class OpenRobots(OpenFiles[OpenRobot]):
+    """The open robots of one project folder; see :class:`.OpenFiles`."""
+
+    def __init__(self, folder: ProjectFolder, kept: StateFolder) -> None:
+        super().__init__(folder, kept, RobotKind(folder))
+
+    def _made(self, key: str, document: RobotDocument) -> OpenRobot:
+        return OpenRobot(key=key, document=document)

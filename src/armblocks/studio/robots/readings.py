@@ -1,0 +1,106 @@
+"""What an arm does in one configuration, for the read-outs beside its sliders: numbers, and singularities in
+words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.errors import InputError
+from armblocks.face.arm import Arm
+from armblocks.robot import Robot
+from armblocks.robot.geometry import reach
+from armblocks.spatial import Transform
+from armblocks.studio.protocol.robot_messages import Readings
+
+SINGULAR = 1e-6
+"""Of the least singular value against the greatest: below it the arm is singular but for rounding."""
+NEARLY = 0.02
+"""Below it speeds of joints become fifty times those of the tool, and more."""
+_PART = 0.1
+"""What a joint or a direction must have of the greatest entry to be named."""
+
+
+def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Readings:
+    """Everything that is read off at ``q, qd, qdd`` (rad, m and per second), by the compiled kernels."""
+    for name, values in (("q", q), ("qd", qd), ("qdd", qdd)):
+        _check_count(arm.robot, name, values)
+    T, J = arm.fkine(q), arm.jacob0(q)
+    pose = Transform.from_matrix(T)
+    return Readings(
+        pose=T.tolist(),
+        position=list(pose.translation),
+        rpy=list(pose.rpy),
+        jacobian=J.tolist(),
+        manipulability=float(arm.manipulability(q)),
+        gravload=arm.gravload(q).tolist(),
+        torque=arm.rne(q, qd, qdd).tolist(),
+        singular=singularity(J, arm.robot.joint_names, reach(arm.robot)),
+        limits=limit_words(arm.robot, q, qd, arm.rne(q, qd, qdd)),
+    )
+
+
+def _check_count(robot: Robot, name: str, values: Sequence[float]) -> None:
+    if len(values) != robot.n:
+        raise InputError(
+            f"{len(values)} numbers were given for {name}",
+            where=f"robot '{robot.name}'",
+            allowed=f"{robot.n}, one for each joint",
+            fix="give one number for each joint",
+        )
+
+
+def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) -> str:
+    """What the arm cannot do in a singular configuration, in words; ``""`` where nothing is lost.
+
+    ``J`` (6, n) as of ``jacob0``. Its linear rows are divided by ``length`` (m, the arm's reach), so that
+    metres and radians can be compared. Where joints can move and the tool stays, they are named; else the
+    direction that is lost.
+    """
+    scaled = J.copy()
+    scaled[:3] /= length
+    left, values, right = np.linalg.svd(scaled)
+    if values[0] == 0:
+        return "Singular: no joint moves the tool."
+    ratio = float(values[-1] / values[0])
+    if ratio >= NEARLY:
+        return ""
+    how = "Singular" if ratio < SINGULAR else "Close to singular"
+    still = np.abs(right[len(values) - 1])
+    named = [joint for joint, part in zip(joints, still) if part > _PART * still.max()]
+    if len(named) == 1:
+        return f"{how}: {named[0]} moves and the tool stays where it is."
+    words = f"{', '.join(named[:-1])} and {named[-1]} can move against each other while the tool stays"
+    if len(joints) < 6:
+        return f"{how}: {words}."
+    return f"{how}: {words}; the tool cannot {_direction(left[:, len(values) - 1])}."
+
+
+def _direction(lost: NDArray[np.float64]) -> str:
+    """The motion of the tool that is lost, in world axes."""
+    linear, angular = lost[:3], lost[3:]
+    slides = float(np.linalg.norm(linear)) >= float(np.linalg.norm(angular))
+    way = linear if slides else angular
+    axis = int(np.argmax(np.abs(way)))
+    if abs(way[axis]) > 0.99 * np.linalg.norm(way):
+        name = "xyz"[axis]
+    else:
+        x, y, z = (round(float(part), 2) + 0.0 for part in way / np.linalg.norm(way) * np.sign(way[axis]))
+        name = f"({x:g}, {y:g}, {z:g})"
+    return f"move along {name}" if slides else f"turn about {name}"
+
+
+def limit_words(robot: Robot, q: Sequence[float], qd: Sequence[float], tau: NDArray[np.float64]) -> list[str]:
+    """Which joints stand outside of their range, or move or pull harder than they may."""
+    found: list[str] = []
+    for link, position, speed, torque in zip(robot.moving_links, q, qd, tau.tolist()):
+        limits = link.joint.limits
+        if limits.position and not limits.position[0] <= position <= limits.position[1]:
+            found.append(f"{link.name} stands outside of its range")
+        if limits.speed is not None and abs(speed) > limits.speed:
+            found.append(f"{link.name} is faster than it may be")
+        if limits.torque is not None and abs(torque) > limits.torque:
+            found.append(f"{link.name} needs more torque than it has")
+    return found

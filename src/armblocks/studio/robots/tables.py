@@ -1,0 +1,153 @@
+"""A robot as the tables of its editor: columns as declared, values, and what no arm could have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from armblocks.robot import DhConvention, Link, Robot, doubts, inertia_findings, serial_chain
+from armblocks.studio.documents.history import History
+from armblocks.studio.documents.project_folder import Disk
+from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
+from armblocks.studio.robots.link_columns import (
+    DYNAMICS,
+    INERTIA_PLACES,
+    KINEMATICS,
+    LINK_COLUMNS,
+    variable_of,
+)
+
+
+def robot_tables() -> say.RobotTables:
+    """Every column that can be typed into."""
+    return say.RobotTables(
+        kinematics=[_column(column) for column in KINEMATICS],
+        dynamics=[_column(column) for column in DYNAMICS],
+        robot=[_column(column) for column in ROBOT],
+    )
+
+
+def robot_shown(
+    key: str,
+    history: History[Robot],
+    path: str | None,
+    shipped: str,
+    notes: Sequence[str],
+    *,
+    disk: Disk = "same",
+    journaled: bool = True,
+) -> say.RobotShown:
+    """An open robot as a page shows it."""
+    robot = history.value
+    return say.RobotShown(
+        robot=key,
+        version=history.version,
+        path=path,
+        shipped=shipped,
+        dirty=history.dirty,
+        disk=disk,
+        journaled=journaled,
+        undo=history.undo_title,
+        redo=history.redo_title,
+        name=robot.name,
+        convention=_convention(robot),
+        chain=robot.links == serial_chain(robot.links),
+        links=[_row(link) for link in robot.links],
+        fields={name: column.read(robot) for name, column in ROBOT_COLUMNS.items()},
+        findings=[
+            *_inertia_findings(robot),
+            *_friction_findings(robot),
+            *_weightless(robot),
+            *_doubts(robot),
+        ],
+        notes=list(notes),
+    )
+
+
+def _column(column: Column[Owner]) -> say.CellColumn:
+    return say.CellColumn(
+        name=column.name,
+        title=column.title,
+        doc=column.doc,
+        quantity=column.quantity.value,
+        unit=column.unit,
+        optional=column.optional,
+        choices=list(column.choices),
+        group=column.group,
+    )
+
+
+def _row(link: Link) -> say.LinkRow:
+    locked = {name: why for name, column in LINK_COLUMNS.items() if (why := column.locked(link))}
+    return say.LinkRow(
+        name=link.name,
+        parent=link.parent,
+        turns=bool(link.joint.turn),
+        moves=link.joint.moves,
+        variable=variable_of(link),
+        cells={name: column.read(link) for name, column in LINK_COLUMNS.items()},
+        locked=locked,
+    )
+
+
+def _convention(robot: Robot) -> Literal["standard", "modified", ""]:
+    found = {link.dh.convention for link in robot.links if link.dh is not None}
+    if found == {DhConvention.STANDARD}:
+        return "standard"
+    return "modified" if found == {DhConvention.MODIFIED} else ""
+
+
+def _inertia_findings(robot: Robot) -> list[say.RobotFinding]:
+    return [
+        say.RobotFinding(
+            link=finding.link,
+            columns=[*INERTIA_PLACES, *(["mass"] if "no mass" in finding.reason else [])],
+            what=f"No rigid body has this inertia: {finding.reason} "
+            f"(principal moments {', '.join(f'{moment:.4g}' for moment in finding.moments)} kg m²).",
+            fix="It is used as given. Give moments of which none exceeds the sum of the other two.",
+        )
+        for finding in inertia_findings(robot)
+    ]
+
+
+def _doubts(robot: Robot) -> list[say.RobotFinding]:
+    return [
+        say.RobotFinding(link=doubt.link or robot.name, columns=[], what=f"{doubt.what}.", fix=doubt.question)
+        for doubt in doubts(robot)
+    ]
+
+
+def _friction_findings(robot: Robot) -> list[say.RobotFinding]:
+    found: list[say.RobotFinding] = []
+    for link in robot.links:
+        if link.motor is None:
+            continue
+        plus, minus = link.motor.coulomb_friction
+        wrong = {"B": link.motor.viscous_friction < 0, "Tc+": plus < 0, "Tc-": minus > 0}
+        if any(wrong.values()):
+            found.append(
+                say.RobotFinding(
+                    link=link.name,
+                    columns=[name for name, is_wrong in wrong.items() if is_wrong],
+                    what="Friction drives the joint instead of holding it.",
+                    fix="Give B and Tc+ that are not below zero, and Tc- that is not above it.",
+                )
+            )
+    return found
+
+
+def _weightless(robot: Robot) -> list[say.RobotFinding]:
+    """Where nothing resists a joint, forward dynamics has no answer."""
+    last = robot.links[-1]
+    light = last.mass == 0 and not any(any(row) for row in last.inertia)
+    if not light or (last.motor is not None and last.motor.reflected_inertia > 0) or not last.joint.moves:
+        return []
+    return [
+        say.RobotFinding(
+            link=last.name,
+            columns=["mass"],
+            what="Nothing resists the last joint: it has no mass, no inertia and no rotor.",
+            fix="Give it a mass or an inertia, or Jm of its motor; poses and joint torques work without.",
+        )
+    ]

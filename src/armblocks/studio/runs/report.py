@@ -1,0 +1,75 @@
+"""The report of a run, as one page: the command line's, made in a process of its own.
+
+The model is run again with the values with which the run began; the same steps give the same numbers. What
+was tuned or stopped on the way is not repeated.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.studio.runs.worker import begun, limit_process
+from armblocks.studio.runs.workers import process_context
+
+MOST_SECONDS = 300.0
+
+
+async def report_of(job: Mapping[str, Any]) -> bytes:
+    """The page, HTML, for the job of a run (see :mod:`armblocks.studio.runs.worker`).
+
+    Raises ``SimulationError`` with what the run or the report refused, or where it takes too long.
+    """
+    context = process_context()
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=write, args=(theirs, dict(job)), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        return await asyncio.to_thread(_received, ours)
+    finally:
+        process.kill()
+        ours.close()
+
+
+def _received(pipe: Connection) -> bytes:
+    try:
+        said = pipe.recv_bytes() if pipe.poll(MOST_SECONDS) else b""
+    except EOFError:
+        said = b""
+    if not said:
+        raise SimulationError(
+            "the report could not be made in the time and memory it may have",
+            where="report",
+            fix="shorten the run, or use 'armblocks run'",
+        )
+    if said[:1] == b"E":
+        raise SimulationError(
+            said[1:].decode(), where="report", fix="shorten the run, or use 'armblocks run'"
+        )
+    return said[1:]
+
+
+def write(pipe: Connection, job: dict[str, Any]) -> None:
+    """In the process: run the model, write the report, send its page."""
+    limit_process()
+    from armblocks.report import write_report
+
+    try:
+        run = begun(job).run
+        run.advance()
+        diagram, result = run.diagram, run.result()
+        with tempfile.TemporaryDirectory() as folder:
+            page = write_report(Path(folder), diagram, result, formats=(), data=()).page
+            pipe.send_bytes(b"H" + page.read_bytes())
+    except ArmblocksError as error:
+        pipe.send_bytes(b"E" + str(error).encode())
+    except MemoryError:
+        pass  # what there is of it frees itself, and that nothing was sent says enough
+    except Exception as error:  # a defect: told to who asked, and not to the terminal
+        pipe.send_bytes(f"Earmblocks has a defect ({type(error).__name__})".encode())

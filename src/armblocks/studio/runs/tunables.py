@@ -1,0 +1,35 @@
+"""Which parameters of a diagram a page may change while it runs, with what their blocks say of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from armblocks.diagram import Diagram
+from armblocks.diagram.mask_tuning import tunable_parameters
+from armblocks.studio.protocol.run_messages import Tunable
+from armblocks.studio.sheet.parameter_values import parameter_json
+
+LONGEST = 64
+"""Numbers of a parameter that a page would show: longer tables are edited in their file."""
+
+
+def tunables(diagram: Diagram) -> list[Tunable]:
+    """The tunable parameters of masks and blocks, by ``block.parameter``, with the values that they have."""
+    return [
+        Tunable(
+            path=path,
+            value=parameter_json(value),
+            unit=rule.unit,
+            doc=rule.doc,
+            low=_bound(rule.minimum if rule.above is None else rule.above),
+            high=_bound(rule.maximum),
+        )
+        for path, rule, value in tunable_parameters(diagram)
+        if np.size(np.asarray(value)) <= LONGEST
+    ]
+
+
+def _bound(value: float) -> float | None:
+    return value if math.isfinite(value) else None

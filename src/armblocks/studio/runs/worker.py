@@ -1,0 +1,325 @@
+"""The process that runs one model: started ahead of time, given one job, gone when the run has ended.
+
+A job is JSON: ``diagram`` (a canonical document), ``folder`` (for the robot files that it names), ``run``
+and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fast as possible), ``tuned``
+(values of tunable parameters that are tried). Commands arrive as the requests of
+:mod:`armblocks.studio.protocol.messages`; between two pieces of the run they are obeyed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import signal
+import sys
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import perf_counter, sleep
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.compiler.target import host_target
+from armblocks.diagram import diagram_views
+from armblocks.errors import ArmblocksError, SimulationError
+from armblocks.face.diagram_run import DiagramRun
+from armblocks.face.model import CompiledDiagram
+from armblocks.simulation import SimulationResult
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol import run_messages as say
+from armblocks.studio.protocol.frames import sample_frame, thinned
+from armblocks.studio.runs.history import RunHistory
+from armblocks.studio.runs.pace import Pace
+from armblocks.studio.runs.tunables import tunables
+from armblocks.studio.sheet.parameter_values import tuned_value
+
+Array = NDArray[np.float64]
+FRAME_SECONDS = 1 / 60
+MOST_MEMORY = 8 * 2**30
+"""Bytes of address space of a worker."""
+MOST_CPU_SECONDS = 3600
+MOST_NUMBERS = 16_000_000
+"""Numbers of one run that a page is sent, 128 MB: of more, the extremes."""
+
+
+def work(pipe: Connection) -> None:
+    """Get ready for any run, wait for the job, run it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C in the terminal is for the server
+    limit_process()
+    host_target()  # starts LLVM, which takes longer than most runs
+    with contextlib.suppress(EOFError, OSError):
+        job = json.loads(pipe.recv_bytes())
+        _Run(pipe, job).run()
+
+
+def stride_of(run: DiagramRun) -> int:
+    """Of how many instants a page gets the extremes: 1, which is all, unless they would fill its memory."""
+    numbers = run.simulation.planned * (1 + run.simulation.compiled.signals_layout.size)
+    return 1 if numbers <= MOST_NUMBERS else math.ceil(2 * numbers / MOST_NUMBERS)
+
+
+def limit_process() -> None:
+    """Give this process no more memory and time than a run may have."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+    # The signal of the lower limit says which one it was; that of the upper one would be taken for no memory.
+    resource.setrlimit(resource.RLIMIT_CPU, (MOST_CPU_SECONDS, MOST_CPU_SECONDS + 5))
+
+
+def begun(job: Mapping[str, Any]) -> RunHistory:
+    """The run of a job before its first step; raises ``ArmblocksError``."""
+    folder = Path(job["folder"])
+    diagram = formats.diagram_from_bytes(
+        job["diagram"].encode(),
+        "model",
+        BLOCKS,
+        formats.load_robot,
+        folder=folder,
+        read_library=ProjectFolder(folder).read_library,
+        draft=True,  # what cannot run is refused when it is traced, and what was traced once needs no check
+    )
+    history = RunHistory(CompiledDiagram(diagram))
+    for path, value in job["tuned"].items():
+        history.tune(path, tuned_value(value, path))
+    return history
+
+
+class _Run:
+    def __init__(self, pipe: Connection, job: dict[str, Any]) -> None:
+        self.pipe = pipe
+        self.key: str = job["run"]
+        self.document: str = job["document"]
+        self.pace = Pace(job["speed"])
+        self.job = job
+        self.tuned: dict[str, Any] = job["tuned"]
+        self.state: Literal["running", "paused", "done", "stopped", "failed"] = "running"
+        self.time = 0.0
+        """How far the page is told; the run itself may be further by a step, where the clock is not."""
+        self.count = 0
+        """How many recorded instants have been told."""
+        self.stride = 1
+        """Of so many instants a page gets the extremes only."""
+        self.times: Array = np.empty(0)
+        self.began = perf_counter()
+
+    def run(self) -> None:
+        """The whole run, to its end or to the reason why it has none."""
+        try:
+            self._go()
+        except SimulationError as error:
+            self._send_rest(error.partial)
+            self._fail(error)
+        except ArmblocksError as error:
+            self._fail(error)
+        except MemoryError:
+            fix = "record fewer samples, or shorten the run"
+            self._fail(SimulationError("the run needs more memory than it may have", fix=fix, where="run"))
+        except OSError:
+            raise  # the server is gone
+        except Exception as error:  # a defect: it is told, and the model is not harmed
+            self._fail(_defect(error))
+
+    def _go(self) -> None:
+        history = begun(self.job)
+        self.stride = stride_of(history.run)
+        self._tell_start(history.run)
+        self.began = perf_counter()
+        self.pace.count_from(0.0)
+        while True:
+            self._advance(history)
+            self._send_samples(history)
+            if history.run.finished and self.count == history.recorded:
+                report = history.run.result().run
+                self._end("done", report.message, report.solver, report.reason)
+                return
+            self._progress()
+            if not self._listen(history):
+                self._end("stopped", f"stopped at {self.time:g} s")
+                return
+
+    def _advance(self, history: RunHistory) -> None:
+        """Go on for one frame: one instant while paused, as far as the clock says, or as far as it gets."""
+        run = history.run
+        if self.state == "paused":
+            history.step()
+            return
+        due = self.pace.due
+        if run.time < due:
+            history.mark()
+            run.advance(None if due == math.inf else due, wall_time=FRAME_SECONDS)
+
+    def _listen(self, history: RunHistory) -> bool:
+        """Obey what has been said, wait while paused or ahead of the clock; ``False`` to stop."""
+        while True:
+            wait = 0.0
+            if self.state == "paused":
+                wait = 0.5
+            elif self.pace.speed is not None:
+                wait = FRAME_SECONDS
+            if not self.pipe.poll(wait):
+                if self.state == "paused":
+                    continue
+                return True
+            command = json.loads(self.pipe.recv_bytes())
+            match command["kind"], command.get("action"):
+                case "control", "stop":
+                    return False
+                case "control", "pause":
+                    self._stand_where_shown(history)
+                    self._become("paused")
+                case "control", "resume":
+                    self._become("running")
+                case "control", "step":
+                    return True
+                case "control", "back":
+                    self._go_back(history, self.count - 1)
+                case "rewind", _:
+                    told = int(np.searchsorted(self.times, float(command["time"]), "right"))
+                    self._go_back(history, told if self.stride == 1 else told * self.stride // 2)
+                case "speed", _:
+                    self.pace.speed = command["speed"]
+                    self.pace.count_from(self.time)
+                case _:
+                    self._tune(history, command["parameter"], command["value"])
+
+    def _become(self, state: Literal["running", "paused"]) -> None:
+        self.state = state
+        self.pace.count_from(self.time)
+        self._progress()
+
+    def _tune(self, history: RunHistory, parameter: str, value: Any) -> None:
+        """Change a parameter from here on; a refusal is told and the run goes on."""
+        try:
+            self._stand_where_shown(history)
+            history.tune(parameter, tuned_value(value, parameter))
+        except ArmblocksError as error:
+            self._progress(error.what, _fault(error))
+        else:
+            self.tuned[parameter] = value
+            self._tell(say.RunTuned(run=self.key, time=self.time, parameter=parameter, value=value))
+
+    def _go_back(self, history: RunHistory, recorded: int) -> None:
+        """Stand where at most so many instants are recorded; what is tuned holds from there on."""
+        history.back_to(max(recorded, 1))
+        self.count, self.time = history.recorded, history.run.time
+        told = self.count if self.stride == 1 else int(np.searchsorted(self.times, self.time, "right"))
+        self.times = self.times[:told]
+        self._tell(say.RunRewound(run=self.key, time=self.time, count=told))
+        self._become("paused")
+
+    def _stand_where_shown(self, history: RunHistory) -> None:
+        """Return to what is shown, where the run is beyond it, and tell all that is recorded until then."""
+        if history.run.time > self.time:
+            history.stand_at(self.time)
+            self._send_samples(history)
+
+    # -- what the hub is told --------------------------------------------------------------------------------
+
+    def _tell(self, event: say.Message) -> None:
+        self.pipe.send_bytes(b"J" + event.model_dump_json().encode())
+
+    def _tell_start(self, run: DiagramRun) -> None:
+        compiled, diagram = run.simulation.compiled, run.diagram
+        self._tell(
+            say.RunStarted(
+                document=self.document,
+                run=self.key,
+                stop_time=run.stop_time,
+                channels=[
+                    say.Channel(name=slot.name, shape=list(slot.shape), unit=slot.unit)
+                    for slot in compiled.signals_layout
+                ],
+                views=[
+                    say.ViewOf(
+                        block=name,
+                        kind=view.kind.value,
+                        signals=list(view.signals),
+                        labels=list(view.labels),
+                        title=view.title,
+                    )
+                    for name, view in diagram_views(diagram)
+                ],
+                aliases=dict(compiled.aliases),
+                tunables=tunables(diagram),
+                stride=self.stride,
+            )
+        )
+
+    def _send_samples(self, history: RunHistory) -> None:
+        """What is recorded and due by the clock; while paused, all."""
+        fresh = history.samples(self.count)
+        due = math.inf if self.state == "paused" else self.pace.due
+        ready = int(np.searchsorted(fresh.time, due, "right"))
+        last = history.run.finished and ready == fresh.time.size
+        if not last:
+            ready -= ready % self.stride
+        if ready:
+            self._send(fresh.time[:ready], fresh.signals[:, :ready], last=last)
+        self.time = min(due, history.run.time)
+
+    def _send(self, time: Array, signals: Array, *, last: bool) -> None:
+        self.count += time.size
+        if self.stride > 1:
+            ends = time[-1:], signals[:, -1:]
+            time, signals = thinned(time, signals, self.stride)
+            if last and time[-1] < ends[0][0]:
+                time, signals = np.append(time, ends[0]), np.append(signals, ends[1], axis=1)
+        self.pipe.send_bytes(b"S" + sample_frame(self.key, self.times.size, time, signals))
+        self.times = np.concatenate([self.times, time])
+
+    def _send_rest(self, partial: object) -> None:
+        """What is good of a run that failed."""
+        if isinstance(partial, SimulationResult) and partial.time.size > self.count:
+            self._send(partial.time[self.count :], partial.signals[:, self.count :], last=True)
+            self.time = float(partial.time[-1])
+
+    def _progress(
+        self, message: str = "", fault: say.Fault | None = None, solver: str = "", reason: str = ""
+    ) -> None:
+        factor = self.time / max(perf_counter() - self.began, 1e-9)
+        self._tell(
+            say.RunProgress(
+                run=self.key,
+                state=self.state,
+                time=self.time,
+                real_time_factor=factor,
+                message=message,
+                fault=fault,
+                solver=solver,
+                reason=reason,
+            )
+        )
+
+    def _end(
+        self, state: Literal["done", "stopped"], message: str, solver: str = "", reason: str = ""
+    ) -> None:
+        self.state = state
+        self._progress(message, solver=solver, reason=reason)
+        # The pipe's end must not overtake what is in it.
+        sleep(0.05)
+
+    def _fail(self, error: ArmblocksError) -> None:
+        self.state = "failed"
+        self._progress(error.what, _fault(error))
+        sleep(0.05)
+
+
+def _defect(error: Exception) -> SimulationError:
+    return SimulationError(
+        f"armblocks has a defect ({type(error).__name__}: {str(error)[:200]})",
+        where="run",
+        allowed="a model that runs, or words about why it does not",
+        fix="report it with the model; your drawing is not harmed",
+    )
+
+
+def _fault(error: ArmblocksError) -> say.Fault:
+    return say.Fault(what=error.what, where=error.where, allowed=error.allowed, fix=error.fix)

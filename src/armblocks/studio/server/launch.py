@@ -1,0 +1,103 @@
+"""Starting the studio: a free port on this machine, a link that works once, and a clean end."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import webbrowser
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from armblocks.errors import InputError
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.server.guard import Keys
+from armblocks.studio.server.terminal_log import log_settings
+from armblocks.studio.server.web_app import HubToCome, built_page, studio_app
+
+if TYPE_CHECKING:
+    from armblocks.studio.server.hub import Hub
+
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+MOST_MESSAGE_BYTES = 8 * 2**20
+
+
+def serve(
+    folder: str | Path,
+    model: str,
+    *,
+    port: int,
+    open_browser: bool,
+    announce: Callable[[str], None],
+    afresh: bool = False,
+) -> None:
+    """Serve until Ctrl-C. ``announce`` gets the login link. ``port`` 0 takes a free one.
+
+    With ``port`` 0 the port of the server that was in this folder last is tried first, and pages of that
+    server go on with this one, unless ``afresh``. Only this machine can reach it: the socket is bound to
+    127.0.0.1. Raises ``InputError`` where the port is taken, ``FormatError`` where the page was not built.
+    """
+    import uvicorn
+
+    web = built_page()
+    project = ProjectFolder(folder)
+    kept = StateFolder(project.root)
+    listener = _listener_as_before(kept) if port == 0 and not afresh else None
+    listener = listener or _listener(port)
+    taken: int = listener.getsockname()[1]
+    keys = Keys(taken, kept.begin_session(taken, afresh=afresh).secret)
+    hub = HubToCome(project)
+    app = studio_app(hub, keys, frozenset(f"{host}:{taken}" for host in LOOPBACK), web)
+    fragment = f"#{quote(model)}" if model else ""
+    link = f"http://127.0.0.1:{taken}/login?key={keys.new_login()}{fragment}"
+    announce(link)
+    if open_browser:
+        webbrowser.open(link)
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        log_config=log_settings(keys.secrets),
+        access_log=False,  # its lines would hold the login link
+        server_header=False,
+        ws_max_size=MOST_MESSAGE_BYTES,
+        ws="websockets-sansio",
+        timeout_graceful_shutdown=1,
+    )
+    server = uvicorn.Server(config)
+
+    def give_up(made: Future[Hub]) -> None:
+        server.should_exit |= made.exception() is not None
+
+    hub.made.add_done_callback(give_up)
+    server.run(sockets=[listener])
+    if hub.made.done():
+        hub.made.result()  # what kept it from being made is the reason of the end
+
+
+def _listener_as_before(kept: StateFolder) -> socket.socket | None:
+    """The port at which pages of the server before this one still ask, where it is free."""
+    last = kept.session()
+    if last is not None:
+        with contextlib.suppress(InputError):
+            return _listener(last.port)
+    return None
+
+
+def _listener(port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(("127.0.0.1", port))
+        listener.listen()  # before the link is told: who follows it at once waits, and is not refused
+    except OSError as error:
+        listener.close()
+        raise InputError(
+            f"port {port} cannot be used ({error.strerror})",
+            where="armblocks studio",
+            allowed="a free port, or 0 for any",
+            fix="choose another --port, or close the program that holds this one",
+        ) from None
+    return listener

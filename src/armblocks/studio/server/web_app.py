@@ -1,0 +1,216 @@
+"""The studio's server: one page, one websocket, a few downloads. Everything passes the guard first.
+
+The page needs nothing of what stands behind it, so it is there at once: the hub, whose imports take longer
+than a page takes to come, is made meanwhile (:class:`HubToCome`), and what asks for it waits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncGenerator, MutableMapping
+from concurrent.futures import Future
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from armblocks.errors import ArmblocksError, FormatError
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.server.guard import Guard, Keys
+from armblocks.studio.server.outbox import Outbox
+from armblocks.studio.server.page import NoRequestError, Page
+
+if TYPE_CHECKING:
+    from armblocks.studio.server.hub import Hub
+
+WEB = Path(__file__).resolve().parent.parent / "web"
+"""The built page; made by the front end's build, not kept in the repository."""
+DRAWING_TYPES = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
+THEMES = ("light", "dark", None)
+FOREVER = "private, max-age=31536000, immutable"
+"""How long a browser may keep a file whose name says its content."""
+
+
+def built_page(folder: Path = WEB) -> Path:
+    """The folder of the built page; raises ``FormatError`` with what to do if it was not built."""
+    if not (folder / "index.html").is_file():
+        raise FormatError(
+            "this installation has no studio page: it was installed without Node.js",
+            where=str(folder),
+            allowed="everything but the studio works",
+            fix="install Node.js 20.19 or newer and run 'pip install .' again, or install a released wheel",
+        )
+    return folder
+
+
+class Assets(StaticFiles):
+    """Files of the page whose names change with their content: a browser asks for each of them once."""
+
+    def file_response(
+        self,
+        full_path: str | os.PathLike[str],
+        stat_result: os.stat_result,
+        scope: MutableMapping[str, Any],
+        status_code: int = 200,
+    ) -> Response:
+        """The file, to be kept for good."""
+        answer = super().file_response(full_path, stat_result, scope, status_code)
+        answer.headers["cache-control"] = FOREVER
+        return answer
+
+
+class HubToCome:
+    """The hub of a folder, made in a thread of its own from the moment at which it is first asked for."""
+
+    def __init__(self, folder: ProjectFolder) -> None:
+        self.made: Future[Hub] = Future()
+        self._folder = folder
+        self._begun = False
+
+    def begin(self) -> None:
+        """Have it made, if nobody has yet."""
+        if not self._begun:
+            self._begun = True
+            Thread(target=self._make, name="hub").start()
+
+    async def here(self) -> Hub:
+        """The hub, as soon as it is there; raises what kept it from being made."""
+        self.begin()
+        return await asyncio.shield(asyncio.wrap_future(self.made))
+
+    def _make(self) -> None:
+        try:
+            from armblocks.studio.server.hub import Hub
+            from armblocks.studio.sheet.shown import library
+
+            library()  # the first page asks for it
+            self.made.set_result(Hub(self._folder))
+        except BaseException as error:
+            self.made.set_exception(error)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What the server answers; each method is the endpoint of a route."""
+
+    hub: HubToCome
+    keys: Keys
+    web: Path
+
+    async def health(self, _: Request) -> Response:
+        """Whether it is the studio that answers here."""
+        return PlainTextResponse("armblocks studio")
+
+    async def login(self, request: Request) -> Response:
+        """Turn the one-time key of the link into the cookie of the session."""
+        if not self.keys.spend_login(request.query_params.get("key", "")):
+            return PlainTextResponse("this login link was used or is wrong: start the studio again", 401)
+        answer = RedirectResponse("/", status_code=303)
+        answer.set_cookie(
+            self.keys.cookie_name, self.keys.session, httponly=True, samesite="strict", path="/"
+        )
+        return answer
+
+    async def index(self, _: Request) -> Response:
+        """The page."""
+        return FileResponse(self.web / "index.html", headers={"cache-control": "no-cache"})
+
+    async def drawing(self, request: Request) -> Response:
+        """A sheet as a file to keep."""
+        asked, kind = request.query_params, request.path_params["kind"]
+        theme = asked.get("theme")
+        if theme not in THEMES:
+            return PlainTextResponse("a theme is light or dark", 422)
+        hub, document = await self.hub.here(), request.path_params["document"]
+        try:
+            data = await hub.drawing(document, kind, sheet=asked.get("sheet", ""), theme=theme)
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type=DRAWING_TYPES[kind])
+
+    async def example(self, request: Request) -> Response:
+        """The drawing of a shipped example, for the gallery."""
+        hub = await self.hub.here()
+        try:
+            data = await hub.example_drawing(request.path_params["name"])
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type=DRAWING_TYPES["svg"])
+
+    async def report(self, request: Request) -> Response:
+        """The report of the last run of a document."""
+        hub = await self.hub.here()
+        try:
+            data = await hub.report(request.path_params["document"])
+        except ArmblocksError as error:
+            return PlainTextResponse(str(error), 404)
+        return Response(data, media_type="text/html")
+
+    async def talk(self, socket: WebSocket) -> None:
+        """The websocket of a page, for as long as it is there."""
+        await socket.accept()
+        outbox = Outbox(socket.send_text, socket.send_bytes)
+        hub, page = await self.hub.here(), Page(outbox.put, outbox.put, outbox)
+        sending = asyncio.create_task(outbox.empty())
+        await hub.welcome(page)
+        try:
+            while (text := await _received(socket, sending)) is not None:
+                await hub.answer(page, text)
+        except (NoRequestError, KeyError):
+            await socket.close(1008, "this is no request of the studio")
+        except WebSocketDisconnect:
+            pass
+        finally:
+            hub.leave(page)
+            sending.cancel()
+            await asyncio.gather(sending, return_exceptions=True)
+
+
+async def _received(socket: WebSocket, sending: asyncio.Task[None]) -> str | None:
+    """What the page says next; ``None`` where nothing can be sent to it any more."""
+    receiving = asyncio.create_task(socket.receive_text())
+    try:
+        await asyncio.wait((receiving, sending), return_when=asyncio.FIRST_COMPLETED)
+        return receiving.result() if receiving.done() else None
+    finally:
+        if not receiving.done():
+            receiving.cancel()
+
+
+def studio_app(hub: HubToCome, keys: Keys, hosts: frozenset[str], web: Path) -> Guard:
+    """The whole application, guarded. ``hosts``: the ``Host`` values that mean this server."""
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncGenerator[None]:
+        async def prepare() -> None:
+            (await hub.here()).prepare()
+
+        preparing = asyncio.create_task(prepare())
+        yield
+        preparing.cancel()
+        await asyncio.gather(preparing, return_exceptions=True)
+        if hub.made.done() and hub.made.exception() is None:
+            hub.made.result().close()
+
+    answers = Answers(hub, keys, web)
+    routes: list[Any] = [
+        Route("/health", answers.health),
+        Route("/login", answers.login),
+        Route("/drawing/{document}.{kind}", answers.drawing),
+        Route("/example/{name}.svg", answers.example),
+        Route("/report/{document}", answers.report),
+        WebSocketRoute("/ws", answers.talk),
+        Route("/", answers.index),
+        Mount("/assets", Assets(directory=web / "assets", check_dir=False)),
+        Mount("/", StaticFiles(directory=web)),
+    ]
+    return Guard(Starlette(routes=routes, lifespan=lifespan), keys, hosts)

@@ -1,0 +1,1 @@
+"""Diagrams in the studio: edits, what a sheet shows, checks, search."""

@@ -1,0 +1,77 @@
+"""What is wrong with a drawing in progress, said at its blocks and ports; it forbids nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_shapes, infer_units
+from armblocks.diagram.check import check_diagram
+from armblocks.diagram.hierarchy import joined, levels_of
+from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
+from armblocks.studio.protocol.sheet_messages import Finding, WireKind
+
+_QUOTED = re.compile(r"block '([^']+)'")
+
+
+def check(diagram: Diagram) -> tuple[list[Finding], dict[str, WireKind]]:
+    """The findings, and what runs on the wires of every output as far as it can be told."""
+    try:
+        levels = levels_of(diagram)
+    except DiagramError as error:
+        return _findings(error, ()), {}
+    open_inputs = [
+        (joined(path, name), port.name)
+        for path, level in levels.items()
+        for name, block in level.blocks.items()
+        for port in block.input_ports()
+        if PortRef(name, port.name) not in level.drivers
+    ]
+    if open_inputs:
+        # Nothing else can be told before every input has a driver.
+        return [_open_input(block, port) for block, port in open_inputs], {}
+    known = [joined(path, name) for path, level in levels.items() for name in level.blocks]
+    try:
+        wires = _wires(diagram)
+        check_diagram(diagram)
+    except ArmblocksError as error:
+        return _findings(error, known), {}
+    return [], wires
+
+
+def _open_input(block: str, port: str) -> Finding:
+    return Finding(
+        severity="error",
+        block=block,
+        port=port,
+        what=f"the input '{port}' is not connected",
+        fix="draw a wire to it, or drop a Constant or a Ground beside it",
+    )
+
+
+def _wires(diagram: Diagram) -> dict[str, WireKind]:
+    form = flatten_hierarchy(diagram)
+    shapes, units = infer_shapes(diagram).outputs, infer_units(diagram)
+    kinds = {
+        PortRef(name, port): WireKind(shape=list(shape), unit=units.get(PortRef(name, port), ""))
+        for name, outputs in shapes.items()
+        for port, shape in outputs.items()
+    }
+    named = {str(ref): kind for ref, kind in kinds.items()}
+    for port, carried in form.carried.items():
+        if isinstance(carried, Bus):
+            named[str(port)] = WireKind(shape=[], unit="", bus=True)
+        elif carried in kinds:
+            named[str(port)] = kinds[carried]
+    return named
+
+
+def _findings(error: ArmblocksError, known: Collection[str]) -> list[Finding]:
+    """One finding at every block that a message names, so that each can be marked."""
+    blocks: list[str] = []
+    if isinstance(error, AlgebraicLoopError):
+        blocks = [ref.rpartition("/")[0] for ref in error.loop]
+    elif isinstance(error, DiagramError):
+        blocks = _QUOTED.findall(f"{error.where} {error.what}")
+    marked = [name for name in dict.fromkeys(blocks) if name in known] or [""]
+    return [Finding(severity="error", block=name, port="", what=error.what, fix=error.fix) for name in marked]

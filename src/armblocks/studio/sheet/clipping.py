@@ -1,0 +1,112 @@
+"""What is copied travels as a diagram file: into another window, a mail, a file, and back onto a sheet.
+
+So a copy has all that a file keeps: what is inside of subsystems, links to libraries, formulas, robots, the
+ways that wires were led, notes.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+
+from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Connection, Diagram, PortRef
+from armblocks.diagram.mask import formula_names
+from armblocks.diagram.names import folded
+from armblocks.errors import DiagramError
+from armblocks.studio.sheet.nesting import check_free
+from armblocks.studio.sheet.parameter_values import ResolveRobot
+from armblocks.studio.sheet.placing import placed
+
+ReadDiagram = Callable[[str, str], Diagram]
+"""From the text of a diagram file, and what messages call it, to the diagram, which may be a draft."""
+
+
+def reader(resolve_robot: ResolveRobot) -> ReadDiagram:
+    """Reads drawings in progress that need no files of a project but robots."""
+
+    def read(text: str, where: str) -> Diagram:
+        return formats.diagram_from_bytes(text.encode(), where, BLOCKS, resolve_robot, draft=True)
+
+    return read
+
+
+def clipped(
+    diagram: Diagram,
+    names: Collection[str],
+    notes: Collection[str],
+    resolve_robot: ResolveRobot,
+    folder: Path | None = None,
+) -> str:
+    """Some blocks of a sheet, the wires among them and some notes, as the text of a diagram file."""
+    chosen = {name: diagram.block(name) for name in names}
+    part = Diagram(
+        name=diagram.name,
+        blocks=chosen,
+        connections=tuple(
+            wire
+            for wire in diagram.connections
+            if wire.source.block in chosen and wire.target.block in chosen
+        ),
+        layout={name: place for name, place in diagram.layout.items() if name in chosen},
+        bends=diagram.bends,
+        notes={name: note for name, note in diagram.notes.items() if name in notes},
+        logged=tuple(ref for ref in diagram.logged if ref.block in chosen),
+        mask=diagram.mask,
+        mask_values=diagram.mask_values,
+    )
+    return formats.diagram_to_bytes(part, resolve_robot, folder=folder).decode()
+
+
+def pasted(diagram: Diagram, copied: Diagram, names: Mapping[str, str], shift: float) -> Diagram:
+    """The diagram with all that was copied on it, under other names where ``names`` has some.
+
+    A formula stays one where the sheet declares all its names; elsewhere its value is taken. Raises
+    ``DiagramError`` for a name that is taken.
+    """
+    where = f"diagram '{diagram.name}'"
+    copied = placed(copied)
+    taken = {folded(name): name for name in diagram.blocks}
+    for name in copied.blocks:
+        check_free(names.get(name, name), taken, where)
+        taken[folded(names.get(name, name))] = names.get(name, name)
+    notes = {names.get(name, name): note for name, note in copied.notes.items()}
+    if any(name in diagram.notes for name in notes):
+        raise DiagramError(
+            "a note of this name is already there",
+            where=where,
+            allowed="every name once",
+            fix="give the pasted note another name",
+        )
+
+    def moved(ref: PortRef) -> PortRef:
+        return PortRef(names.get(ref.block, ref.block), ref.port)
+
+    wires = {wire: Connection(moved(wire.source), moved(wire.target)) for wire in copied.connections}
+    layout = {
+        names.get(name, name): dataclasses.replace(place, x=place.x + shift, y=place.y + shift)
+        for name, place in copied.layout.items()
+    }
+    bends = {wires[wire]: tuple(value + shift for value in led) for wire, led in copied.bends.items()}
+    shifted = {
+        name: dataclasses.replace(note, x=note.x + shift, y=note.y + shift) for name, note in notes.items()
+    }
+    blocks = {names.get(name, name): _at_home(block, diagram) for name, block in copied.blocks.items()}
+    return dataclasses.replace(
+        diagram,
+        blocks={**diagram.blocks, **blocks},
+        connections=(*diagram.connections, *wires.values()),
+        layout={**diagram.layout, **layout},
+        bends={**diagram.bends, **bends},
+        notes={**diagram.notes, **shifted},
+        logged=(*diagram.logged, *(moved(ref) for ref in copied.logged)),
+    )
+
+
+def _at_home(block: Block, diagram: Diagram) -> Block:
+    """A block whose formulas over what the diagram does not declare have become values."""
+    known = set(diagram.mask_values)
+    foreign = [name for name, text in block.formulas if not formula_names(text) <= known]
+    return block.with_parameters(**{name: block.parameter_value(name) for name in foreign})

@@ -1,0 +1,329 @@
+"""What edits do: each is a pure function from one diagram to the next.
+
+A drawing in progress is a :class:`~armblocks.diagram.Diagram` that nobody has checked: inputs may be open and
+widths may disagree; that is told beside the blocks, it does not forbid the edit. What an edit does refuse is
+what no drawing could show: a name that is taken, a port that is not there, a second driver of one input, a
+parameter that its block does not allow.
+
+Parameters arrive as JSON values and are checked by the block's own declarations. Nothing is evaluated.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import (
+    Block,
+    Connection,
+    Diagram,
+    DiagramBlock,
+    Note,
+    ParameterKind,
+    Placement,
+    PortRef,
+    with_parameters,
+)
+from armblocks.diagram.diagram import block_in_scope
+from armblocks.diagram.mask import Scope
+from armblocks.diagram.names import folded
+from armblocks.drawing.diagram_layout import standing_box
+from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.studio.protocol.edit_messages import (
+    AddBlocks,
+    BendWires,
+    BreakLink,
+    Connect,
+    Describe,
+    Edit,
+    GroupBlocks,
+    KeepTuned,
+    LogSignal,
+    MoveBlocks,
+    NewBlock,
+    PasteBlocks,
+    Place,
+    RemoveBlocks,
+    Rename,
+    SetMask,
+    SetNotes,
+    SetParameters,
+    SetSettings,
+    SheetNote,
+    Wire,
+)
+from armblocks.studio.sheet.clipping import ReadDiagram, pasted, reader
+from armblocks.studio.sheet.mask_edits import with_mask
+from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
+from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_value, tuned_value
+from armblocks.studio.sheet.placing import placed
+from armblocks.studio.sheet.typed_settings import with_settings
+
+DEFAULT_ROBOT = "puma560"
+"""The arm that a robot block starts with when it is dropped on the sheet."""
+MOST_BLOCKS = 20_000
+"""Blocks that one sheet may hold in the editor."""
+
+
+def applied(
+    edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot, read_diagram: ReadDiagram | None = None
+) -> Diagram:
+    """The diagram after an edit; the one given stays as it is. ``resolve_robot`` finds the robots it names.
+
+    ``read_diagram`` reads what was copied; without it only what needs no files of a project can be pasted.
+    Raises ``DiagramError``, ``UnknownNameError`` or ``InputError`` for an edit that cannot be carried out.
+    """
+    match edit:
+        case AddBlocks():
+            return _add(edit, diagram, resolve_robot)
+        case PasteBlocks():
+            copied = (read_diagram or reader(resolve_robot))(edit.text, "what was copied")
+            _check_room(diagram, len(copied.blocks))
+            return pasted(diagram, copied, edit.names, edit.shift)
+        case RemoveBlocks():
+            return _remove(edit, diagram)
+        case Connect():
+            return _connect([edit.wire], diagram, replace=edit.replace)
+        case MoveBlocks():
+            return _move(edit, diagram)
+        case BendWires():
+            return _bend(edit.wires, diagram)
+        case SetNotes():
+            return _note(edit.notes, diagram)
+        case Rename():
+            return _rename(edit, diagram)
+        case SetParameters():
+            return _set_parameters(edit, diagram, resolve_robot)
+        case SetMask():
+            return with_mask(edit, diagram, resolve_robot)
+        case KeepTuned():
+            return with_parameters(
+                diagram, {path: tuned_value(value, path) for path, value in edit.values.items()}
+            )
+        case LogSignal():
+            return _log(edit, diagram)
+        case GroupBlocks():
+            return grouped(edit.blocks, edit.name, diagram)
+        case BreakLink():
+            return unlinked(diagram, _known(edit.block, diagram))
+        case SetSettings():
+            return _set_settings(edit, diagram)
+        case Describe():
+            return dataclasses.replace(diagram, description=edit.text)
+
+
+def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    where = f"diagram '{diagram.name}'"
+    blocks, layout = dict(diagram.blocks), dict(diagram.layout)
+    _check_room(diagram, len(edit.blocks))
+    taken = {folded(name): name for name in blocks}
+    for new in edit.blocks:
+        check_free(new.name, taken, where)
+        taken[folded(new.name)] = new.name
+        blocks[new.name] = _made(new, diagram.mask_values, resolve_robot)
+        layout[new.name] = _placement(new.place)
+    added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
+    if edit.instead:
+        added = _remove(RemoveBlocks(wires=edit.instead), added)
+    return _connect(edit.wires, added, replace=False)
+
+
+def _check_room(diagram: Diagram, more: int) -> None:
+    if len(diagram.blocks) + more > MOST_BLOCKS:
+        raise DiagramError(
+            f"the sheet would hold {len(diagram.blocks) + more} blocks",
+            where=f"diagram '{diagram.name}'",
+            allowed=f"at most {MOST_BLOCKS}",
+            fix="group some of them into subsystems",
+        )
+
+
+def _made(new: NewBlock, scope: Scope, resolve_robot: ResolveRobot) -> Block:
+    kind = BLOCKS[new.type]
+    rules = {rule.name: rule for rule in kind.parameters()}
+    values: dict[str, Any] = {}
+    for name, value in new.parameters.items():
+        if name not in rules:
+            raise UnknownNameError(f"parameter of {new.type}", name, rules, where=f"block '{new.name}'")
+        values[name] = parameter_value(rules[name], value, f"block '{new.name}'", resolve_robot, scope)
+    for name, rule in rules.items():
+        if rule.required and name not in values:
+            default = DEFAULT_ROBOT if rule.kind is ParameterKind.ROBOT else None
+            values[name] = parameter_value(rule, default, f"block '{new.name}'", resolve_robot)
+    made = kind(**values)
+    # What is inside of a new subsystem can be looked at as well.
+    return dataclasses.replace(made, diagram=placed(made.diagram)) if isinstance(made, DiagramBlock) else made
+
+
+def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
+    gone = {_known(name, diagram) for name in edit.blocks}
+    cut = {_connection(wire) for wire in edit.wires}
+    for wire in cut:
+        _present(wire, diagram)
+    return dataclasses.replace(
+        diagram,
+        blocks={name: block for name, block in diagram.blocks.items() if name not in gone},
+        layout={name: place for name, place in diagram.layout.items() if name not in gone},
+        notes={name: note for name, note in diagram.notes.items() if name not in edit.notes},
+        connections=tuple(
+            wire
+            for wire in diagram.connections
+            if wire not in cut and wire.source.block not in gone and wire.target.block not in gone
+        ),
+        logged=tuple(ref for ref in diagram.logged if ref.block not in gone),
+    )
+
+
+def _present(wire: Connection, diagram: Diagram) -> Connection:
+    if wire not in diagram.connections:
+        raise DiagramError(
+            f"there is no wire {wire}",
+            where=f"diagram '{diagram.name}'",
+            allowed="a wire of this sheet",
+            fix="reload the page if it shows one there",
+        )
+    return wire
+
+
+def _log(edit: LogSignal, diagram: Diagram) -> Diagram:
+    ref = _port(edit.port)
+    _check_port(ref, diagram, output=True)
+    others = tuple(other for other in diagram.logged if other != ref)
+    return dataclasses.replace(diagram, logged=(*others, ref) if edit.logged else others)
+
+
+def _connect(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
+    connections = {wire.target: wire for wire in diagram.connections}
+    for wire in wires:
+        made = _connection(wire)
+        _check_port(made.source, diagram, output=True)
+        _check_port(made.target, diagram, output=False)
+        present = connections.get(made.target)
+        if present is not None and not replace:
+            raise DiagramError(
+                f"input '{made.target}' is already driven by '{present.source}'",
+                where=f"diagram '{diagram.name}'",
+                allowed="one wire for each input",
+                fix="delete that wire first, or join the signals with a Sum or a Mux",
+            )
+        connections[made.target] = made
+    if not wires:
+        return diagram
+    connected = dataclasses.replace(diagram, connections=tuple(connections.values()))
+    return _bend([wire for wire in wires if wire.bends], connected)
+
+
+def _connection(wire: Wire) -> Connection:
+    return Connection(_port(wire.source), _port(wire.target))
+
+
+def _port(text: str) -> PortRef:
+    block, slash, port = text.rpartition("/")
+    if not slash:
+        raise DiagramError(
+            f"'{text}' is no port",
+            allowed="block/port",
+            fix="name the block and the port",
+            where="connection",
+        )
+    return PortRef(block, port)
+
+
+def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
+    block = diagram.blocks[_known(ref.block, diagram)]
+    ports = [port.name for port in (block.output_ports() if output else block.input_ports())]
+    if ref.port not in ports:
+        side = "output" if output else "input"
+        raise UnknownNameError(f"{side} port", ref.port, ports, where=f"block '{ref.block}' ({block.title})")
+
+
+def _move(edit: MoveBlocks, diagram: Diagram) -> Diagram:
+    layout = dict(diagram.layout)
+    shifts: dict[str, tuple[float, float]] = {}
+    for name, place in edit.places.items():
+        before, after = layout[_known(name, diagram)], _placement(place)
+        layout[name] = after
+        if dataclasses.replace(before, x=after.x, y=after.y) == after:
+            shifts[name] = (after.x - before.x, after.y - before.y)
+    bends = dict(diagram.bends)
+    for wire, values in diagram.bends.items():
+        shift = shifts.get(wire.source.block)
+        if shift is not None and shift == shifts.get(wire.target.block):
+            flat = _leaves_sideways(wire, diagram)
+            bends[wire] = tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(values))
+    moved = _note(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
+    return _connect(edit.wires, _remove(RemoveBlocks(wires=edit.instead), moved), replace=False)
+
+
+def _leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
+    block, place = diagram.blocks[wire.source.block], diagram.layout[wire.source.block]
+    spots = standing_box(wire.source.block, block, place).outputs
+    return any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
+
+
+def _bend(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
+    bends = dict(diagram.bends)
+    for wire in wires:
+        bends[_present(_connection(wire), diagram)] = tuple(wire.bends)
+    return dataclasses.replace(diagram, bends=bends)
+
+
+def _note(notes: Mapping[str, SheetNote], diagram: Diagram, *, known: bool = False) -> Diagram:
+    if not notes:
+        return diagram
+    for name in notes if known else ():
+        if name not in diagram.notes:
+            raise UnknownNameError("note", name, diagram.notes, where=f"diagram '{diagram.name}'")
+    changed = {name: Note(**note.model_dump()) for name, note in notes.items()}
+    return dataclasses.replace(diagram, notes={**diagram.notes, **changed})
+
+
+def _placement(place: Place) -> Placement:
+    return Placement(**place.model_dump())
+
+
+def _rename(edit: Rename, diagram: Diagram) -> Diagram:
+    _known(edit.block, diagram)
+    taken = {folded(name): name for name in diagram.blocks if name != edit.block}
+    check_free(edit.name, taken, f"diagram '{diagram.name}'")
+
+    def renamed(name: str) -> str:
+        return edit.name if name == edit.block else name
+
+    def moved(ref: PortRef) -> PortRef:
+        return PortRef(renamed(ref.block), ref.port)
+
+    wires = {wire: Connection(moved(wire.source), moved(wire.target)) for wire in diagram.connections}
+    return dataclasses.replace(
+        diagram,
+        blocks={renamed(name): block for name, block in diagram.blocks.items()},
+        layout={renamed(name): place for name, place in diagram.layout.items()},
+        connections=tuple(wires.values()),
+        bends={wires[wire]: bends for wire, bends in diagram.bends.items()},
+        logged=tuple(moved(ref) for ref in diagram.logged),
+    )
+
+
+def _set_parameters(edit: SetParameters, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    old = diagram.blocks[_known(edit.block, diagram)]
+    rules = {rule.name: rule for rule in old.own_parameters()}
+    where = f"block '{edit.block}' ({old.title})"
+    values: dict[str, Any] = {}
+    for name, value in edit.values.items():
+        if name not in rules:
+            raise UnknownNameError("parameter", name, rules, where=where)
+        values[name] = parameter_value(rules[name], value, where, resolve_robot, diagram.mask_values)
+    changed = block_in_scope(edit.block, old.with_parameters(**values), diagram.mask_values)
+    return with_block(diagram, edit.block, changed)
+
+
+def _set_settings(edit: SetSettings, diagram: Diagram) -> Diagram:
+    return dataclasses.replace(diagram, settings=with_settings(diagram.settings, edit.values))
+
+
+def _known(name: str, diagram: Diagram) -> str:
+    if name not in diagram.blocks:
+        raise UnknownNameError("block", name, diagram.blocks, where=f"diagram '{diagram.name}'")
+    return name

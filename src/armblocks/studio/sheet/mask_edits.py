@@ -1,0 +1,160 @@
+"""Editing the parameters that a diagram declares, its mask: what the dialog "Edit mask" asks for."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from armblocks.diagram import Block, Diagram, DiagramBlock, Parameter, ParameterKind
+from armblocks.diagram.diagram import block_in_scope
+from armblocks.diagram.mask import formula_names
+from armblocks.diagram.parameter import REQUIRED, Value
+from armblocks.errors import DiagramError, InputError, UnknownNameError
+from armblocks.studio.protocol.edit_messages import MaskParameter, SetMask
+from armblocks.studio.sheet.nesting import with_block
+from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_json, parameter_value
+
+_TRUTH = {"true": True, "1": True, "false": False, "0": False}
+
+
+def mask_of(diagram: Diagram) -> SetMask:
+    """The mask of a diagram as the edit that would make it anew."""
+    return SetMask(name=diagram.name, parameters=[_stated(rule) for rule in diagram.mask])
+
+
+def _stated(rule: Parameter) -> MaskParameter:
+    return MaskParameter(
+        name=rule.name,
+        was=rule.name,
+        kind=rule.kind.value,  # pyright: ignore[reportArgumentType]
+        default=parameter_json(rule.default),
+        unit=rule.unit,
+        doc=rule.doc,
+        minimum=rule.minimum if math.isfinite(rule.minimum) else None,
+        above=rule.above,
+        maximum=rule.maximum if math.isfinite(rule.maximum) else None,
+        choices=list(rule.choices),
+    )
+
+
+def with_mask(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    """The diagram after its mask, or that of one of its subsystems, was edited.
+
+    What had another name is renamed in all formulas; what is set keeps its value. Raises ``DiagramError`` for
+    a block without a mask of its own and for a parameter that is removed while a formula reads it, else what
+    the declarations and the values raise.
+    """
+    if not edit.block:
+        return _masked(edit, diagram, resolve_robot)
+    if edit.block not in diagram.blocks:
+        raise UnknownNameError("block", edit.block, diagram.blocks, where=f"diagram '{diagram.name}'")
+    block = diagram.blocks[edit.block]
+    where = f"block '{edit.block}' ({block.title})"
+    if not isinstance(block, DiagramBlock):
+        raise DiagramError(
+            "the block cannot have a mask",
+            where=where,
+            allowed="subsystems",
+            fix="put it into a subsystem first",
+        )
+    if block.diagram.link:
+        raise DiagramError(
+            f"the mask belongs to the library block '{block.diagram.link}'",
+            where=where,
+            allowed="other values of its parameters",
+            fix="break the link first",
+        )
+    names = _renamings(edit) | {rule.name: rule.name for rule in block.parameters()}
+    changed = dataclasses.replace(
+        block,
+        diagram=_masked(edit, block.diagram, resolve_robot),
+        formulas=tuple(sorted((names[name], text) for name, text in block.formulas if name in names)),
+    )
+    return with_block(diagram, edit.block, block_in_scope(edit.block, changed, diagram.mask_values))
+
+
+def _renamings(edit: SetMask) -> dict[str, str]:
+    """New names of the parameters that stay, by their old ones."""
+    return {rule.was: rule.name for rule in edit.parameters if rule.was}
+
+
+def _masked(edit: SetMask, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+    where = f"diagram '{diagram.name}'"
+    old = {rule.name: rule for rule in diagram.mask}
+    names = _renamings(edit)
+    for name in names:
+        if name not in old:
+            raise UnknownNameError("mask parameter", name, old, where=where)
+    mask = tuple(_rule(rule, old.get(rule.was), where, resolve_robot) for rule in edit.parameters)
+    values: dict[str, Value] = {}
+    for stated, rule in zip(edit.parameters, mask):
+        before = old.get(stated.was)
+        # What is now of another kind begins at its default, and what stood at the default follows it.
+        if before is None or before.kind is not rule.kind:
+            continue
+        if (value := diagram.mask_values[stated.was]) != before.default:
+            values[rule.name] = rule.check(value, f"{where}, '{rule.name}'")
+    gone = [name for name in old if name not in names]
+    blocks = {name: _respelled(name, block, names, gone) for name, block in diagram.blocks.items()}
+    return dataclasses.replace(
+        diagram, name=edit.name or diagram.name, mask=mask, mask_values=values, blocks=blocks
+    )
+
+
+def _rule(stated: MaskParameter, old: Parameter | None, where: str, resolve_robot: ResolveRobot) -> Parameter:
+    """The declaration; what the dialog does not show stays as it was."""
+    kind = ParameterKind(stated.kind)
+    plain = Parameter(name="", kind=kind, doc="", default=REQUIRED)
+    base = plain if old is None or old.kind is not kind else old
+    rule = dataclasses.replace(
+        base,
+        name=stated.name,
+        doc=stated.doc,
+        unit=stated.unit,
+        default=REQUIRED,
+        minimum=-math.inf if stated.minimum is None else stated.minimum,
+        above=stated.above,
+        maximum=math.inf if stated.maximum is None else stated.maximum,
+        choices=tuple(stated.choices),
+    )
+    default = parameter_value(rule, _typed(stated, where), where, resolve_robot)
+    return dataclasses.replace(rule, default=default)
+
+
+def _typed(stated: MaskParameter, where: str) -> Any:
+    typed = stated.default
+    if stated.kind != "boolean" or not isinstance(typed, str):
+        return typed
+    if typed.strip().lower() not in _TRUTH:
+        raise InputError(
+            f"the value is '{typed[:40]}'",
+            where=f"{where}, parameter '{stated.name}'",
+            allowed="true or false",
+            fix="choose one of the two",
+        )
+    return _TRUTH[typed.strip().lower()]
+
+
+def _respelled(name: str, block: Block, names: Mapping[str, str], gone: list[str]) -> Block:
+    """A block whose formulas read the parameters by their new names."""
+    formulas: list[tuple[str, str]] = []
+    for parameter, text in block.formulas:
+        lost = formula_names(text) & set(gone)
+        if lost:
+            raise DiagramError(
+                f"the mask parameter '{min(lost)}' is removed, and the formula '{text[:60]}' reads it",
+                where=f"block '{name}' ({block.title}), parameter '{parameter}'",
+                allowed="removing what no formula reads",
+                fix="change that formula first, or keep the parameter",
+            )
+        formulas.append((parameter, renamed_in(text, names)))
+    changed = tuple(formulas)
+    return block if changed == block.formulas else dataclasses.replace(block, formulas=changed)
+
+
+def renamed_in(formula: str, names: Mapping[str, str]) -> str:
+    """A formula with other names in it, all exchanged at once."""
+    return re.sub(r"(?<![\w.])[^\W\d]\w*", lambda found: names.get(found[0], found[0]), formula)

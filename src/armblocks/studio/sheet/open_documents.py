@@ -1,0 +1,59 @@
+"""The diagrams that a studio has open."""
+
+from __future__ import annotations
+
+import asyncio
+import dataclasses
+from pathlib import PurePath
+
+from armblocks.studio.documents.file_kind import DiagramKind
+from armblocks.studio.documents.open_files import OpenFile, OpenFiles
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.documents.state_folder import StateFolder
+from armblocks.studio.protocol import messages as say
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.parameter_values import ResolveRobot
+
+
+@dataclasses.dataclass(eq=False, kw_only=True)
+class OpenDocument(OpenFile[Document]):
+    """A drawing with its file, its journal and the background check that looks at it."""
+
+    checking: asyncio.Task[None] | None = None
+
+    def leave(self) -> None:
+        """It is put away: what would be done about it later is not."""
+        super().leave()
+        if self.checking is not None:
+            self.checking.cancel()
+
+    def state(self) -> say.DocumentState:
+        """Where it stands, for pages."""
+        document = self.document
+        return say.DocumentState(
+            document=self.key,
+            version=document.version,
+            title=document.diagram.name,
+            path=self.path,
+            example=self.origin,
+            dirty=document.dirty,
+            undo=document.undo_title,
+            redo=document.redo_title,
+            disk=self.disk,
+            journaled=self.journaled,
+            settings=dataclasses.asdict(document.diagram.settings),
+        )
+
+
+class OpenDocuments(OpenFiles[OpenDocument]):
+    """The open diagrams of one project folder; see :class:`.OpenFiles`."""
+
+    def __init__(self, folder: ProjectFolder, kept: StateFolder, resolve_robot: ResolveRobot) -> None:
+        super().__init__(folder, kept, DiagramKind(folder, resolve_robot))
+
+    def open_bytes(self, data: bytes, name: str) -> OpenDocument:
+        """A new drawing that begins as the content of a file from elsewhere."""
+        return self.bring(self.kind.from_file(data, self.folder.root / PurePath(name).name))
+
+    def _made(self, key: str, document: Document) -> OpenDocument:
+        return OpenDocument(key=key, document=document)

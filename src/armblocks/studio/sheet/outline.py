@@ -1,0 +1,81 @@
+"""The whole model at a glance: its tree of sheets, and where something is found in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from armblocks.diagram import Block, Diagram, DiagramBlock, ParameterKind
+from armblocks.studio.protocol.sheet_messages import Found, Outline
+from armblocks.studio.sheet.parameter_values import parameter_json
+
+MOST_FOUND = 50
+MOST_TEXT = 60
+"""Characters of a value that are shown."""
+
+
+def outline(diagram: Diagram) -> Outline:
+    """The sheets of a diagram as a tree."""
+    inner = {name: block for name, block in diagram.blocks.items() if isinstance(block, DiagramBlock)}
+    return Outline(
+        name=diagram.name,
+        blocks=len(diagram.blocks),
+        subsystems=[
+            outline(block.diagram).model_copy(update={"name": name}) for name, block in inner.items()
+        ],
+    )
+
+
+def find(diagram: Diagram, text: str) -> list[Found]:
+    """Blocks of all sheets that hold every word of ``text`` in name, type or values; the best come first.
+
+    A word that begins a name counts most, then one in a name, in a type, in a value.
+    """
+    words = text.lower().split()
+    ranked: list[tuple[int, int, Found]] = []
+    for path, name, block in _blocks(diagram, ()):
+        rank, matches = 0, list[str]()
+        for word in words:
+            one, match = _rank(name, block, word)
+            rank = max(rank, one)
+            matches += [match] if match else []
+        if words and rank < _NOT:
+            found = Found(inside=list(path), name=name, title=block.title, match=", ".join(matches))
+            ranked.append((rank, len(path), found))
+    ranked.sort(key=lambda entry: entry[:2])
+    return [found for _, _, found in ranked[:MOST_FOUND]]
+
+
+_NOT = 9
+"""Rank of what does not match."""
+
+
+def _rank(name: str, block: Block, word: str) -> tuple[int, str]:
+    if name.lower().startswith(word):
+        return 0, ""
+    if word in name.lower():
+        return 1, ""
+    if word in block.title.lower() or word in block.type_name().lower():
+        return 2, ""
+    for rule in block.parameters():
+        if rule.kind is ParameterKind.DIAGRAM:
+            continue
+        said = f"{rule.name} = {_text(parameter_json(block.parameter_value(rule.name)))}"
+        if word in said.lower():
+            return 3, said if len(said) <= MOST_TEXT else f"{said[: MOST_TEXT - 1]}…"
+    return _NOT, ""
+
+
+def _text(value: object) -> str:
+    """A value as the dialogs show it."""
+    if isinstance(value, dict):
+        return str(value.get("source", ""))  # pyright: ignore[reportUnknownMemberType, reportUnknownArgumentType]
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value)
+
+
+def _blocks(diagram: Diagram, path: Sequence[str]) -> Iterator[tuple[Sequence[str], str, Block]]:
+    for name, block in diagram.blocks.items():
+        yield path, name, block
+        if isinstance(block, DiagramBlock):
+            yield from _blocks(block.diagram, (*path, name))

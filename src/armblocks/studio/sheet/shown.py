@@ -1,0 +1,191 @@
+"""A diagram as the page draws it: boxes, ports, faces, wires; and what changed since another diagram."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+from typing import Any
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
+from armblocks.drawing.block_faces import FaceShape, face_size, port_labels
+from armblocks.drawing.diagram_drawing import block_marks
+from armblocks.drawing.diagram_layout import Box, drawn_blocks, standing_box
+from armblocks.errors import ArmblocksError
+from armblocks.formats import load_robot
+from armblocks.pictures.picture import Picture
+from armblocks.pictures.svg import svg_marks
+from armblocks.studio.protocol.edit_messages import Place, SheetNote, Wire
+from armblocks.studio.protocol.sheet_messages import (
+    BlockType,
+    ParameterRule,
+    PortSpot,
+    Sheet,
+    SheetBlock,
+    SheetChange,
+)
+from armblocks.studio.sheet.edits import DEFAULT_ROBOT
+from armblocks.studio.sheet.parameter_values import parameter_json
+
+
+def sheet(diagram: Diagram) -> Sheet:
+    """The whole drawing of a diagram whose blocks all have a place."""
+    return Sheet(
+        linked=[],
+        link="",
+        name=diagram.name,
+        description=diagram.description,
+        blocks={name: _sheet_block(name, block, diagram) for name, block in diagram.blocks.items()},
+        wires=[_wire(wire, diagram) for wire in diagram.connections],
+        notes=_notes(diagram),
+        logged=[str(ref) for ref in diagram.logged],
+    )
+
+
+def sheet_change(before: Diagram, after: Diagram) -> SheetChange:
+    """What is other in ``after``. Blocks that are the same objects are not looked at."""
+    blocks: dict[str, SheetBlock | None] = {name: None for name in before.blocks if name not in after.blocks}
+    shown, shows = drawn_blocks(before), drawn_blocks(after)
+    for name, block in after.blocks.items():
+        same = before.blocks.get(name) is block and (shown[name] is shows[name] or shown[name] == shows[name])
+        if not same or before.layout.get(name) != after.layout.get(name):
+            blocks[name] = _sheet_block(name, block, after)
+    old, new = (
+        {(wire, diagram.bends.get(wire, ())) for wire in diagram.connections} for diagram in (before, after)
+    )
+    return SheetChange(
+        blocks=blocks,
+        wires_added=[_wire(wire, after) for wire, _ in sorted(new - old)],
+        wires_removed=[_wire(wire, before) for wire, _ in sorted(old - new)],
+        notes=_notes(after) if after.notes != before.notes else None,
+        description=after.description if after.description != before.description else None,
+        logged=[str(ref) for ref in after.logged] if after.logged != before.logged else None,
+    )
+
+
+@lru_cache(maxsize=1)
+def library() -> tuple[BlockType, ...]:
+    """Every type of block, for the palette and the dialogs."""
+    return tuple(_block_type(kind) for kind in BLOCKS.values())
+
+
+def _block_type(kind: type[Block]) -> BlockType:
+    block = _default(kind)
+    box = standing_box("", block, Placement(x=0.0, y=0.0))
+    return BlockType(
+        type=kind.type_name(),
+        title=kind.title,
+        family=kind.family,
+        summary=kind.summary(),
+        documentation=(kind.__doc__ or "").strip(),
+        width=box.width,
+        height=box.height,
+        face=_face(box),
+        inputs=[port.name for port in block.input_ports()],
+        outputs=[port.name for port in block.output_ports()],
+        parameters=[
+            _rule(rule, block) for rule in kind.parameters() if rule.kind is not ParameterKind.DIAGRAM
+        ],
+    )
+
+
+def _rule(rule: Parameter, block: Block) -> ParameterRule:
+    return ParameterRule(
+        name=rule.name,
+        kind=rule.kind.value,
+        doc=rule.doc,
+        unit=rule.unit,
+        default=parameter_json(block.parameter_value(rule.name)),
+        tunable=rule.tunable,
+        choices=list(rule.choices),
+        allowed=rule.describe(),
+    )
+
+
+def _default(kind: type[Block]) -> Block:
+    robots: dict[str, Any] = {
+        rule.name: load_robot(DEFAULT_ROBOT)
+        for rule in kind.parameters()
+        if rule.required and rule.kind is ParameterKind.ROBOT
+    }
+    return kind(**robots)
+
+
+def _sheet_block(name: str, block: Block, diagram: Diagram) -> SheetBlock:
+    place = diagram.layout[name]
+    shown = drawn_blocks(diagram)[name]
+    drawn = _drawn(shown, dataclasses.replace(place, x=0.0, y=0.0))
+    own: dict[str, Any] = {"name": name, "place": Place(**dataclasses.asdict(place))}
+    if shown is not block:
+        own["parameters"] = _parameters(block)
+    return drawn.model_copy(update=own)
+
+
+@lru_cache(maxsize=4096)
+def _drawn(block: Block, place: Placement) -> SheetBlock:
+    """A block at the origin: blocks that look alike are drawn once."""
+    box = standing_box("", block, place)
+    into, out = port_labels(block)
+    return SheetBlock(
+        name="",
+        type=block.type_name(),
+        title=block.title,
+        place=Place(x=0.0, y=0.0),
+        width=box.width,
+        height=box.height,
+        face=_face(box),
+        inputs=_spots(box, into, inputs=True),
+        outputs=_spots(box, out, inputs=False),
+        opens=isinstance(block, DiagramBlock),
+        formulas=dict(block.formulas),
+        mask=[_rule(rule, block) for rule in block.diagram.mask] if isinstance(block, DiagramBlock) else [],
+        link=block.diagram.link if isinstance(block, DiagramBlock) else "",
+        parameters=_parameters(block),
+    )
+
+
+def _parameters(block: Block) -> dict[str, Any]:
+    return {
+        rule.name: parameter_json(block.parameter_value(rule.name))
+        for rule in block.parameters()
+        if rule.kind is not ParameterKind.DIAGRAM
+    }
+
+
+def _face(box: Box) -> str:
+    try:
+        marks = block_marks(box)
+    except ArmblocksError:
+        # A face that cannot be drawn (a robot without links) must not stop the sheet.
+        marks = block_marks(dataclasses.replace(box, block=BLOCKS["Ground"]()))
+    return svg_marks(Picture(width=box.width, height=box.height, title="", marks=marks))
+
+
+def _spots(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[PortSpot]:
+    ports = box.block.input_ports() if inputs else box.block.output_ports()
+    spots = {spot.name: spot for spot in (box.inputs if inputs else box.outputs)}
+    shown = labels if len(labels) == len(ports) else ("",) * len(ports)
+    if face_size(box.block)[0] is FaceShape.CIRCLE:
+        shown = ("",) * len(ports)
+    return [
+        PortSpot(
+            name=port.name,
+            doc=port.doc,
+            label=label,
+            unit=port.unit,
+            x=spots[port.name].x,
+            y=spots[port.name].y,
+            dx=spots[port.name].dx,
+            dy=spots[port.name].dy,
+        )
+        for port, label in zip(ports, shown)
+    ]
+
+
+def _wire(wire: Connection, diagram: Diagram) -> Wire:
+    bends = diagram.bends.get(wire, ())
+    return Wire(source=str(wire.source), target=str(wire.target), bends=bends)
+
+
+def _notes(diagram: Diagram) -> dict[str, SheetNote]:
+    return {name: SheetNote(**dataclasses.asdict(note)) for name, note in diagram.notes.items()}

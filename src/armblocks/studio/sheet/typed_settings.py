@@ -1,0 +1,72 @@
+"""From what is typed into the dialog of configuration parameters to a run's options, and its faults."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from armblocks.equations import SimulationOptions
+from armblocks.errors import ArmblocksError, InputError, UnknownNameError
+from armblocks.simulation.plan import check_options
+from armblocks.simulation.tableaux import find_tableau
+from armblocks.studio.sheet.parameter_values import number_value
+
+SettingValue = float | str | None
+
+
+def with_settings(options: SimulationOptions, values: Mapping[str, SettingValue]) -> SimulationOptions:
+    """The options with some of them changed; numbers may be typed as texts such as ``1/1000``.
+
+    Raises ``UnknownNameError`` and ``InputError``: no model gets settings with which nothing could run.
+    """
+    known = [field.name for field in dataclasses.fields(SimulationOptions)]
+    for name in values:
+        if name not in known:
+            raise UnknownNameError("setting", name, known)
+    read: dict[str, Any] = {name: _read(name, value) for name, value in values.items()}
+    changed = dataclasses.replace(options, **read)
+    check_options(changed, "the settings")
+    tableau = None if changed.solver.casefold() == "auto" else find_tableau(changed.solver)
+    if tableau is not None and tableau.adaptive and changed.step is not None:
+        raise InputError(
+            f"step is {changed.step:g} s, and solver {tableau.name} chooses its own steps",
+            where="the settings",
+            allowed="no step, or a fixed-step solver",
+            fix="use the largest step to bound the steps, or choose rk4",
+        )
+    return changed
+
+
+def setting_faults(options: SimulationOptions, values: Mapping[str, SettingValue]) -> dict[str, str]:
+    """What is wrong with typed settings, by name: said while they are typed."""
+    faults: dict[str, str] = {}
+    for name, value in values.items():
+        try:
+            _read(name, value)
+        except ArmblocksError as error:
+            faults[name] = _words(error)
+    if faults:
+        return faults
+    try:
+        with_settings(options, values)
+    except ArmblocksError as error:
+        # What is refused says the name of the setting first.
+        name = next((name for name in values if error.what.startswith(name)), "solver")
+        return {name: _words(error)}
+    return {}
+
+
+def _read(name: str, value: SettingValue) -> SettingValue:
+    if not isinstance(value, str) or name == "solver":
+        return value
+    number = number_value(value, name)
+    if isinstance(number, list):
+        raise InputError(
+            f"{name} is a list", where="the settings", allowed="one number", fix="type one number"
+        )
+    return number
+
+
+def _words(error: ArmblocksError) -> str:
+    return f"{error.what}. Allowed: {error.allowed}" if error.allowed else error.what
