@@ -48,7 +48,7 @@ def index_page() -> str:
         "In a terminal, `armblocks blocks NAME` says the same.",
         "",
     ]
-    for family, kinds in BLOCKS.by_family().items():
+    for family, kinds in BLOCKS.families.items():
         lines += [f"## {family.capitalize()}", "", '<div class="block-list">', ""]
         for kind in kinds:
             lines += [
@@ -76,6 +76,7 @@ def block_page(kind: type[Block]) -> str:
     block = example_block(kind)
     diagram = ab.block_example(kind)
     name = kind.type_name()
+    family = BLOCKS.family_of(kind)
     called = f"**{prose(kind.title)}**, of" if other_title(kind) else "Of"
     lines = [
         # Without a place in the table of contents: the theme would write all blocks beside each of them.
@@ -87,7 +88,7 @@ def block_page(kind: type[Block]) -> str:
         "",
         f'<div class="symbol alone">{symbol(kind, name)}</div>',
         "",
-        f"{called} the family [{kind.family}](../blocks.md#{kind.family}).",
+        f"{called} the family [{family}](../blocks.md#{family}).",
         "",
         *docstring(kind),
         "",
@@ -96,10 +97,10 @@ def block_page(kind: type[Block]) -> str:
         *parameter_table(kind),
         *behaviour(diagram),
     ]
-    others = [other for other in BLOCKS.by_family()[kind.family] if other is not kind]
+    others = [other for other in BLOCKS.families[family] if other is not kind]
     if others:
         links = ", ".join(f"[{other.type_name()}]({other.type_name()}.md)" for other in others)
-        lines += ["## See also", "", f"The family {kind.family}: {links}. [All blocks](../blocks.md).", ""]
+        lines += ["## See also", "", f"The family {family}: {links}. [All blocks](../blocks.md).", ""]
     return "\n".join(lines)
 
 

@@ -39,7 +39,7 @@ def test_a_wrong_name_is_met_with_the_nearest(invoke: Invoke) -> None:
 def test_without_a_name_all_blocks_are_listed(invoke: Invoke) -> None:
     text = invoke("blocks").stdout
     assert all(f"\n{name} " in text for name in BLOCKS)
-    assert all(f"\n{family}" in text for family in BLOCKS.by_family())
+    assert all(f"\n{family}" in text for family in BLOCKS.families)
     assert f"{len(BLOCKS)} blocks" in text
 
 

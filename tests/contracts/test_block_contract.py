@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import runpy
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -109,7 +111,6 @@ def test_it_says_what_it_is() -> None:
     for kind in KINDS:
         assert kind.summary().endswith((".", "…")), kind
         assert "\n" not in kind.summary(), kind
-        assert kind.family, kind
         assert kind.title, kind
         assert BLOCKS[kind.type_name()] is kind
 
@@ -118,6 +119,19 @@ def test_it_is_imported_by_its_name() -> None:
     for kind in KINDS:
         assert kind.type_name() in blocks.__all__
         assert getattr(blocks, kind.type_name()) is kind
+
+
+def test_type_checkers_know_its_name() -> None:
+    script = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "block_names.py"))
+    assert script["STUB"].read_text(encoding="utf-8") == script["stub"](), "run scripts/block_names.py"
+
+
+def test_its_folder_is_its_family() -> None:
+    for kind in KINDS:
+        if kind.__module__.startswith("armblocks.blocks."):
+            assert kind.__module__.split(".")[2] == BLOCKS.family_of(kind)
+    folders = {path.parent.name for path in Path(blocks.__file__).parent.glob("*/__init__.py")}
+    assert folders == set(BLOCKS.families)
 
 
 def test_it_is_final_and_frozen() -> None:

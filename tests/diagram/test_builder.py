@@ -199,11 +199,14 @@ def test_setting_parameters_wrongly_is_refused() -> None:
 
 
 def test_the_library_says_the_nearest_type() -> None:
-    library = BlockLibrary([Gain, Clock, Constant])
+    library = BlockLibrary({"maths": [Gain], "sources": [Clock, Constant]})
     assert library["Gain"] is Gain
     assert "Clock" in library
     assert len(library) == 3
-    assert library.by_family() == {"maths": (Gain,), "sources": (Clock, Constant)}
+    assert library.families == {"maths": (Gain,), "sources": (Clock, Constant)}
+    assert library.family_of(Clock) == "sources"
+    with pytest.raises(UnknownNameError, match="there is no block type named 'Sum'"):
+        library.family_of(Sum)
     with pytest.raises(UnknownNameError, match=r"there is no block type named 'Gian'.*did you mean 'Gain'"):
         library["Gian"]
 

@@ -295,7 +295,6 @@ def test_equations_that_forget_an_output_are_the_authors_mistake() -> None:
     class Forgetful(Block):
         """Says y and gives z."""
 
-        family: ClassVar[str] = "none"
         title: ClassVar[str] = "Forgetful"
 
         def output_ports(self) -> tuple[Port, ...]:

@@ -15,7 +15,7 @@ from casadi import SX, Function, densify, fabs, fmax, if_else, jtimes, symvar, v
 from reference_history import History
 
 from armblocks.blocks import FromFile
-from armblocks.blocks.rate_limits import RateLimiting
+from armblocks.blocks.discontinuities.rate_limits import RateLimiting
 from armblocks.diagram import Block, shape_of
 from armblocks.equations import Shape, flatten, unflatten
 

@@ -1,264 +1,15 @@
-"""All kinds of blocks. ``BLOCKS`` is the library of every class that a file of this package defines.
+"""All kinds of blocks: each folder of this package is a family, each class with a title in it is a kind.
 
-A new file stands in the list of modules below, in the order in which blocks are listed, and its classes in
-the imports and in ``__all__``. These names are written out because type checkers and editors only know what
-a text says: a list made from ``BLOCKS`` would leave ``from armblocks.blocks import Gain`` unknown to them.
-``tests/contracts`` holds both lists against each other.
+``BLOCKS`` is the library of all kinds, and each kind is a name of this package: ``from armblocks.blocks
+import Gain``. A new block is one class in a file of its family's folder; it is found there. Type checkers and
+editors know the names from ``__init__.pyi``, which ``scripts/block_names.py`` writes.
 """
 
-from types import ModuleType
+import importlib
+import pkgutil
+from collections.abc import Iterator
 
-from armblocks.blocks import (
-    angles,
-    arithmetic,
-    arm_plant,
-    arm_quantities,
-    branching,
-    constraints,
-    continuous,
-    delays,
-    descriptor,
-    discontinuities,
-    discrete,
-    drives,
-    dry_friction,
-    dynamic_limits,
-    edges,
-    ending,
-    expression,
-    from_file,
-    gains,
-    joint_control,
-    joint_drives,
-    joint_paths,
-    joint_pid,
-    joint_sensors,
-    lags,
-    limited_integrators,
-    logic,
-    lookup,
-    maths,
-    matrices,
-    noise,
-    orientations,
-    periodic,
-    pid,
-    poses,
-    prelookup,
-    python_function,
-    rate_limits,
-    reductions,
-    repeating,
-    robots,
-    rounding,
-    routing,
-    second_order,
-    selection,
-    sinks,
-    sources,
-    state_space,
-    transfer_functions,
-    transforms,
-    transport,
-    waveforms,
-    zero_poles,
-)
-from armblocks.blocks.angles import (
-    AngleDifference,
-    CartesianToPolar,
-    DegreesToRadians,
-    PolarToCartesian,
-    RadiansToDegrees,
-)
-from armblocks.blocks.arithmetic import (
-    Abs,
-    Bias,
-    Divide,
-    Hypot,
-    Polynomial,
-    Sign,
-    Sqrt,
-    UnaryMinus,
-)
-from armblocks.blocks.arm_plant import ArmPlant
-from armblocks.blocks.arm_quantities import JacobianInverse, LoadedRne, Manipulability, RobotEnergy
-from armblocks.blocks.branching import If, SwitchCase
-from armblocks.blocks.constraints import AlgebraicConstraint
-from armblocks.blocks.continuous import Derivative, Integrator
-from armblocks.blocks.delays import (
-    Delay,
-    Memory,
-    RateTransition,
-    ResettableDelay,
-    TappedDelay,
-    UnitDelay,
-    ZeroOrderHold,
-)
-from armblocks.blocks.descriptor import DescriptorStateSpace
-from armblocks.blocks.discontinuities import DeadZone, PulseGenerator, Quantizer, Relay, Saturation, Switch
-from armblocks.blocks.discrete import (
-    CounterLimited,
-    Difference,
-    DigitalClock,
-    DiscreteDerivative,
-    DiscreteIntegrator,
-    RateLimiter,
-)
-from armblocks.blocks.drives import DcMotor, MotorWinding
-from armblocks.blocks.dry_friction import Backlash, CoulombFriction, StickSlipFriction
-from armblocks.blocks.dynamic_limits import (
-    DeadZoneDynamic,
-    HitCrossing,
-    SaturationDynamic,
-    WrapToZero,
-)
-from armblocks.blocks.edges import (
-    Counter,
-    DFlipFlop,
-    EdgeDetection,
-    JKFlipFlop,
-    MinMaxRunningResettable,
-    SRFlipFlop,
-    VariableIntegerDelay,
-)
-from armblocks.blocks.ending import Assertion, StopSimulation
-from armblocks.blocks.expression import Expression
-from armblocks.blocks.from_file import FromFile
-from armblocks.blocks.gains import SineWaveFunction, SliderGain, WeightedSampleTime
-from armblocks.blocks.joint_control import ComputedTorque, FeedForward, GravityCompensation, JointPD
-from armblocks.blocks.joint_drives import JointStops, MotorDrive
-from armblocks.blocks.joint_paths import CirclePath, CTraj, MultiSegment, Trapezoidal
-from armblocks.blocks.joint_pid import JointPID, SampledJointPID
-from armblocks.blocks.joint_sensors import Encoder, JointSensor, Tachometer
-from armblocks.blocks.lags import (
-    FirstOrderLag,
-    LeadLag,
-    SecondOrderLag,
-    TransferFunctionFirstOrder,
-    TransferFunctionLeadOrLag,
-    TransferFunctionRealZero,
-)
-from armblocks.blocks.limited_integrators import IntegratorLimited, ResettableIntegrator
-from armblocks.blocks.logic import (
-    CombinatorialLogic,
-    CompareToConstant,
-    CompareToZero,
-    IntervalTest,
-    IntervalTestDynamic,
-    LogicalOperator,
-    RelationalOperator,
-    TruthTable,
-)
-from armblocks.blocks.lookup import LookupTable1D, LookupTable2D, LookupTableDynamic, LookupTableND
-from armblocks.blocks.maths import (
-    Atan2,
-    Gain,
-    MathFunction,
-    MatrixGain,
-    MatrixProduct,
-    MinMax,
-    Power,
-    Product,
-    Sum,
-    Trigonometry,
-)
-from armblocks.blocks.matrices import (
-    CrossProduct,
-    Determinant,
-    DiagonalMatrix,
-    ExtractDiagonal,
-    LinearSolve,
-    MatrixConcatenate,
-    MatrixInverse,
-    MatrixPower,
-    Reshape,
-    Trace,
-    Transpose,
-)
-from armblocks.blocks.noise import BandLimitedWhiteNoise, RandomNumber, UniformRandomNumber
-from armblocks.blocks.orientations import (
-    AngleAxis2T,
-    Eul2T,
-    Quaternion2T,
-    QuaternionInverse,
-    QuaternionNormalize,
-    QuaternionProduct,
-    QuaternionRate,
-    Rpy2T,
-    T2AngleAxis,
-    T2eul,
-    T2Quaternion,
-    T2rpy,
-)
-from armblocks.blocks.periodic import PWM, FirstOrderHold
-from armblocks.blocks.pid import PID, PID2DOF, DiscretePID, DiscretePID2DOF
-from armblocks.blocks.poses import (
-    Delta2Tr,
-    PoseIntegration,
-    PoseInverse,
-    PoseProduct,
-    Rp2T,
-    Skew,
-    T2Rp,
-    Tr2Delta,
-    TransformPoint,
-    TransformTwist,
-)
-from armblocks.blocks.prelookup import DirectLookup, InterpolationUsingPrelookup, Prelookup
-from armblocks.blocks.python_function import CalledPythonFunction, PythonFunction
-from armblocks.blocks.rate_limits import RateLimiterContinuous, RateLimiterDynamic
-from armblocks.blocks.reductions import (
-    CumulativeSum,
-    DotProduct,
-    Extremum,
-    Norm,
-    ProductOfElements,
-    SumOfElements,
-)
-from armblocks.blocks.repeating import (
-    CounterFreeRunning,
-    RepeatingSequence,
-    RepeatingSequenceInterpolated,
-    RepeatingSequenceStair,
-    SignalGenerator,
-)
-from armblocks.blocks.robots import (
-    Coriolis,
-    Fkine,
-    ForwardDynamics,
-    Gravload,
-    Inertia,
-    Jacob0,
-    Jacobe,
-    JTraj,
-    Rne,
-    RobotPlot,
-)
-from armblocks.blocks.rounding import Modulo, Rounding
-from armblocks.blocks.routing import Demux, Mux
-from armblocks.blocks.second_order import SecondOrderIntegrator, SecondOrderIntegratorLimited
-from armblocks.blocks.selection import (
-    Assignment,
-    IndexVector,
-    ManualSwitch,
-    MultiportSwitch,
-    Selector,
-    SubMatrix,
-)
-from armblocks.blocks.sinks import Display, Scope, Spectrum, Terminator, ToFile, ToWorkspace, XYGraph
-from armblocks.blocks.sources import Clock, Constant, Ramp, SineWave, Step
-from armblocks.blocks.state_space import DiscreteStateSpace, StateSpace
-from armblocks.blocks.transfer_functions import (
-    DiscreteFilter,
-    DiscreteFir,
-    DiscreteTransferFunction,
-    TransferFunction,
-)
-from armblocks.blocks.transforms import T2xyz, Xyz2T
-from armblocks.blocks.transport import TransportDelay, VariableTimeDelay, VariableTransportDelay
-from armblocks.blocks.waveforms import Chirp, FromTable, Ground, Pulse
-from armblocks.blocks.zero_poles import AnalogFilter, DigitalFilter, DiscreteZeroPole, ZeroPole
-from armblocks.diagram import Block, BlockLibrary, conditional, structure, virtual_wiring
+from armblocks.diagram import Block, BlockLibrary
 from armblocks.diagram.conditional import (
     ActionSubsystem,
     EnabledSubsystem,
@@ -270,315 +21,57 @@ from armblocks.diagram.conditional import (
 from armblocks.diagram.structure import Inport, Outport, Subsystem
 from armblocks.diagram.virtual_wiring import BusAssignment, BusCreator, BusSelector, From, Goto
 
+FAMILIES = (
+    "sources",
+    "maths",
+    "continuous",
+    "discrete",
+    "discontinuities",
+    "routing",
+    "structure",
+    "transforms",
+    "robots",
+    "sinks",
+    "matrices",
+    "logic",
+    "lookup",
+    "functions",
+)
+"""The families in the order of lists; within a family the kinds stand by the alphabet."""
 
-def _defined_in(family: ModuleType) -> list[type[Block]]:
-    kinds = [value for value in vars(family).values() if isinstance(value, type) and issubclass(value, Block)]
-    # What several kinds have in common has no title of its own.
-    return [kind for kind in kinds if kind.__module__ == family.__name__ and "title" in vars(kind)]
+_KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
+    "routing": (BusAssignment, BusCreator, BusSelector, From, Goto, Merge),
+    "structure": (
+        ActionSubsystem,
+        EnabledSubsystem,
+        EnabledTriggeredSubsystem,
+        Inport,
+        Outport,
+        ResettableSubsystem,
+        Subsystem,
+        TriggeredSubsystem,
+    ),
+}
+"""The kinds that the passes over a diagram handle: the layer of the diagram defines them."""
+
+
+def _kinds_of(family: str) -> Iterator[type[Block]]:
+    """The kinds of one family. A class that several kinds share has no title of its own."""
+    yield from _KNOWN_TO_THE_DIAGRAM.get(family, ())
+    folder = importlib.import_module(f"{__name__}.{family}")
+    for file in pkgutil.iter_modules(folder.__path__, f"{folder.__name__}."):
+        classes = [
+            value for value in vars(importlib.import_module(file.name)).values() if isinstance(value, type)
+        ]
+        for value in classes:
+            if value.__module__ == file.name and issubclass(value, Block) and "title" in vars(value):
+                yield value
 
 
 BLOCKS = BlockLibrary(
-    kind
-    for family in (
-        sources,
-        maths,
-        continuous,
-        state_space,
-        transfer_functions,
-        descriptor,
-        limited_integrators,
-        zero_poles,
-        lags,
-        pid,
-        discontinuities,
-        dry_friction,
-        delays,
-        discrete,
-        routing,
-        virtual_wiring,
-        structure,
-        conditional,
-        branching,
-        transforms,
-        robots,
-        sinks,
-        ending,
-        arithmetic,
-        rounding,
-        angles,
-        constraints,
-        gains,
-        reductions,
-        matrices,
-        selection,
-        logic,
-        lookup,
-        prelookup,
-        waveforms,
-        from_file,
-        repeating,
-        noise,
-        orientations,
-        poses,
-        joint_paths,
-        arm_quantities,
-        joint_control,
-        joint_drives,
-        joint_pid,
-        joint_sensors,
-        drives,
-        arm_plant,
-        expression,
-        python_function,
-        second_order,
-        transport,
-        periodic,
-        dynamic_limits,
-        rate_limits,
-        edges,
-    )
-    for kind in _defined_in(family)
+    {family: sorted(_kinds_of(family), key=lambda kind: kind.type_name().casefold()) for family in FAMILIES}
 )
 """Every kind of block by type name."""
 
-__all__ = [
-    "BLOCKS",
-    "PID",
-    "PID2DOF",
-    "PWM",
-    "Abs",
-    "ActionSubsystem",
-    "AlgebraicConstraint",
-    "AnalogFilter",
-    "AngleAxis2T",
-    "AngleDifference",
-    "ArmPlant",
-    "Assertion",
-    "Assignment",
-    "Atan2",
-    "Backlash",
-    "BandLimitedWhiteNoise",
-    "Bias",
-    "BusAssignment",
-    "BusCreator",
-    "BusSelector",
-    "CTraj",
-    "CalledPythonFunction",
-    "CartesianToPolar",
-    "Chirp",
-    "CirclePath",
-    "Clock",
-    "CombinatorialLogic",
-    "CompareToConstant",
-    "CompareToZero",
-    "ComputedTorque",
-    "Constant",
-    "Coriolis",
-    "CoulombFriction",
-    "Counter",
-    "CounterFreeRunning",
-    "CounterLimited",
-    "CrossProduct",
-    "CumulativeSum",
-    "DFlipFlop",
-    "DcMotor",
-    "DeadZone",
-    "DeadZoneDynamic",
-    "DegreesToRadians",
-    "Delay",
-    "Delta2Tr",
-    "Demux",
-    "Derivative",
-    "DescriptorStateSpace",
-    "Determinant",
-    "DiagonalMatrix",
-    "Difference",
-    "DigitalClock",
-    "DigitalFilter",
-    "DirectLookup",
-    "DiscreteDerivative",
-    "DiscreteFilter",
-    "DiscreteFir",
-    "DiscreteIntegrator",
-    "DiscretePID",
-    "DiscretePID2DOF",
-    "DiscreteStateSpace",
-    "DiscreteTransferFunction",
-    "DiscreteZeroPole",
-    "Display",
-    "Divide",
-    "DotProduct",
-    "EdgeDetection",
-    "EnabledSubsystem",
-    "EnabledTriggeredSubsystem",
-    "Encoder",
-    "Eul2T",
-    "Expression",
-    "ExtractDiagonal",
-    "Extremum",
-    "FeedForward",
-    "FirstOrderHold",
-    "FirstOrderLag",
-    "Fkine",
-    "ForwardDynamics",
-    "From",
-    "FromFile",
-    "FromTable",
-    "Gain",
-    "Goto",
-    "GravityCompensation",
-    "Gravload",
-    "Ground",
-    "HitCrossing",
-    "Hypot",
-    "If",
-    "IndexVector",
-    "Inertia",
-    "Inport",
-    "Integrator",
-    "IntegratorLimited",
-    "InterpolationUsingPrelookup",
-    "IntervalTest",
-    "IntervalTestDynamic",
-    "JKFlipFlop",
-    "JTraj",
-    "Jacob0",
-    "Jacobe",
-    "JacobianInverse",
-    "JointPD",
-    "JointPID",
-    "JointSensor",
-    "JointStops",
-    "LeadLag",
-    "LinearSolve",
-    "LoadedRne",
-    "LogicalOperator",
-    "LookupTable1D",
-    "LookupTable2D",
-    "LookupTableDynamic",
-    "LookupTableND",
-    "Manipulability",
-    "ManualSwitch",
-    "MathFunction",
-    "MatrixConcatenate",
-    "MatrixGain",
-    "MatrixInverse",
-    "MatrixPower",
-    "MatrixProduct",
-    "Memory",
-    "Merge",
-    "MinMax",
-    "MinMaxRunningResettable",
-    "Modulo",
-    "MotorDrive",
-    "MotorWinding",
-    "MultiSegment",
-    "MultiportSwitch",
-    "Mux",
-    "Norm",
-    "Outport",
-    "PolarToCartesian",
-    "Polynomial",
-    "PoseIntegration",
-    "PoseInverse",
-    "PoseProduct",
-    "Power",
-    "Prelookup",
-    "Product",
-    "ProductOfElements",
-    "Pulse",
-    "PulseGenerator",
-    "PythonFunction",
-    "Quantizer",
-    "Quaternion2T",
-    "QuaternionInverse",
-    "QuaternionNormalize",
-    "QuaternionProduct",
-    "QuaternionRate",
-    "RadiansToDegrees",
-    "Ramp",
-    "RandomNumber",
-    "RateLimiter",
-    "RateLimiterContinuous",
-    "RateLimiterDynamic",
-    "RateTransition",
-    "RelationalOperator",
-    "Relay",
-    "RepeatingSequence",
-    "RepeatingSequenceInterpolated",
-    "RepeatingSequenceStair",
-    "ResettableDelay",
-    "ResettableIntegrator",
-    "ResettableSubsystem",
-    "Reshape",
-    "Rne",
-    "RobotEnergy",
-    "RobotPlot",
-    "Rounding",
-    "Rp2T",
-    "Rpy2T",
-    "SRFlipFlop",
-    "SampledJointPID",
-    "Saturation",
-    "SaturationDynamic",
-    "Scope",
-    "SecondOrderIntegrator",
-    "SecondOrderIntegratorLimited",
-    "SecondOrderLag",
-    "Selector",
-    "Sign",
-    "SignalGenerator",
-    "SineWave",
-    "SineWaveFunction",
-    "Skew",
-    "SliderGain",
-    "Spectrum",
-    "Sqrt",
-    "StateSpace",
-    "Step",
-    "StickSlipFriction",
-    "StopSimulation",
-    "SubMatrix",
-    "Subsystem",
-    "Sum",
-    "SumOfElements",
-    "Switch",
-    "SwitchCase",
-    "T2AngleAxis",
-    "T2Quaternion",
-    "T2Rp",
-    "T2eul",
-    "T2rpy",
-    "T2xyz",
-    "Tachometer",
-    "TappedDelay",
-    "Terminator",
-    "ToFile",
-    "ToWorkspace",
-    "Tr2Delta",
-    "Trace",
-    "TransferFunction",
-    "TransferFunctionFirstOrder",
-    "TransferFunctionLeadOrLag",
-    "TransferFunctionRealZero",
-    "TransformPoint",
-    "TransformTwist",
-    "TransportDelay",
-    "Transpose",
-    "Trapezoidal",
-    "TriggeredSubsystem",
-    "Trigonometry",
-    "TruthTable",
-    "UnaryMinus",
-    "UniformRandomNumber",
-    "UnitDelay",
-    "VariableIntegerDelay",
-    "VariableTimeDelay",
-    "VariableTransportDelay",
-    "WeightedSampleTime",
-    "WrapToZero",
-    "XYGraph",
-    "Xyz2T",
-    "ZeroOrderHold",
-    "ZeroPole",
-]
+globals().update(BLOCKS)
+globals()["__all__"] = ["BLOCKS", *BLOCKS]

@@ -83,19 +83,24 @@ def _list(console: Console, search: str | None) -> None:
 
 
 def _mentions(kind: type[Block], search: str) -> bool:
-    words = (kind.type_name(), kind.title, kind.family, inspect.cleandoc(kind.__doc__ or ""))
+    from armblocks.blocks import BLOCKS
+
+    words = (kind.type_name(), kind.title, BLOCKS.family_of(kind), inspect.cleandoc(kind.__doc__ or ""))
     wanted = " ".join(search.casefold().split())
     return any(wanted in " ".join(text.casefold().split()) for text in words)
 
 
 def blocks_table(kinds: list[type[Block]]) -> Table:
     """A line for each block, under the names of their families."""
+    from armblocks.blocks import BLOCKS
+
     rows = table(("block", "left"), ("what it does", "left"))
-    for family in dict.fromkeys(kind.family for kind in kinds):
-        rows.add_row(Text(f"\n{family}", STRONG))
-        for kind in kinds:
-            if kind.family == family:
-                rows.add_row(kind.type_name(), kind.summary())
+    for family, members in BLOCKS.families.items():
+        listed = [kind for kind in members if kind in kinds]
+        if listed:
+            rows.add_row(Text(f"\n{family}", STRONG))
+        for kind in listed:
+            rows.add_row(kind.type_name(), kind.summary())
     return rows
 
 
@@ -107,11 +112,12 @@ def _save(console: Console, kind: type[Block], path: Path) -> None:
 
 
 def _show(console: Console, kind: type[Block]) -> None:
+    from armblocks.blocks import BLOCKS
     from armblocks.face.block_examples import block_example, caption, example_block
     from armblocks.formats import diagram_to_python
 
     block = example_block(kind)
-    console.print(Text.assemble((kind.type_name(), STRONG), f"  ({kind.title}; {kind.family})"))
+    console.print(Text.assemble((kind.type_name(), STRONG), f"  ({kind.title}; {BLOCKS.family_of(kind)})"))
     for line in _paragraphs(inspect.cleandoc(kind.__doc__ or "")):
         console.print(line)
     for title, ports in (

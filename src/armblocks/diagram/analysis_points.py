@@ -36,7 +36,6 @@ from armblocks.errors import InputError, UnknownNameError
 class InputPoint(Block):
     """A small change is added to a signal: y = u + offset."""
 
-    family: ClassVar[str] = "analysis"
     title: ClassVar[str] = "Input Point"
 
     offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
@@ -58,7 +57,6 @@ class InputPoint(Block):
 class LoopOpening(Block):
     """What arrives goes no further; a fixed level comes out: y = level + offset."""
 
-    family: ClassVar[str] = "analysis"
     title: ClassVar[str] = "Loop Opening"
 
     level: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the signal at the operating point")

@@ -29,7 +29,7 @@ Signals = Mapping[str, SX]
 class Block(ABC):
     """One kind of block. Subclasses are final frozen dataclasses whose fields are parameters.
 
-    A subclass sets ``family`` and ``title``, declares its parameters with
+    A subclass sets ``title``, declares its parameters with
     :func:`~armblocks.diagram.parameter.parameter`, and overrides what it has: ports, states, equations.
     In the equations ``t`` is the time (s), ``x`` the block's states of all kinds, ``u`` its inputs, ``p`` its
     tunable parameters, all symbolic; the other parameters are plain attributes. An equation must not read a
@@ -57,8 +57,6 @@ class Block(ABC):
     The first line of a subclass's docstring says in one sentence what the block does, with its equation.
     """
 
-    family: ClassVar[str]
-    """Palette group: ``sources``, ``maths``, ``continuous``, ``routing``, ``sinks``, ``robots``, …"""
     title: ClassVar[str]
     """The name people know the block by, as Simulink or the toolbox shows it: ``XY Graph``."""
     time_derivatives: ClassVar[Mapping[str, str]] = {}

@@ -131,7 +131,6 @@ class ActionSubsystem(DiagramBlock):
 class Merge(Block):
     """The outputs of several conditional subsystems on one wire: y = that of the one which worked last."""
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Merge"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(

@@ -35,7 +35,6 @@ class ConditionalBlock(Block):
     control has changed; ``?done`` keeps it from acting twice where a tick was first.)
     """
 
-    family: ClassVar[str] = ""
     title: ClassVar[str] = ""
 
     block: Block

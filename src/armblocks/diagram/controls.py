@@ -45,7 +45,6 @@ def _side(u: SX) -> SX:
 class EnableControl(Block):
     """Whether an enabled subsystem is on, and whether its states start anew just now: on = u > 0."""
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Enable"
 
     outer: bool = parameter(False, doc="whether it is inside a subsystem that can be off")
@@ -93,7 +92,6 @@ class EnableControl(Block):
 class TriggerControl(Block):
     """Whether a trigger fires just now, and how long after it fired before."""
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Trigger"
 
     outer: bool = parameter(False, doc="whether it is inside a subsystem that can be off")
@@ -160,7 +158,6 @@ class TriggerControl(Block):
 class HeldOutput(Block):
     """An output of a conditional subsystem: y = u while it works, else what y was, or ``initial``."""
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Out"
 
     fires: bool = parameter(False, doc="whether works is 1 at instants only")
@@ -206,7 +203,6 @@ class HeldOutput(Block):
 class MergedOutput(Block):
     """Several outputs of conditional subsystems on one wire: y = that of the one that works, or did last."""
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Merge"
 
     inputs: int = parameter(2, minimum=1, doc="how many inputs")

@@ -10,10 +10,15 @@ from armblocks.errors import UnknownNameError
 
 
 class BlockLibrary(Mapping[str, type[Block]]):
-    """Kinds of blocks by type name, ``library["Gain"]``; an unknown name says the nearest."""
+    """Kinds of blocks by type name, ``library["Gain"]``; an unknown name raises with the nearest ones.
 
-    def __init__(self, kinds: Iterable[type[Block]]) -> None:
-        self._kinds = MappingProxyType({kind.type_name(): kind for kind in kinds})
+    ``families``: the kinds of each family, in the order of lists.
+    """
+
+    def __init__(self, families: Mapping[str, Iterable[type[Block]]]) -> None:
+        self._families = MappingProxyType({family: tuple(kinds) for family, kinds in families.items()})
+        self._family_of = {kind: family for family, kinds in self._families.items() for kind in kinds}
+        self._kinds = MappingProxyType({kind.type_name(): kind for kind in self._family_of})
 
     def __getitem__(self, name: str) -> type[Block]:
         try:
@@ -30,9 +35,14 @@ class BlockLibrary(Mapping[str, type[Block]]):
     def __len__(self) -> int:
         return len(self._kinds)
 
-    def by_family(self) -> Mapping[str, tuple[type[Block], ...]]:
-        """The kinds of each family, both in the order in which the library was given them."""
-        families: dict[str, list[type[Block]]] = {}
-        for kind in self._kinds.values():
-            families.setdefault(kind.family, []).append(kind)
-        return {family: tuple(kinds) for family, kinds in families.items()}
+    @property
+    def families(self) -> Mapping[str, tuple[type[Block], ...]]:
+        """The kinds of each family, both in the order of lists."""
+        return self._families
+
+    def family_of(self, kind: type[Block]) -> str:
+        """The family of a kind; a kind that is not in the library has none and raises."""
+        try:
+            return self._family_of[kind]
+        except KeyError:
+            raise UnknownNameError("block type", kind.type_name(), self._kinds) from None

@@ -62,7 +62,6 @@ class Inport(Block):
     At the top of the hierarchy nothing is connected from outside, and it gives ``value``.
     """
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "In"
 
     port: int = parameter(0, minimum=0, doc="its place among the inputs, from 1; 0 takes the next free one")
@@ -104,7 +103,6 @@ class Outport(Block):
     ``initial``, which it also is before the subsystem has worked.
     """
 
-    family: ClassVar[str] = "structure"
     title: ClassVar[str] = "Out"
 
     port: int = parameter(0, minimum=0, doc="its place among the outputs, from 1; 0 takes the next free one")
@@ -142,7 +140,6 @@ class DiagramBlock(Block):
     Subclasses say which inputs they have besides, to control when the diagram works.
     """
 
-    family: ClassVar[str] = "structure"
     virtual: ClassVar[bool] = True
 
     diagram: Diagram = parameter(

@@ -46,7 +46,6 @@ class Goto(Block):
     everywhere.
     """
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Goto"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -68,7 +67,6 @@ class Goto(Block):
 class From(Block):
     """Receives the signal that the Goto with the same tag sends."""
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "From"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -89,7 +87,6 @@ class From(Block):
 class BusCreator(Block):
     """Puts several signals on one wire, each under its name; a bus may be an element of a bus."""
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Bus Creator"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -114,7 +111,6 @@ class BusCreator(Block):
 class BusSelector(Block):
     """Takes elements out of a bus by their paths: speed, or motor.speed of a bus within a bus."""
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Bus Selector"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -141,7 +137,6 @@ class BusSelector(Block):
 class BusAssignment(Block):
     """The same bus with other signals for some of its elements."""
 
-    family: ClassVar[str] = "routing"
     title: ClassVar[str] = "Bus Assignment"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(

@@ -75,7 +75,7 @@ def _block_type(kind: type[Block]) -> BlockType:
     return BlockType(
         type=kind.type_name(),
         title=kind.title,
-        family=kind.family,
+        family=BLOCKS.family_of(kind),
         summary=kind.summary(),
         documentation=(kind.__doc__ or "").strip(),
         width=box.width,

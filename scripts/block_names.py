@@ -1,0 +1,32 @@
+"""Write ``src/armblocks/blocks/__init__.pyi``: the names of all blocks, for type checkers and editors.
+
+The package finds its blocks in its folders when it is imported, which a type checker does not follow. A test
+fails while the file is not up to date.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from armblocks.blocks import BLOCKS
+
+STUB = Path(__file__).resolve().parent.parent / "src" / "armblocks" / "blocks" / "__init__.pyi"
+BANNER = "# Made by scripts/block_names.py: do not edit."
+
+
+def stub() -> str:
+    """The text of the file: each kind imported from the module that defines it."""
+    imports = sorted((kind.__module__, name) for name, kind in BLOCKS.items())
+    lines = [
+        BANNER,
+        "from armblocks.diagram import BlockLibrary",
+        *(f"from {module} import {name} as {name}" for module, name in imports),
+        "",
+        "FAMILIES: tuple[str, ...]",
+        "BLOCKS: BlockLibrary",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    STUB.write_text(stub(), encoding="utf-8")

@@ -1,0 +1,85 @@
+"""Blocks with continuous states, and the exact time derivative."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    integral_unit,
+    parameter,
+    rate_unit,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integrator(Block):
+    """The integral over time: y' = u, y(0) = initial."""
+
+    title: ClassVar[str] = "Integrator"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The integral of a sine that starts at 0: 1 - cos t.",
+    )
+
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the rate"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the integral"),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the integral"),)
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": integral_unit(inputs["u"])}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivative(Block):
+    """The exact rate of change: y = du/dt, worked out from the equations of what feeds it.
+
+    Nothing is filtered or differenced. Where the input jumps (Step), the jump is ignored and the rate on
+    its right side is given.
+    """
+
+    title: ClassVar[str] = "Derivative"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The slope of a sine: a cosine, exactly, from the first instant on.",
+    )
+    time_derivatives: ClassVar[Mapping[str, str]] = {"y": "u"}
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is differentiated"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its rate of change"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": rate_unit(inputs["u"])}

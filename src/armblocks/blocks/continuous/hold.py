@@ -1,0 +1,89 @@
+"""The hold of the first order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.periodic import AGAIN, COUNT, FRESH, INSTANT, sample_time, sampled, sampling_guards
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstOrderHold(Block):
+    """Straight lines through samples: y(t) = u(t_k) + (u(t_k) - u(t_(k-1))) (t - t_k) / T until t_(k+1).
+
+    ``extrapolation`` goes on as between the last two samples, and is exact for a straight line; at each
+    instant y may jump to the new sample. ``interpolation`` goes from sample to sample without a jump, one
+    period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First Order Hold
+    extrapolates. The sample before the first one is ``initial``, which is also y before the offset.
+
+    A sampled block that ticks at t_k itself sees y as it was just before.
+    """
+
+    title: ClassVar[str] = "First Order Hold"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine, sampled every second, as straight lines from sample to sample, one second late.",
+        parameters={"method": "interpolation", "period": 1.0},
+        inputs={"u": made("SineWave")},
+    )
+
+    method: str = parameter(
+        "extrapolation", choices=("extrapolation", "interpolation"), doc="which line is drawn"
+    )
+    period: float = parameter(0.1, above=0.0, doc="T, from sample to sample", unit="s")
+    offset: float = parameter(0.0, minimum=0.0, doc="when the first sample is taken", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the sample before the first one")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is sampled"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the straight lines"),)
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        samples = (State("last", shape, "the last sample"), State("before", shape, "the one before"))
+        return (COUNT, FRESH, *samples)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return INSTANT, AGAIN
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        start = x["last"] if self.method == "extrapolation" else x["before"]
+        since = fmax(t - sample_time(p, x["count"] - 1.0), 0.0) / p["period"]
+        line = start + (x["last"] - x["before"]) * since
+        return {"y": if_else(x["count"] > 0.0, line, x["last"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"count": SX(0.0), "fresh": SX(0.0), "last": p["initial"], "before": p["initial"]}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return sampling_guards(t, x, p)
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        due, looks, counted = sampled(t, x, p, e)
+        return {
+            **counted,
+            "last": if_else(looks, u["u"], x["last"]),
+            "before": if_else(due, x["last"], x["before"]),
+        }

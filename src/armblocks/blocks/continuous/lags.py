@@ -1,0 +1,137 @@
+"""The linear systems of first and second order that control engineers think in; all gains are tunable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstOrderLag(Block):
+    """A lag of first order (PT1): y = gain / (T s + 1) u, that is T y' = gain u - y."""
+
+    title: ClassVar[str] = "First-Order Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "time_constant", "initial")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response: 63 % after one time constant of 2 s.",
+        parameters={"time_constant": 2.0},
+        inputs={"u": made("Step")},
+    )
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    time_constant: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="T", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the lagging output"),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("y", self.output_shapes(inputs)["y"], "the output"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["y"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": (p["gain"] * u["u"] - x["y"]) / p["time_constant"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"y": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SecondOrderLag(Block):
+    """A lag of second order (PT2): y = gain w^2 / (s^2 + 2 damping w s + w^2) u, at rest at the start."""
+
+    title: ClassVar[str] = "Second-Order Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "natural_frequency", "damping")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response with a damping of 0.3: it overshoots and swings in.",
+        parameters={"natural_frequency": 2.0, "damping": 0.3},
+        inputs={"u": made("Step")},
+    )
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    natural_frequency: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, above=0.0, doc="w, without damping", unit="rad/s"
+    )
+    damping: ArrayLike = parameter(
+        0.7, kind=ParameterKind.ARRAY, minimum=0.0, doc="damping ratio; 1 is critical"
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the lagging output"), Port("rate", "its rate of change"))
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        return (State("y", shape, "the output"), State("rate", shape, "its rate of change"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["y"], "rate": x["rate"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        w = p["natural_frequency"]
+        pull = w * (p["gain"] * u["u"] - x["y"]) - 2.0 * p["damping"] * x["rate"]
+        return {"y": x["rate"], "rate": w * pull}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"y": SX(0.0), "rate": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeadLag(Block):
+    """A lead or lag compensator: y = gain (T1 s + 1) / (T2 s + 1) u, at rest at the start.
+
+    It leads (its phase is positive) where T1 is the greater of the two times, else it lags.
+    """
+
+    title: ClassVar[str] = "Lead-Lag"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "lead_time", "lag_time")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A lead answers a step with more than its final value, and comes back to it.",
+        parameters={"lead_time": 2.0, "lag_time": 1.0},
+        inputs={"u": made("Step")},
+    )
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="T1", unit="s")
+    lag_time: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, above=0.0, doc="T2", unit="s")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the compensated signal"),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input, lagging by T2"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        ratio = p["lead_time"] / p["lag_time"]
+        return {"y": p["gain"] * (x["x"] + ratio * (u["u"] - x["x"]))}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": (u["u"] - x["x"]) / p["lag_time"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}

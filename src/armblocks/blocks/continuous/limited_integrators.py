@@ -1,0 +1,294 @@
+"""Integrators whose state jumps or stops at exactly located events."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_or
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import parameters_shape
+from armblocks.blocks.external_resets import (
+    EDGES,
+    LEVELS,
+    external_reset_parameter,
+    initial_source_parameter,
+    reset_ports,
+    side_of,
+)
+from armblocks.blocks.switching import JUST, limits_in_order
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    integral_unit,
+    made,
+    parameter,
+)
+from armblocks.equations import Shape
+
+_SATURATED = Port("saturated", "1 at the upper limit, -1 at the lower, else 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResettableIntegrator(Block):
+    """The integral over time with resets: y' = u, and y = initial at t = 0 and whenever a trigger fires.
+
+    It is Simulink's Integrator with its ports. With ``level`` and ``level hold`` y is the initial value, as
+    it is at each moment, while the trigger is not 0. The initial value may come from a port: at the start
+    too, or ``external at resets`` only, so that it may depend on y itself. The ``state_port`` gives the
+    integral without what the other inputs do to it at this instant: a loop through it is not algebraic. With
+    ``limit_output`` y stays between ``lower`` and ``upper``.
+    """
+
+    title: ClassVar[str] = "Integrator with Reset"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The integral of 1, set back to 0 by every rising edge.",
+        inputs={"u": made("Constant"), "reset": made("PulseGenerator", period=3.0, delay=1.0)},
+    )
+
+    external_reset: str = external_reset_parameter("rising")
+    initial_condition_source: str = initial_source_parameter()
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0 and at a reset, where no port says it"
+    )
+    state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
+    limit_output: bool = parameter(False, doc="whether the output is held between lower and upper")
+    lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
+    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        further = reset_ports(self.external_reset, self.initial_condition_source)
+        return (Port("u", "the rate"), *further)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        saturated = (_SATURATED,) if self.limit_output else ()
+        state = (Port("state", "the integral before a reset"),) if self.state_port else ()
+        return (Port("y", "the integral"), *saturated, *state)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        wide = {name: shape for name, shape in inputs.items() if name != "reset"}
+        own = ("initial", "lower", "upper") if self.limit_output else ("initial",)
+        shape = broadcast({**wide, "initial value": parameters_shape(self, *own)})
+        return {port.name: shape for port in self.output_ports()}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return self.output_shapes({})
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        unit = integral_unit(inputs["u"])
+        return {"y": unit, "state": unit} if self.state_port else {"y": unit}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the integral"),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        begun = (State("begun", (), "0 until the port has given the start value, then 1"),)
+        kept = (State("kept", shape, "the initial value just before this instant"),)
+        return (
+            *(begun if self.initial_condition_source == "external" else ()),
+            *(kept if self.external_reset == "level hold" else ()),
+        )
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        held = (State("held", (), "1 while the trigger is not 0, else 0"),)
+        shape = self.output_shapes(inputs)["y"]
+        return (
+            *(held if self._by_level else ()),
+            *((_limit_mode(shape),) if self.limit_output else ()),
+        )
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        reset = Guard("reset", (), "the trigger", EDGES.get(self.external_reset, 0))
+        begins = Guard("begins", (), "the port is asked where to begin", 1)
+        shape = self.output_shapes(inputs)["y"]
+        return (
+            *(() if self.external_reset == "none" else (reset,)),
+            *((begins,) if self.initial_condition_source == "external" else ()),
+            *(_limit_guards(shape) if self.limit_output else ()),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        y = if_else(x["held"], self._start(u, p), x["x"]) if self._by_level else x["x"]
+        saturated = {"saturated": x["mode"]} if self.limit_output else {}
+        return {"y": y, **saturated, **({"state": x["x"]} if self.state_port else {})}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        rate = if_else(x["mode"] == 0.0, u["u"], 0.0) if self.limit_output else u["u"]
+        return {"x": if_else(x["held"], 0.0, rate) if self._by_level else rate}
+
+    def initial_states(self, p: Signals) -> Signals:
+        start = self._within(p["initial"], p)
+        begun = {"begun": SX(0.0)} if self.initial_condition_source == "external" else {}
+        return {"x": start, **begun, **({"kept": start} if self.external_reset == "level hold" else {})}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        found = _limit_guard_values(x, u, p) if self.limit_output else {}
+        if self.external_reset != "none":
+            found["reset"] = (self._level(u) if self._by_level else u["reset"]) - JUST
+        if self.initial_condition_source == "external":
+            found["begins"] = 0.5 - x["begun"]
+        return found
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        held = {"held": self._level(u) > 0.0} if self._by_level else {}
+        return {**held, **({"mode": _limit_side(x["x"], x["mode"], u, p)} if self.limit_output else {})}
+
+    def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"kept": self._start(u, p)} if self.external_reset == "level hold" else {}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        after = _limited(x, p, e) if self.limit_output else {"x": x["x"]}
+        anew, start = SX(0.0), self._start(u, p)
+        if self._by_level:
+            # The state takes the value that was held when the trigger lets go.
+            anew = e["reset"] < 0.0
+            start = x["kept"] if self.external_reset == "level hold" else start
+            after["held"] = if_else(e["reset"] == 0.0, x["held"], e["reset"] > 0.0)
+        elif self.external_reset != "none":
+            anew = e["reset"] != 0.0
+        if self.initial_condition_source == "external":
+            # At t = 0 what the port says may still be settling.
+            begins = logic_or(x["begun"] == 0.0, t <= 0.0)
+            start = if_else(begins, self._start(u, p), start)
+            anew = logic_or(anew, begins)
+            after["begun"] = SX(1.0)
+        after["x"] = if_else(anew, start, after["x"])
+        if self.limit_output:
+            after["mode"] = if_else(anew, _limit_side(after["x"], SX(0.0), u, p), after["mode"])
+        return after
+
+    @property
+    def _by_level(self) -> bool:
+        return self.external_reset in LEVELS
+
+    def _level(self, u: Signals) -> SX:
+        return if_else(side_of(self.external_reset, u["reset"]), 1.0, 0.0)
+
+    def _start(self, u: Signals, p: Signals) -> SX:
+        """What the state becomes at a reset."""
+        return self._within(u.get("initial", p["initial"]), p)
+
+    def _within(self, value: SX, p: Signals) -> SX:
+        return fmin(fmax(value, p["lower"]), p["upper"]) if self.limit_output else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntegratorLimited(Block):
+    """The integral over time, held between two limits: y' = u, but 0 at a limit while u drives beyond it."""
+
+    title: ClassVar[str] = "Integrator Limited"
+    spreads: ClassVar[tuple[str, ...]] = ("initial", "lower", "upper")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The integral of a sine would reach 2; it stays at the limit 1 and leaves it as soon as "
+            "the sine turns."
+        ),
+    )
+
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0, within the limits"
+    )
+    lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
+    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the rate"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the integral"), _SATURATED)
+
+    def assumed_output_shapes(self) -> Shapes:
+        return self.output_shapes({})
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the integral"),)
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (_limit_mode(self.output_shapes(inputs)["y"]),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return _limit_guards(self.output_shapes(inputs)["y"])
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"], "saturated": x["mode"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": if_else(x["mode"] == 0.0, u["u"], 0.0)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": fmin(fmax(p["initial"], p["lower"]), p["upper"])}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _limit_guard_values(x, u, p)
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"mode": _limit_side(x["x"], x["mode"], u, p)}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return _limited(x, p, e)
+
+
+# The state x between the limits p["lower"] and p["upper"], with u["u"] for its rate.
+
+
+def _limit_mode(shape: Shape) -> State:
+    return State("mode", shape, "1 at the upper limit, -1 at the lower, else 0")
+
+
+def _limit_guards(shape: Shape) -> tuple[Guard, ...]:
+    return (
+        Guard("upper", shape, "y reaches the upper limit", 1),
+        Guard("lower", shape, "y reaches the lower limit", -1),
+        Guard("rises", shape, "u becomes positive", 1),
+        Guard("falls", shape, "u becomes negative", -1),
+    )
+
+
+def _limit_guard_values(x: Signals, u: Signals, p: Signals) -> dict[str, SX]:
+    return {
+        "upper": x["x"] - p["upper"],
+        "lower": x["x"] - p["lower"],
+        "rises": u["u"] - JUST,
+        "falls": u["u"] + JUST,
+    }
+
+
+def _limit_side(x: SX, mode: SX, u: Signals, p: Signals) -> SX:
+    """The consistent mode: a state at a limit stays there until its rate leads away from it."""
+    downwards = logic_or(u["u"] < 0.0, logic_and(mode < 0.0, u["u"] == 0.0))
+    upwards = logic_or(u["u"] > 0.0, logic_and(mode > 0.0, u["u"] == 0.0))
+    at_lower = logic_and(x <= p["lower"], downwards)
+    at_upper = logic_and(x >= p["upper"], upwards)
+    return if_else(at_upper, 1.0, if_else(at_lower, -1.0, 0.0))
+
+
+def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
+    """State and mode after events."""
+    stands = logic_and(x["x"] >= p["upper"], e["rises"] > 0.0)
+    stands_low = logic_and(x["x"] <= p["lower"], e["falls"] < 0.0)
+    upper, lower = logic_or(e["upper"] > 0.0, stands), logic_or(e["lower"] < 0.0, stands_low)
+    freed = logic_or(
+        logic_and(x["mode"] > 0.0, e["falls"] < 0.0), logic_and(x["mode"] < 0.0, e["rises"] > 0.0)
+    )
+    inner = if_else(freed, 0.0, x["mode"])
+    return {
+        "mode": if_else(upper, 1.0, if_else(lower, -1.0, inner)),
+        # Also where the mode follows from the values alone, a state a little beyond a limit is put onto it.
+        "x": fmin(fmax(x["x"], p["lower"]), p["upper"]),
+    }

@@ -1,0 +1,39 @@
+"""Rational transfer functions by their coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+
+from armblocks.blocks.linear_blocks import RationalBlock
+from armblocks.diagram import (
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransferFunction(RationalBlock):
+    """A rational transfer function: y = (b0 s^m + … + bm) / (a0 s^n + … + an) u, at rest at the start.
+
+    Coefficients stand from the highest power to the lowest, as in MATLAB. Its state is the controllable
+    canonical form's: x1 = u filtered by 1/denominator, differentiated n - 1 times, … xn.
+    """
+
+    title: ClassVar[str] = "Transfer Fcn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of 4 / (s^2 + 0.8 s + 4): damping 0.2, natural frequency 2 rad/s.",
+        parameters={"numerator": (4.0,), "denominator": (1.0, 0.8, 4.0)},
+        inputs={"u": made("Step")},
+    )
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (self.degree,), "the canonical state"),)
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._shifted(x, u, p)

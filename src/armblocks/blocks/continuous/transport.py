@@ -1,0 +1,196 @@
+"""Dead time: what a signal was some time ago, jumps and kinks included.
+
+Sources: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, chapters 2 and 4 (steps
+that end where discontinuities arrive, dense output as the past).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.switching import limits_in_order
+from armblocks.diagram import (
+    Block,
+    DelayLine,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TransportDelay(Block):
+    """The input some time ago: y(t) = u(t - delay), ``initial`` before there was any.
+
+    The past is kept as exactly as the run is; a jump comes out exactly one delay after it went in. No step is
+    longer than the delay.
+    """
+
+    title: ClassVar[str] = "Transport Delay"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A step and a sine, both one second later.",
+        inputs={"u": made("Sum").by(u1=made("Step", time=2.0), u2=made("SineWave"))},
+    )
+
+    delay: float = parameter(1.0, above=0.0, doc="how long ago", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output for t < delay")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is delayed"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the input some time ago"),)
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
+        return (DelayLine("past", self.output_shapes(inputs)["y"], "the input some time ago", "u"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["past"]}
+
+    def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"past": p["delay"]}
+
+    def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
+        return {"past": (p["delay"], p["delay"])}
+
+    def initial_past(self, p: Signals) -> Signals:
+        return {"past": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class VariableTimeDelay(Block):
+    """The input a given time ago: y(t) = u(t - d(t)), with d held between ``shortest`` and ``longest``.
+
+    No step is longer than ``shortest``. Jumps of the input come out as jumps, which are not located.
+    """
+
+    title: ClassVar[str] = "Variable Time Delay"
+    rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine whose delay grows from 0.1 s to 2 s: it comes out slower.",
+        inputs={"u": made("SineWave", frequency=3.0), "d": made("Ramp", slope=0.3)},
+    )
+
+    shortest: float = parameter(0.1, above=0.0, doc="the shortest delay", unit="s")
+    longest: float = parameter(2.0, above=0.0, doc="the longest delay", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the start")
+
+    def check(self) -> None:
+        limits_in_order(self, "shortest", "longest")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is delayed"), Port("d", "how long ago", "s", shape=()))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the input some time ago"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
+        return (DelayLine("past", self.output_shapes(inputs)["y"], "the input some time ago", "u"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["past"]}
+
+    def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"past": fmin(fmax(u["d"], p["shortest"]), p["longest"])}
+
+    def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
+        return {"past": (p["shortest"], p["longest"])}
+
+    def initial_past(self, p: Signals) -> Signals:
+        return {"past": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class VariableTransportDelay(Block):
+    """What entered a pipe when it comes out: y(t) = u(t - d), the transit time at the inlet being ``T(t)``.
+
+    The pipe is filled between t - d and t, so the integral of 1/T over that time is 1, from which
+    d' = 1 - T(t - d) / T(t). (Simulink's Variable Transport Delay; Variable Time Delay takes T itself for d.)
+    """
+
+    title: ClassVar[str] = "Variable Transport Delay"
+    rated_inputs: ClassVar[tuple[str, ...]] = ("u", "T")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The flow in a pipe gets slower, its transit time grows from 1 s: a sine comes out late.",
+        inputs={"u": made("SineWave", frequency=2.0), "T": made("Ramp", slope=0.2, initial=1.0)},
+    )
+
+    initial_delay: float = parameter(1.0, above=0.0, doc="the transit time up to t = 0", unit="s")
+    shortest: float = parameter(0.1, above=0.0, doc="the delay is at least that", unit="s")
+    longest: float = parameter(10.0, above=0.0, doc="and at most that", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the start")
+
+    def check(self) -> None:
+        limits_in_order(self, "shortest", "longest")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what enters"), Port("T", "the transit time at the inlet, above 0", "s", shape=()))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "what comes out"), Port("delay", "how long it was inside", "s", shape=()))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": shape_of(self.initial)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("delay", (), "how long what comes out was inside", "s"),)
+
+    def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
+        return (
+            DelayLine("past", self.output_shapes(inputs)["y"], "what entered then", "u"),
+            DelayLine("transit", (), "the transit time at the inlet then", "T"),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["past"], "delay": x["delay"]}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"delay": 1.0 - x["transit"] / u["T"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"delay": p["initial_delay"]}
+
+    def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        inside = fmin(fmax(x["delay"], p["shortest"]), p["longest"])
+        return {"past": inside, "transit": inside}
+
+    def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
+        return dict.fromkeys(("past", "transit"), (p["shortest"], p["longest"]))
+
+    def initial_past(self, p: Signals) -> Signals:
+        return {"past": p["initial"], "transit": p["initial_delay"]}

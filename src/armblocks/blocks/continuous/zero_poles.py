@@ -1,0 +1,108 @@
+"""Transfer functions by zeros and poles; analog filters by order and edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+
+from armblocks.blocks.linear_blocks import (
+    FILTER_DESIGNS,
+    FILTER_TYPES,
+    SectionsByRoots,
+    check_band,
+    section_change,
+    section_output,
+)
+from armblocks.blocks.linear_systems import (
+    LinearSystem,
+    low_pass,
+    realised,
+    shifted,
+)
+from armblocks.diagram import (
+    Block,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZeroPole(SectionsByRoots):
+    """A transfer function by its roots: y = gain (s - z1) … (s - zm) / ((s - p1) … (s - pn)) u, m <= n.
+
+    Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
+    imaginary) in files. At rest at the start; the state is that of a chain of sections with one or two poles.
+    """
+
+    title: ClassVar[str] = "Zero-Pole"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of a zero at -2 and poles at -0.5 and -1 ± 3i.",
+        parameters={"zeros": (-2.0,), "poles": ((-0.5, 0.0), (-1.0, 3.0), (-1.0, -3.0)), "gain": 2.5},
+        inputs={"u": made("Step")},
+    )
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (shape_of(self.poles)[0],), "the states of the sections"),)
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": section_change(self.system, x["x"], u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalogFilter(Block):
+    """A filter by order and edge: |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)) for the Butterworth low pass.
+
+    ``chebyshev1`` falls faster and ripples in the pass band, ``chebyshev2`` in the stop band, which begins
+    at its edge. Bands have twice the order in poles. At rest at the start.
+    """
+
+    title: ClassVar[str] = "Analog Filter Design"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A square wave of 0.25 Hz behind a Butterworth low pass of 10 rad/s.",
+        parameters={"order": 4, "edge": 10.0},
+        inputs={"u": made("SignalGenerator", waveform="square", frequency=0.25)},
+    )
+
+    design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the kind of filter")
+    filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
+    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low pass behind it")
+    edge: float = parameter(1.0, above=0.0, tunable=False, doc="the edge, of bands the lower", unit="rad/s")
+    upper_edge: float = parameter(
+        2.0, above=0.0, tunable=False, doc="the upper edge of a band, above the lower", unit="rad/s"
+    )
+    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="in the pass band (chebyshev1), dB")
+    attenuation: float = parameter(40.0, above=0.0, tunable=False, doc="in the stop band (chebyshev2), dB")
+
+    def check(self) -> None:
+        check_band(self, self.filter_type, self.edge, self.upper_edge)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the filtered input", shape=()),)
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (len(self._system.B),), "the states of the sections"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": section_output(self._system, x["x"], u["u"])}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": section_change(self._system, x["x"], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    def _system(self) -> LinearSystem:
+        base = low_pass(self.design, self.order, self.ripple, self.attenuation)
+        return realised(shifted(base, self.filter_type, self.edge, self.upper_edge))

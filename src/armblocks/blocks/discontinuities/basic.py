@@ -1,0 +1,237 @@
+"""Blocks whose output has kinks and jumps: each switch is an event, located exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, floor, fmax, fmin, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.switching import (
+    JUST,
+    beyond,
+    cell_of,
+    limits_in_order,
+    zone,
+    zone_after,
+)
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saturation(Block):
+    """The input held between two limits: y = min(max(u, lower), upper)."""
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Saturation"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The crests of the sine are cut off at 1.5, its troughs at -0.5.",
+        parameters={"lower": -0.5, "upper": 1.5},
+        inputs={"u": made("SineWave", amplitude=2.0)},
+    )
+
+    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
+    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is limited"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the limited signal"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "lower": shape_of(self.lower), "upper": shape_of(self.upper)})}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("mode", self.output_shapes(inputs)["y"], "-1 at the lower limit, 1 at the upper, 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        return (Guard("upper", shape, "u - upper"), Guard("lower", shape, "u - lower"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        below = if_else(x["mode"] < 0.0, p["lower"], u["u"])
+        return {"y": if_else(x["mode"] > 0.0, p["upper"], below)}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"upper": u["u"] - p["upper"], "lower": u["u"] - p["lower"]}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"mode": zone(u["u"], p["lower"], p["upper"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"mode": zone_after(x["mode"], e)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadZone(Block):
+    """Nothing within the zone, what exceeds it outside: y = u - end above, u - start below, 0 between."""
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Dead Zone"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Between -0.5 and 0.5 nothing comes through, outside what exceeds the zone.",
+    )
+
+    start: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, doc="where the zone begins")
+    end: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, doc="where the zone ends")
+
+    def check(self) -> None:
+        limits_in_order(self, "start", "end")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "what exceeds the zone"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "start": shape_of(self.start), "end": shape_of(self.end)})}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("mode", self.output_shapes(inputs)["y"], "-1 below the zone, 1 above, 0 within"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        return (Guard("upper", shape, "u - end"), Guard("lower", shape, "u - start"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        below = if_else(x["mode"] < 0.0, u["u"] - p["start"], 0.0)
+        return {"y": if_else(x["mode"] > 0.0, u["u"] - p["end"], below)}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"upper": u["u"] - p["end"], "lower": u["u"] - p["start"]}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"mode": zone(u["u"], p["start"], p["end"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"mode": zone_after(x["mode"], e)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relay(Block):
+    """A switch with hysteresis: y = on_value once u reaches on_point, off_value once u falls to off_point.
+
+    It starts off, unless u begins at or above on_point.
+    """
+
+    title: ClassVar[str] = "Relay"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="It switches on as the sine rises through 0.5 and off as it falls through -0.5, not before.",
+    )
+
+    on_point: float = parameter(0.5, doc="where it switches on")
+    off_point: float = parameter(-0.5, doc="where it switches off, at most on_point")
+    on_value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the output while on")
+    off_value: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output while off")
+
+    def check(self) -> None:
+        limits_in_order(self, "off_point", "on_point")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "on_value or off_value"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        own = {"on_value": shape_of(self.on_value), "off_value": shape_of(self.off_value)}
+        return {"y": broadcast({**inputs, **own})}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("mode", inputs["u"], "1 on, 0 off", follows=True, remembers=True),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (
+            Guard("on", inputs["u"], "u - on_point", 1, locates=True),
+            Guard("off", inputs["u"], "u - off_point", -1, locates=True),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": if_else(x["mode"] > 0.0, p["on_value"], p["off_value"])}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"on": u["u"] - p["on_point"] + JUST, "off": u["u"] - p["off_point"] - JUST}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        sides = self.guard_values(t, x, u, p)
+        stays = if_else(sides["off"] < 0.0, 0.0, x["mode"])
+        return {"mode": if_else(sides["on"] > 0.0, 1.0, stays)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantizer(Block):
+    """The input in steps: y = interval round(u / interval), halves upwards.
+
+    A step down happens 1e-9 of the interval later than the step up, so that rounding makes none chatter.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Quantizer"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine in steps of 0.5.",
+        inputs={"u": made("SineWave", amplitude=2.0)},
+    )
+
+    interval: float = parameter(0.5, above=0.0, doc="the height of a step")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the nearest step"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("step", inputs["u"], "the number of the step, 0 at u = 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        shape = inputs["u"]
+        return (Guard("up", shape, "the edge above", 1), Guard("down", shape, "the edge below", -1))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["interval"] * x["step"]}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        within = u["u"] / p["interval"] - x["step"]
+        return {"up": within - 0.5 + JUST, "down": within + 0.5 + 1e-9}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        now = floor(u["u"] / p["interval"] + 0.5)
+        return {"step": cell_of(now, x["step"], self.guard_values(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"step": beyond(self.guard_values(t, x, u, p))}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        # A jump may pass several edges at once; at an edge, rounding must not undo the step.
+        nearest = floor(u["u"] / p["interval"] + 0.5)
+        down = if_else(e["down"] < 0.0, fmin(nearest, x["step"] - 1.0), x["step"])
+        return {"step": if_else(e["up"] > 0.0, fmax(nearest, x["step"] + 1.0), down)}

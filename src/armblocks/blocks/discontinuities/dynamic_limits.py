@@ -1,0 +1,169 @@
+"""Limits that move, crossings that are counted, and signals that start again: each switch is an event."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fabs, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.switching import located, zero_crossing_parameter
+from armblocks.diagram import (
+    Block,
+    Condition,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingLimits(Block):
+    """What blocks with two limits that are signals have in common."""
+
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("upper", "the upper limit"), Port("u", "the signal"), Port("lower", "the lower limit"))
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = broadcast(inputs)
+        above = Condition("above", shape, "1 above the upper limit", closed=False)
+        return located(self, above, Condition("below", shape, "1 below the lower limit", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - u["upper"], "below": u["lower"] - u["u"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SaturationDynamic(MovingLimits):
+    """The input held between two signals: y = min(max(u, lower), upper)."""
+
+    title: ClassVar[str] = "Saturation Dynamic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine between -0.2 and a limit that rises.",
+        inputs={
+            "upper": made("Ramp", slope=0.1).named("upper"),
+            "u": made("SineWave"),
+            "lower": made("Constant", value=-0.2).named("lower"),
+        },
+    )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the limited signal"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": if_else(x["above"], u["upper"], if_else(x["below"], u["lower"], u["u"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeadZoneDynamic(MovingLimits):
+    """Nothing between two signals, what exceeds them outside: y = u - upper, 0 or u - lower."""
+
+    title: ClassVar[str] = "Dead Zone Dynamic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="What of a sine exceeds a zone that grows upwards.",
+        inputs={
+            "upper": made("Ramp", slope=0.1).named("upper"),
+            "u": made("SineWave"),
+            "lower": made("Constant", value=-0.2).named("lower"),
+        },
+    )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "what exceeds the zone"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": if_else(x["above"], u["u"] - u["upper"], if_else(x["below"], u["u"] - u["lower"], 0.0))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrapToZero(Block):
+    """Zero where the input exceeds a threshold: y = u, but 0 where u > threshold."""
+
+    title: ClassVar[str] = "Wrap To Zero"
+    spreads: ClassVar[tuple[str, ...]] = ("threshold",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A ramp that falls to 0 once it exceeds 5.",
+        parameters={"threshold": 5.0},
+        inputs={"u": made("Ramp")},
+    )
+
+    threshold: ArrayLike = parameter(255.0, kind=ParameterKind.ARRAY, doc="the greatest output")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the signal, or 0"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        return located(self, Condition("above", shape, "1 above the threshold", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - p["threshold"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": if_else(x["above"], 0.0, u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class HitCrossing(Block):
+    """How often a signal has crossed an offset, and when it did last: located exactly.
+
+    Simulink's block is 1 for the step that ends at the crossing; a count can be looked at afterwards, and
+    what it triggers sees it change.
+    """
+
+    title: ClassVar[str] = "Hit Crossing"
+    spreads: ClassVar[tuple[str, ...]] = ("offset",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine crosses 0.5 upwards and downwards: the count steps at each crossing.",
+        parameters={"offset": 0.5},
+    )
+
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is crossed")
+    direction: str = parameter("either", choices=("rising", "falling", "either"), doc="which crossings count")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("count", "crossings so far"), Port("last", "time of the last one; 0 before any", "s"))
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["count"]
+        return (State("count", shape, "crossings so far"), State("last", shape, "time of the last", "s"))
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        way = {"rising": 1, "falling": -1, "either": 0}[self.direction]
+        return (Guard("crosses", self.output_shapes(inputs)["count"], "u - offset", way),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"count": x["count"], "last": x["last"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"count": SX(0.0), "last": SX(0.0)}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"crosses": u["u"] - p["offset"]}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"count": x["count"] + fabs(e["crosses"]), "last": if_else(e["crosses"] == 0.0, x["last"], t)}

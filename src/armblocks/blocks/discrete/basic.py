@@ -1,0 +1,199 @@
+"""Sampled integrals, differences and derivatives.
+
+In their equations k counts the ticks and T is the period of the clock.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin, if_else, logic_or
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.external_resets import (
+    SEEN,
+    external_reset_parameter,
+    fires_at_tick,
+    initial_source_parameter,
+    reset_ports,
+    side_of,
+)
+from armblocks.blocks.switching import limits_in_order
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    parameter,
+    sample_time_parameter,
+)
+
+INPUT = Port("u", "what is sampled")
+
+_METHODS = ("forward_euler", "backward_euler", "trapezoidal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteIntegrator(Block):
+    """The integral as a sum: x(k+1) = x(k) + gain T u(k), held between two limits, x(0) = initial.
+
+    The output is that of Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler:
+    y(k) = x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2.
+    An external reset makes x(k) the initial value at its tick, before anything else; the ``state_port`` gives
+    x(k) as it was before that, so that no loop through it is algebraic.
+    """
+
+    title: ClassVar[str] = "Discrete-Time Integrator"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The integral of a sine by the rule of Euler: rectangles, one a tick.",
+    )
+    sampled: ClassVar[bool] = True
+
+    method: str = parameter("forward_euler", choices=_METHODS, doc="the rule of integration")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    external_reset: str = external_reset_parameter("none")
+    initial_condition_source: str = initial_source_parameter()
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick and at a reset, where no port says it"
+    )
+    lower: float = parameter(-math.inf, finite=False, doc="the least value")
+    upper: float = parameter(math.inf, finite=False, doc="the greatest value")
+    state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
+    saturation_port: bool = parameter(False, doc="whether an output says at which limit the sum is")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the rate"), *reset_ports(self.external_reset, self.initial_condition_source))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        saturated = Port("saturated", "1 at the upper limit, -1 at the lower, else 0")
+        return (
+            Port("y", "the sum"),
+            *((saturated,) if self.saturation_port else ()),
+            *((Port("state", "the sum before a reset"),) if self.state_port else ()),
+        )
+
+    def assumed_output_shapes(self) -> Shapes:
+        return self.output_shapes({})
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        x = State("x", self.output_shapes(inputs)["y"], "the sum")
+        return (x, SEEN) if self._has_resets else (x,)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        share = {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[self.method]
+        free = self._begun(x, u, p)
+        if share:
+            free = free + share * p["gain"] * p["T"] * u["u"]
+        y = self._limited(free, p) if share or self._has_resets else free
+        found = {"y": y}
+        if self.saturation_port:
+            found["saturated"] = if_else(y >= p["upper"], 1.0, if_else(y <= p["lower"], -1.0, 0.0))
+        return found | ({"state": x["x"]} if self.state_port else {})
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        after = {"x": self._limited(self._begun(x, u, p) + p["gain"] * p["T"] * u["u"], p)}
+        if self._has_resets:
+            still = self.external_reset == "none"
+            after["seen"] = SX(0.0) if still else side_of(self.external_reset, u["reset"])
+        return after
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"], **({"seen": SX(-1.0)} if self._has_resets else {})}
+
+    def initial_outputs(self, p: Signals) -> Signals:
+        return {port.name: SX(0.0) for port in self.output_ports()} | {"y": p["initial"]}
+
+    @property
+    def _has_resets(self) -> bool:
+        return self.external_reset != "none" or self.initial_condition_source != "internal"
+
+    def _begun(self, x: Signals, u: Signals, p: Signals) -> SX:
+        """The state at this tick, after a reset."""
+        if not self._has_resets:
+            return x["x"]
+        anew = SX(0.0)
+        if self.external_reset != "none":
+            anew = fires_at_tick(self.external_reset, u["reset"], x["seen"])
+        if self.initial_condition_source == "external":
+            anew = logic_or(anew, x["seen"] < 0.0)
+        return if_else(anew, u.get("initial", p["initial"]), x["x"])
+
+    def _limited(self, value: SX, p: Signals) -> SX:
+        return fmin(fmax(value, p["lower"]), p["upper"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference(Block):
+    """What the input gained since the tick before: y(k) = u(k) - u(k-1)."""
+
+    title: ClassVar[str] = "Difference"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="What the sine has gained since the last tick.",
+    )
+    sampled: ClassVar[bool] = True
+
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the difference"),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] - x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteDerivative(Block):
+    """The rate of change between two ticks: y(k) = gain (u(k) - u(k-1)) / T."""
+
+    title: ClassVar[str] = "Discrete Derivative"
+    spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The slope of the sine as two samples tell it: half a tick late.",
+    )
+    sampled: ClassVar[bool] = True
+
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (INPUT,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the rate of change"),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["gain"] * (u["u"] - x["x"]) / p["T"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}

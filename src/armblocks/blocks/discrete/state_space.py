@@ -1,0 +1,43 @@
+"""Sampled linear systems in state space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, mtimes
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.linear_blocks import LinearBlock
+from armblocks.diagram import (
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    sample_time_parameter,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteStateSpace(LinearBlock):
+    """A linear sampled system: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), x(0) = initial.
+
+    D belongs to the structure (it is not tunable), so that a zero in it leaves the output free of the input
+    and the block may stand in a loop.
+    """
+
+    title: ClassVar[str] = "Discrete State-Space"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of x(k+1) = 0.5 x + u: it goes to 2, half of the way with every tick.",
+        inputs={"u": made("Step")},
+    )
+    sampled: ClassVar[bool] = True
+
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (self._state,)
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": mtimes(p["A"], x["x"]) + mtimes(p["B"], u["u"])}

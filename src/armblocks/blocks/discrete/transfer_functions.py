@@ -1,0 +1,144 @@
+"""Sampled transfer functions and filters by their coefficients.
+
+In their equations k counts the ticks and T is the period of the clock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX, dot, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.linear_blocks import RationalBlock
+from armblocks.diagram import (
+    Block,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteTransferFunction(RationalBlock):
+    """A rational transfer function in z: y = (b0 z^m + … + bm) / (a0 z^n + … + an) u, at rest at the start.
+
+    Coefficients stand from the highest power of z to the lowest, as in MATLAB.
+    """
+
+    title: ClassVar[str] = "Discrete Transfer Fcn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of z / (z - 0.5): each tick halves the way to 2.",
+        parameters={"numerator": (1.0, 0.0), "denominator": (1.0, -0.5)},
+        inputs={"u": made("Step")},
+    )
+    sampled: ClassVar[bool] = True
+
+    denominator: ArrayLike = parameter((1.0, 0.5), dimensions=(1,), doc="a0 … an, highest power first")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (self.degree,), "u / denominator at the last ticks"),)
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._shifted(x, u, p)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteFilter(RationalBlock):
+    """A digital filter: y = (b0 + b1 z^-1 + … + bm z^-m) / (a0 + … + an z^-n) u, at rest at the start."""
+
+    title: ClassVar[str] = "Discrete Filter"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A low-pass: pulses come out smoothed.",
+        parameters={"numerator": (0.2,), "denominator": (1.0, -0.8), "sample_time": 0.1},
+        inputs={"u": made("PulseGenerator", period=4.0)},
+    )
+    sampled: ClassVar[bool] = True
+
+    numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, rising powers of 1/z")
+    denominator: ArrayLike = parameter((1.0, 0.5), dimensions=(1,), doc="a0 … an, rising powers of 1/z")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def check(self) -> None:
+        a = np.asarray(self.denominator)
+        if a[0] == 0.0 or self.degree < 1:
+            raise InputError(
+                f"the denominator is {a.tolist()}",
+                where=self.type_name(),
+                allowed="a0 not zero, and two coefficients in one of both",
+                fix="use a Gain where nothing is remembered",
+            )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the filtered input", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (self.degree,), "u / denominator at the last ticks"),)
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._shifted(x, u, p)
+
+    @property
+    def degree(self) -> int:
+        """How many states there are."""
+        return max(shape_of(self.numerator)[0], shape_of(self.denominator)[0]) - 1
+
+    def _coefficients(self, p: Signals) -> tuple[SX, SX]:
+        b, a = (
+            vertcat(p[name], SX(self.degree + 1 - p[name].numel(), 1))
+            for name in ("numerator", "denominator")
+        )
+        return b, a
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteFir(Block):
+    """A filter with finite memory: y(k) = b0 u(k) + b1 u(k-1) + … + bm u(k-m)."""
+
+    title: ClassVar[str] = "Discrete FIR Filter"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The mean of the last four samples of pulses: edges become slopes.",
+        parameters={"coefficients": (0.25, 0.25, 0.25, 0.25), "sample_time": 0.2},
+        inputs={"u": made("PulseGenerator", period=4.0)},
+    )
+    sampled: ClassVar[bool] = True
+
+    coefficients: ArrayLike = parameter((0.5, 0.5), dimensions=(1,), doc="b0 … bm")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def check(self) -> None:
+        if shape_of(self.coefficients)[0] < 2:
+            raise InputError(
+                "there is one coefficient",
+                where="DiscreteFir.coefficients",
+                allowed="two or more",
+                fix="use a Gain where nothing is remembered",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the filtered input", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (shape_of(self.coefficients)[0] - 1,), "the last inputs, the newest first"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": dot(p["coefficients"], vertcat(u["u"], x["x"]))}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": vertcat(u["u"], x["x"])[: x["x"].numel()]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}

@@ -1,0 +1,128 @@
+"""Sampled systems by zeros, poles and gain; digital filters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.linear_blocks import (
+    FILTER_DESIGNS,
+    FILTER_TYPES,
+    SectionsByRoots,
+    check_band,
+    section_change,
+    section_output,
+)
+from armblocks.blocks.linear_systems import (
+    LinearSystem,
+    low_pass,
+    realised,
+    sampled,
+    shifted,
+    warped,
+)
+from armblocks.diagram import (
+    Block,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteZeroPole(SectionsByRoots):
+    """A sampled system by its roots: y = gain (z - z1) … (z - zm) / ((z - p1) … (z - pn)) u, m <= n.
+
+    Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
+    imaginary) in files. At rest at the start.
+    """
+
+    title: ClassVar[str] = "Discrete Zero-Pole"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The step response of poles at 0.7 ± 0.5i, every 0.2 s.",
+        parameters={
+            "zeros": (0.0,),
+            "poles": ((0.7, 0.5), (0.7, -0.5)),
+            "gain": 0.34,
+            "sample_time": 0.2,
+        },
+        inputs={"u": made("Step")},
+    )
+
+    poles: ArrayLike = parameter((0.0, 0.5), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (shape_of(self.poles)[0],), "the states of the sections"),)
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": section_change(self.system, x["x"], u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DigitalFilter(Block):
+    """A sampled filter by order and edge: the analog one under the transformation z = (1 + s) / (1 - s).
+
+    Edges are shares of half the sampling frequency, as in MATLAB and SciPy (``butter(order, edge)``).
+    """
+
+    title: ClassVar[str] = "Digital Filter Design"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A noisy sine, sampled every 0.02 s, behind a low pass of 2 Hz.",
+        parameters={"order": 3, "edge": 0.08, "sample_time": 0.02},
+        inputs={
+            "u": made("Sum").by(
+                u1=made("SineWave", frequency=2.0), u2=made("RandomNumber", variance=0.1, sample_time=0.02)
+            )
+        },
+    )
+
+    design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the kind of filter")
+    filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
+    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low pass behind it")
+    edge: float = parameter(
+        0.2, above=0.0, maximum=0.9999, tunable=False, doc="the edge, of bands the lower; 1 is 1 / (2 T)"
+    )
+    upper_edge: float = parameter(
+        0.4, above=0.0, maximum=0.9999, tunable=False, doc="the upper edge of a band, above the lower"
+    )
+    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="in the pass band (chebyshev1), dB")
+    attenuation: float = parameter(40.0, above=0.0, tunable=False, doc="in the stop band (chebyshev2), dB")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def check(self) -> None:
+        check_band(self, self.filter_type, self.edge, self.upper_edge)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the filtered input", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (len(self._system.B),), "the states of the sections"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": section_output(self._system, x["x"], u["u"])}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": section_change(self._system, x["x"], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    def _system(self) -> LinearSystem:
+        base = low_pass(self.design, self.order, self.ripple, self.attenuation)
+        return realised(sampled(shifted(base, self.filter_type, warped(self.edge), warped(self.upper_edge))))

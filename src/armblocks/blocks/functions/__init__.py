@@ -1,0 +1,1 @@
+"""Blocks whose equation the user writes: expressions and Python functions."""

@@ -1,0 +1,110 @@
+"""A block that calculates what its user writes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.diagram.expression_language import CONSTANTS, FUNCTIONS, Formula
+from armblocks.errors import InputError, UnknownNameError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Expression(Block):
+    """What a formula says, such as sin(u[1]) * k: y = formula(u, t, constants), compiled like any block.
+
+    In the formula stand the inputs ``u`` (or ``u1``, ``u2``, … where there are several), their elements
+    ``u[1]``, ``u[2]``, … counted from 1, the time ``t``, ``pi``, ``e``, and the constants that ``names``
+    lists and ``values`` gives, which stay tunable. Operators are + - * / ^, comparisons and && || !.
+    Functions are the usual ones, such as atan2, min, hypot, and ``if(condition, yes, no)``. Whole vectors are
+    worked on element by element.
+    """
+
+    title: ClassVar[str] = "Fcn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A formula of the input: a decaying swing, over a straight rise.",
+        parameters={"formula": "sin(3 * u) * exp(-k * u)", "names": "k", "values": (0.3,)},
+        inputs={"u": made("Ramp")},
+        shown=("y",),
+    )
+
+    formula: str = parameter("u", doc="what comes out")
+    inputs: int = parameter(1, minimum=0, maximum=100, doc="how many inputs")
+    names: str = parameter("", doc="names of constants, such as k, offset")
+    values: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="their values, in order"
+    )
+
+    def check(self) -> None:
+        Formula(self.formula, "Expression.formula")
+        names = self._names()
+        taken = {*CONSTANTS, *FUNCTIONS, "t", *(port.name for port in self.input_ports())}
+        wrong = [name for name in names if not name.isidentifier() or name in taken or names.count(name) > 1]
+        if wrong:
+            raise InputError(
+                f"'{wrong[0]}' cannot be the name of a constant",
+                where="Expression.names",
+                allowed="names made of letters, digits and _, each once, that mean nothing else in formulas",
+                fix="choose another name",
+            )
+        if names and math.prod(shape_of(self.values)) != len(names):
+            raise InputError(
+                f"there are {len(names)} names and {math.prod(shape_of(self.values))} values",
+                where="Expression",
+                allowed="one value for each name",
+                fix="correct names or values",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "input") if self.inputs else ()
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value of the formula"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        for name, shape in inputs.items():
+            if len(shape) > 1:
+                raise InputError(
+                    f"'{name}' has shape {shape}",
+                    allowed="scalars and vectors in a formula",
+                    fix="use the blocks for matrices",
+                )
+        u = {name: SX.sym(name, math.prod(shape)) for name, shape in inputs.items()}
+        values = SX.sym("p", max(1, len(self._names())))
+        try:
+            size, columns = self._value(SX.sym("t"), u, values).shape
+        except UnknownNameError as error:
+            raise InputError(error.what, allowed=error.allowed, fix=error.fix) from None
+        if columns > 1:
+            raise InputError(
+                f"the formula gives a matrix of {size} x {columns}",
+                allowed="scalars and vectors",
+                fix="use the blocks for matrices",
+            )
+        return {"y": (size,) if size > 1 else ()}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._value(t, u, p["values"])}
+
+    def _names(self) -> list[str]:
+        return self.names.replace(",", " ").split()
+
+    def _value(self, t: SX, u: Signals, values: SX) -> SX:
+        constants = {name: values[k] for k, name in enumerate(self._names())}
+        return Formula(self.formula, "Expression.formula").trace({**u, "t": t, **constants})

@@ -1,0 +1,267 @@
+"""Blocks that are Python functions: traced with symbols and compiled like any other, or called at ticks."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from casadi import SX, if_else, sum1, sum2
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    UserFunction,
+    WorkedExample,
+    parameter,
+    sample_time_parameter,
+)
+from armblocks.equations import Shape, flatten, unflatten
+from armblocks.errors import ArmblocksError, InputError
+
+
+def unchanged(u: object) -> object:
+    """What comes in, comes out: the function of a block that was given none."""
+    return u
+
+
+@dataclass(frozen=True, kw_only=True)
+class PythonFunction(Block):
+    """What a Python function gives: y = function(its inputs, t).
+
+    Every argument without a default is an input of its name, but ``t``, which is the time (s). A scalar
+    arrives as a symbol, a vector or matrix as a NumPy array of symbols, on which arithmetic, indices, ``@``
+    and NumPy's functions work; the function runs once, when the diagram is traced, and its equations are
+    compiled and differentiated like those of any block. It may not decide by values (``if u > 0``), as they
+    are not known then: ``casadi.if_else``, ``fmin``, ``fmax`` and ``fabs`` do that in the equations. It must
+    depend on its arguments alone. With several ``results`` it returns as many.
+
+    A diagram's file keeps ``file.py:name`` and runs no code unless it is trusted.
+    """
+
+    title: ClassVar[str] = "Python Function"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The function that every new block has: what comes in, comes out."
+    )
+
+    function: Any = parameter(
+        unchanged,
+        kind=ParameterKind.FUNCTION,
+        of_type=UserFunction,
+        doc="the function, such as def law(u, t)",
+    )
+    results: str = parameter("y", doc="names of the outputs, such as tau, power")
+
+    def check(self) -> None:
+        _check_results(self, _names(self.results))
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _argument_ports(self.function)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return tuple(Port(name, "a result") for name in _names(self.results))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        u = {name: unflatten(SX.sym(name, math.prod(shape)), shape) for name, shape in inputs.items()}
+        return {name: _shape(value) for name, value in self._called(SX.sym("t"), u, inputs).items()}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        shapes = {name: _natural_shape(value) for name, value in u.items()}
+        return {name: _symbols(value) for name, value in self._called(t, u, shapes).items()}
+
+    def _called(self, t: SX, u: Signals, shapes: Shapes) -> Mapping[str, Any]:
+        """What the function gives for symbols."""
+        user = cast("UserFunction", self.function)
+        given = {name: _array(value, shapes[name]) for name, value in u.items()}
+        if "t" in user.arguments:
+            given["t"] = t
+        names = _names(self.results)
+        where = f"the function {user.name}"
+        try:
+            with warnings.catch_warnings():
+                # CasADi announces other types for numbers; symbols stay symbols
+                warnings.simplefilter("ignore", FutureWarning)
+                returned: Any = user.function(**given)
+            values = [returned] if len(names) == 1 else list(returned)
+            found = [value if isinstance(value, SX) else np.array(value, dtype=object) for value in values]
+            for value in found:
+                _symbols(value)
+        except ArmblocksError:
+            raise
+        except Exception as error:
+            raise InputError(
+                f"{where} cannot be traced: {type(error).__name__}: {error}"[:400],
+                allowed="arithmetic, NumPy's functions, and casadi.if_else, fmin, fmax where values decide",
+                fix="replace 'if' by casadi.if_else, max by casadi.fmax, and functions of other libraries; "
+                "or take a CalledPythonFunction, which runs at its ticks",
+            ) from error
+        if len(found) != len(names):
+            raise InputError(
+                f"{where} returns {len(found)} values for the results {', '.join(names)}",
+                allowed="one value for each result",
+                fix="correct the function or the names",
+            )
+        return dict(zip(names, found))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalledPythonFunction(Block):
+    """What a Python function gives at each tick: y(k) = function(its inputs at the tick, t), held in between.
+
+    For what no equations can say: a controller of another library, a decision, a table that is searched. The
+    run halts at each tick and calls the function with numbers and NumPy arrays; its report says how often,
+    and which part of the run that took. What ticks at the same instant sees the new values. The function may
+    keep things of its own, which are then no states of the diagram: a saved state and a second run do not
+    know of them. Where it can be traced, a Python Function is faster by far, works in continuous time and can
+    be linearised.
+
+    A diagram's file keeps ``file.py:name`` and runs no code unless it is trusted.
+    """
+
+    title: ClassVar[str] = "Python Function (called)"
+    sampled: ClassVar[bool] = True
+    called: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The function that every new block has, called every half second: what comes in, comes out.",
+        parameters={"sample_time": 0.5},
+    )
+
+    function: Any = parameter(
+        unchanged,
+        kind=ParameterKind.FUNCTION,
+        of_type=UserFunction,
+        doc="the function, such as def law(u, t)",
+    )
+    results: str = parameter("y", doc="names of the outputs, such as tau, power")
+    shapes: str = parameter("", doc="shapes of the outputs, such as 3, 2x2, 1; numbers where nothing is said")
+    sample_time: ArrayLike = sample_time_parameter(0.1)
+
+    def check(self) -> None:
+        names = _names(self.results)
+        _check_results(self, names)
+        entries = _names(self.shapes)
+        if entries and (len(entries) != len(names) or not all(_SHAPE.fullmatch(entry) for entry in entries)):
+            raise InputError(
+                f"the shapes are '{self.shapes}' for the results {', '.join(names)}",
+                where="CalledPythonFunction.shapes",
+                allowed="one for each result: 1 for a number, 3 for a vector of three, 2x2 for a matrix",
+                fix="give as many shapes as results",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _argument_ports(self.function)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        names = _names(self.results)
+        entries = _names(self.shapes) or ["1"] * len(names)
+        shapes = [tuple(int(size) for size in entry.split("x")) for entry in entries]
+        return tuple(
+            Port(name, "a result", shape=() if shape == (1,) else shape) for name, shape in zip(names, shapes)
+        )
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        taken = (State(f"{name}?", shape, f"{name} at the tick") for name, shape in inputs.items())
+        given = (
+            State(f"{port.name}?", port.shape or (), f"what the function gave for {port.name}")
+            for port in self.output_ports()
+        )
+        return (*taken, *given)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # The values follow from the inputs, though not by an equation: the order of a tick has to know.
+        all_inputs = sum((sum1(sum2(value)) for value in u.values()), SX(0.0))
+        given = {port.name: x[f"{port.name}?"] for port in self.output_ports()}
+        return {name: if_else(all_inputs > 0.0, value, value) for name, value in given.items()}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        taken = {f"{name}?": value for name, value in u.items()}
+        return taken | {f"{port.name}?": x[f"{port.name}?"] for port in self.output_ports()}
+
+    def initial_states(self, p: Signals) -> Signals:
+        ports = (*self.input_ports(), *self.output_ports())
+        return {f"{port.name}?": SX(0.0) for port in ports}
+
+    def call(self, t: float, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
+        user = cast("UserFunction", self.function)
+        given = {**inputs, **({"t": t} if "t" in user.arguments else {})}
+        names = _names(self.results)
+        try:
+            returned: Any = user.function(**given)
+            values = [returned] if len(names) == 1 else list(returned)
+        except Exception as error:
+            raise InputError(
+                f"the function {user.name} failed: {type(error).__name__}: {error}"[:400],
+                allowed="a function that takes numbers and arrays and returns such",
+                fix="correct the function",
+            ) from error
+        if len(values) != len(names):
+            raise InputError(
+                f"the function {user.name} returns {len(values)} values for the results {', '.join(names)}",
+                allowed="one value for each result",
+                fix="correct the function or the names",
+            )
+        return dict(zip(names, values))
+
+
+_SHAPE = re.compile("[1-9][0-9]*(x[1-9][0-9]*)?")
+
+
+def _names(text: str) -> list[str]:
+    return text.replace(",", " ").split()
+
+
+def _argument_ports(function: UserFunction) -> tuple[Port, ...]:
+    return tuple(Port(name, "an argument") for name in function.arguments if name != "t")
+
+
+def _check_results(block: Block, names: list[str]) -> None:
+    """Raise ``InputError`` where the results of a function cannot be ports."""
+    taken = {port.name for port in block.input_ports()}
+    wrong = [name for name in names if not name.isidentifier() or names.count(name) > 1 or name in taken]
+    if wrong or not names:
+        raise InputError(
+            f"the results are '{block.parameter_value('results')}'",
+            where=f"{block.type_name()}.results",
+            allowed="names made of letters, digits and _, each once, that no argument has",
+            fix="choose other names",
+        )
+
+
+def _array(value: SX, shape: Shape) -> Any:
+    """A symbol as the user's function gets it."""
+    if not shape:
+        return value
+    found = np.empty(shape, dtype=object)
+    flat = flatten(value, shape)
+    for k, place in enumerate(itertools.product(*map(range, shape))):
+        found[place] = flat[k]
+    return found
+
+
+def _natural_shape(value: SX) -> Shape:
+    rows, columns = value.shape
+    return (rows, columns) if columns > 1 else (rows,) if rows > 1 else ()
+
+
+def _shape(value: Any) -> Shape:
+    return _natural_shape(value) if isinstance(value, SX) else tuple(value.shape)
+
+
+def _symbols(value: Any) -> SX:
+    """What the user's function gave, in its natural shape."""
+    if isinstance(value, SX):
+        return value
+    entries = SX.zeros(value.size)
+    for k, entry in enumerate(value.ravel()):
+        entries[k] = entry
+    return unflatten(entries, value.shape)

@@ -1,0 +1,199 @@
+"""What linear blocks in continuous and discrete time have in common: matrices, coefficients, roots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from casadi import SX, dot, mtimes, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.linear_systems import (
+    LinearSystem,
+    ZeroPoleGain,
+    check_proper,
+    complex_roots,
+    realised,
+)
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Signals,
+    State,
+    parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearBlock(Block):
+    """Four matrices that fit each other: what becomes of the state is A x + B u, the output is C x + D u.
+
+    D belongs to the structure (it is not tunable), so that a zero in it leaves the output free of the input
+    and the block may stand in a loop.
+    """
+
+    A: ArrayLike = parameter(((0.5,),), dimensions=(2,), doc="the system matrix (n, n)")
+    B: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the input matrix (n, m)")
+    C: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the output matrix (k, n)")
+    D: ArrayLike = parameter(((0.0,),), dimensions=(2,), doc="the feedthrough (k, m)", tunable=False)
+    initial: ArrayLike = parameter(
+        0.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="the state (n,) at the start, or one number for all",
+    )
+
+    def check(self) -> None:
+        A, B, C, D = (shape_of(self.parameter_value(name)) for name in "ABCD")
+        if A[0] != A[1] or B[0] != A[0] or C[1] != A[0] or (C[0], B[1]) != D:
+            raise InputError(
+                f"A is {A}, B is {B}, C is {C}, D is {D}",
+                where=self.type_name(),
+                allowed="A (n, n), B (n, m), C (k, n), D (k, m)",
+                fix="make the four matrices fit each other",
+            )
+        if shape_of(self.initial) not in ((), A[:1]):
+            raise InputError(
+                f"initial has shape {shape_of(self.initial)}",
+                where=f"{self.type_name()}.initial",
+                allowed=f"() or {A[:1]}",
+                fix="give one number for each row of A, or one for all",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=shape_of(self.B)[1:]),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output", shape=shape_of(self.C)[:1]),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": mtimes(p["C"], x["x"]) + mtimes(SX(np.asarray(self.D)), u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": p["initial"]}
+
+    @property
+    def _state(self) -> State:
+        return State("x", shape_of(self.A)[:1], "the state of the system")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RationalBlock(Block):
+    """A quotient of two polynomials, in the direct form II; at rest at the start.
+
+    Its state is u filtered by 1/denominator, the highest power first: its derivatives, or its last values.
+    """
+
+    numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, highest power first")
+    denominator: ArrayLike = parameter((1.0, 1.0), dimensions=(1,), doc="a0 … an, highest power first")
+
+    def check(self) -> None:
+        b, a = np.asarray(self.numerator), np.asarray(self.denominator)
+        if a[0] == 0.0 or len(a) < 2 or len(b) > len(a):
+            raise InputError(
+                f"the denominator is {a.tolist()} and the numerator has {len(b)} coefficients",
+                where=self.type_name(),
+                allowed="a0 not zero, at least two a, and no more b than a",
+                fix="leave out leading zeros; more zeros than poles would ask for the input of the future",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        b, a = self._normalised(p)
+        # y = b0 u + sum (b_i - b0 a_i) x_i; a strictly proper system has no b0, so nothing feeds through.
+        return {"y": b[0] * u["u"] + dot(b[1:] - b[0] * a[1:], x["x"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    def degree(self) -> int:
+        """How many states there are."""
+        return shape_of(self.denominator)[0] - 1
+
+    def _coefficients(self, p: Signals) -> tuple[SX, SX]:
+        """Numerator and denominator of one length."""
+        missing = p["denominator"].numel() - p["numerator"].numel()
+        return vertcat(SX(missing, 1), p["numerator"]), p["denominator"]
+
+    def _normalised(self, p: Signals) -> tuple[SX, SX]:
+        b, a = self._coefficients(p)
+        return b / a[0], a / a[0]
+
+    def _shifted(self, x: Signals, u: Signals, p: Signals) -> Signals:
+        """What comes of the state: u filtered by 1/denominator, then all that is there but its last."""
+        a = self._normalised(p)[1]
+        return {"x": vertcat(u["u"] - dot(a[1:], x["x"]), x["x"])[: self.degree]}
+
+
+FILTER_DESIGNS = ("butterworth", "chebyshev1", "chebyshev2")
+
+
+FILTER_TYPES = ("low_pass", "high_pass", "band_pass", "band_stop")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionsByRoots(Block):
+    """A chain of sections by zeros and poles, with a factor; continuous or sampled."""
+
+    zeros: ArrayLike = parameter((1.0,), dimensions=(1, 2), tunable=False, roots=True, doc="z1 … zm, or none")
+    poles: ArrayLike = parameter((0.0, -1.0), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
+    gain: float = parameter(1.0, doc="the factor")
+
+    def check(self) -> None:
+        check_proper(*roots_of(self), where=self.type_name())
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the input", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the output", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["gain"] * section_output(self.system, x["x"], u["u"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+    @property
+    def system(self) -> LinearSystem:
+        """The sections, without the factor."""
+        zeros, poles = roots_of(self)
+        return realised(ZeroPoleGain(zeros=zeros, poles=poles, gain=1.0))
+
+
+def roots_of(block: SectionsByRoots) -> tuple[Any, Any]:
+    """Zeros and poles as complex numbers."""
+    where = block.type_name()
+    return complex_roots(block.zeros, where, "zeros"), complex_roots(block.poles, where, "poles")
+
+
+def section_output(system: LinearSystem, x: SX, u: SX) -> SX:
+    """The output C x + D u; without feedthrough the input has no part in it."""
+    found = dot(SX(np.asarray(system.C)), x)
+    return found + system.D * u if system.D else found
+
+
+def section_change(system: LinearSystem, x: SX, u: SX) -> SX:
+    """A x + B u: the derivative of the state, or the state at the next tick."""
+    return mtimes(SX(np.asarray(system.A)), x) + SX(np.asarray(system.B)) * u
+
+
+def check_band(block: Block, filter_type: str, edge: float, upper_edge: float) -> None:
+    """Raise where the two edges of a band are not in order."""
+    if filter_type.startswith("band") and upper_edge <= edge:
+        raise InputError(
+            f"edge is {edge} and upper_edge is {upper_edge}",
+            where=block.type_name(),
+            allowed="edge < upper_edge",
+            fix="exchange them",
+        )

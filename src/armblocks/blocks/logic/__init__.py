@@ -1,0 +1,1 @@
+"""Blocks of comparisons, logic, edges, flip-flops and counters."""

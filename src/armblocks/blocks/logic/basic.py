@@ -1,0 +1,394 @@
+"""Logic: signals that are 1 where something holds and 0 where it does not.
+
+Every input that is not zero counts as true. Where a comparison of continuous signals changes its answer is an
+event, located exactly. A gate has none of its own: its inputs change at the events of others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import reduce
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX, if_else, logic_and, logic_not, logic_or
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.blocks.routing.selection import choose
+from armblocks.blocks.switching import located, zero_crossing_parameter
+from armblocks.diagram import (
+    Block,
+    Condition,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.equations import Shape
+from armblocks.errors import InputError
+
+_MOST_CONDITIONS = 12
+_RELATIONS = ("==", "~=", "<", "<=", ">", ">=")
+_GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
+    "AND": (logic_and, False),
+    "OR": (logic_or, False),
+    "NAND": (logic_and, True),
+    "NOR": (logic_or, True),
+    "XOR": (lambda left, right: left != right, False),
+    "NXOR": (lambda left, right: left != right, True),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelationalOperator(Block):
+    """Two signals compared, element by element: y = 1 where u1 (relation) u2 holds, else 0."""
+
+    title: ClassVar[str] = "Relational Operator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is at most 0.5.",
+        inputs={"u1": made("SineWave"), "u2": made("Constant", value=0.5)},
+    )
+
+    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u1", "the left side"), Port("u2", "the right side"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _side_values(self.relation, u["u1"] - u["u2"])
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _related(self.relation, x)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogicalOperator(Block):
+    """A gate, element by element: y = u1 AND u2 AND … and the like; NOT has one input.
+
+    XOR is true where an odd count of inputs is; NAND, NOR and NXOR are the opposites.
+    """
+
+    title: ClassVar[str] = "Logical Operator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while both pulses are there.",
+        inputs={
+            "u1": made("PulseGenerator", period=4.0).named("slow"),
+            "u2": made("PulseGenerator", period=1.0).named("fast"),
+        },
+    )
+
+    operator: str = parameter("AND", choices=(*_GATES, "NOT"), doc="the gate")
+    inputs: int = parameter(2, minimum=1, doc="how many inputs; NOT always has one")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", 1 if self.operator == "NOT" else self.inputs, "condition")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        conditions = [value != 0.0 for value in u.values()]
+        if self.operator == "NOT":
+            return {"y": logic_not(conditions[0])}
+        gate, opposite = _GATES[self.operator]
+        found = reduce(gate, conditions)
+        return {"y": logic_not(found) if opposite else found}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareToConstant(Block):
+    """A signal compared with a number, element by element: y = 1 where u (relation) constant, else 0."""
+
+    title: ClassVar[str] = "Compare To Constant"
+    spreads: ClassVar[tuple[str, ...]] = ("constant",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is above 0.5.",
+        parameters={"relation": ">", "constant": 0.5},
+    )
+
+    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    zero_crossing: bool = zero_crossing_parameter()
+    constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the left side"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _side_values(self.relation, u["u"] - p["constant"])
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _related(self.relation, x)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareToZero(Block):
+    """A signal compared with zero, element by element: y = 1 where u (relation) 0 holds, else 0."""
+
+    title: ClassVar[str] = "Compare To Zero"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is not above 0.",
+    )
+
+    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the left side"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_sides(self.relation, self.output_shapes(inputs)["y"]))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _side_values(self.relation, u["u"])
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _related(self.relation, x)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntervalTest(Block):
+    """Whether a signal lies in an interval: y = 1 where lower <= u <= upper, else 0.
+
+    Each end belongs to the interval unless ``lower_closed`` or ``upper_closed`` is false.
+    """
+
+    title: ClassVar[str] = "Interval Test"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is between -0.5 and 0.5.",
+    )
+
+    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the lower end")
+    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the upper end")
+    lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
+    upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is tested"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({**inputs, "lower": shape_of(self.lower), "upper": shape_of(self.upper)})}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        above = Condition("above", shape, "1 above the lower end", closed=self.lower_closed)
+        below = Condition("below", shape, "1 below the upper end", closed=self.upper_closed)
+        return located(self, above, below)
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - p["lower"], "below": p["upper"] - u["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": logic_and(x["above"], x["below"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntervalTestDynamic(Block):
+    """Whether a signal lies in an interval that moves: y = 1 where lower <= u <= upper, else 0."""
+
+    title: ClassVar[str] = "Interval Test Dynamic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is between two limits, of which the upper one rises.",
+        inputs={
+            "upper": made("Ramp", slope=0.1),
+            "u": made("SineWave"),
+            "lower": made("Constant", value=-0.5),
+        },
+    )
+
+    lower_closed: bool = parameter(True, doc="whether the lower end belongs to the interval")
+    upper_closed: bool = parameter(True, doc="whether the upper end belongs to the interval")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("upper", "the upper end"), Port("u", "what is tested"), Port("lower", "the lower end"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 or 0"),)
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        above = Condition("above", shape, "1 above the lower end", closed=self.lower_closed)
+        below = Condition("below", shape, "1 below the upper end", closed=self.upper_closed)
+        return located(self, above, below)
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"above": u["u"] - u["lower"], "below": u["upper"] - u["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": logic_and(x["above"], x["below"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CombinatorialLogic(Block):
+    """A truth table: y = the row of the table that the conditions point at, the first the highest digit.
+
+    For conditions (u1, …, um) the row is 1 + u1 2^(m-1) + … + um, of 2^m rows. A table of one column gives
+    a scalar. The default is AND of two.
+    """
+
+    title: ClassVar[str] = "Combinatorial Logic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The truth table of exclusive or: 1 while just one of the two pulses is there.",
+        parameters={"table": ((0.0,), (1.0,), (1.0,), (0.0,))},
+        inputs={
+            "u": made("Mux").by(
+                u1=made("PulseGenerator", period=4.0).named("slow"),
+                u2=made("PulseGenerator", period=1.0).named("fast"),
+            )
+        },
+    )
+
+    table: ArrayLike = parameter(
+        ((0.0,), (0.0,), (0.0,), (1.0,)), dimensions=(2,), doc="one row for each combination of conditions"
+    )
+
+    def check(self) -> None:
+        rows = shape_of(self.table)[0]
+        if rows & (rows - 1) or rows < 2:
+            raise InputError(
+                f"the table has {rows} rows",
+                where="CombinatorialLogic",
+                allowed="2, 4, 8, … rows: one for each combination of conditions",
+                fix="add the missing rows",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the conditions (m,)", shape=(shape_of(self.table)[0].bit_length() - 1,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        columns = shape_of(self.table)[1]
+        return (Port("y", "the row of the table", shape=(columns,) if columns > 1 else ()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        row = SX(0.0)
+        for k in range(u["u"].numel()):
+            row = 2.0 * row + (u["u"][k] != 0.0)
+        return {"y": choose(row, [p["table"][k, :].T for k in range(p["table"].shape[0])])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TruthTable(Block):
+    """A decision table: y = the actions of the first decision whose conditions all hold.
+
+    Each row of ``decisions`` says of every condition whether it has to be true (1), false (0) or may be
+    either (-1), and the same row of ``actions`` what comes out then. Every combination must be decided; a
+    last row of -1 is for all others.
+    """
+
+    title: ClassVar[str] = "Truth Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="2 where the slow pulse is there, else 1 where the fast one is, else 0.",
+        parameters={
+            "decisions": ((1.0, -1.0), (0.0, 1.0), (-1.0, -1.0)),
+            "actions": ((2.0,), (1.0,), (0.0,)),
+        },
+        inputs={
+            "u": made("Mux").by(
+                u1=made("PulseGenerator", period=4.0).named("slow"),
+                u2=made("PulseGenerator", period=1.0).named("fast"),
+            )
+        },
+    )
+
+    decisions: ArrayLike = parameter(
+        ((1.0, 1.0), (-1.0, -1.0)),
+        dimensions=(2,),
+        tunable=False,
+        minimum=-1.0,
+        maximum=1.0,
+        doc="one row for each decision: 1 true, 0 false, -1 either",
+    )
+    actions: ArrayLike = parameter(((1.0,), (0.0,)), dimensions=(2,), doc="what comes out, one row for each")
+
+    def check(self) -> None:
+        rows = np.asarray(self.decisions, dtype=np.float64)
+        if rows.shape[0] != shape_of(self.actions)[0] or not np.isin(rows, (-1.0, 0.0, 1.0)).all():
+            raise InputError(
+                f"there are {rows.shape[0]} decisions and {shape_of(self.actions)[0]} actions",
+                where="TruthTable",
+                allowed="an action for each decision, of entries 1, 0 and -1",
+                fix="correct the table",
+            )
+        if rows.shape[1] > _MOST_CONDITIONS:
+            raise InputError(
+                f"there are {rows.shape[1]} conditions",
+                where="TruthTable.decisions",
+                allowed=f"at most {_MOST_CONDITIONS}",
+                fix="decide in several tables",
+            )
+        table = rows.tolist()
+        for given in product((0, 1), repeat=rows.shape[1]):
+            if any(all(want in (-1.0, one) for want, one in zip(row, given)) for row in table):
+                continue
+            raise InputError(
+                f"the conditions {list(given)} are not decided",
+                where="TruthTable.decisions",
+                allowed="a decision for every combination of conditions",
+                fix="add a last row of -1 for all others",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the conditions (m,)", shape=(shape_of(self.decisions)[1],)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        columns = shape_of(self.actions)[1]
+        return (Port("y", "the action", shape=(columns,) if columns > 1 else ()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        rows: list[list[float]] = np.asarray(self.decisions, dtype=np.float64).tolist()
+        action = p["actions"][len(rows) - 1, :].T
+        for k in reversed(range(len(rows) - 1)):
+            asked = [(u["u"][i] != 0.0) == want for i, want in enumerate(rows[k]) if want >= 0.0]
+            action = if_else(reduce(logic_and, asked, SX(1.0)), p["actions"][k, :].T, action)
+        return {"y": action}
+
+
+def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:
+    """What a relation asks of left minus right; equality takes two questions."""
+    above = Condition("above", shape, "1 where the left side is greater", closed=False)
+    below = Condition("below", shape, "1 where the left side is less", closed=False)
+    if relation in (">", "<="):
+        return (above,)
+    return (below,) if relation in ("<", ">=") else (above, below)
+
+
+def _side_values(relation: str, difference: SX) -> Signals:
+    values = {"above": difference, "below": -difference}
+    return {entry.name: values[entry.name] for entry in _sides(relation, ())}
+
+
+def _related(relation: str, x: Signals) -> SX:
+    """The answer by the sides."""
+    if relation in ("==", "~="):
+        different = logic_or(x["above"], x["below"])
+        return logic_not(different) if relation == "==" else different
+    found = x["above"] if relation in (">", "<=") else x["below"]
+    return found if relation in (">", "<") else logic_not(found)

@@ -1,0 +1,266 @@
+"""Sampled logic with a memory: edges, flip-flops, counters. They work at their ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, if_else, logic_and, logic_not
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+
+_EDGES: Mapping[str, Callable[[SX, SX], SX]] = {
+    "change": lambda u, before: u != before,
+    "increase": lambda u, before: u > before,
+    "decrease": lambda u, before: u < before,
+    "rise positive": lambda u, before: logic_and(u > 0.0, before <= 0.0),
+    "rise nonnegative": lambda u, before: logic_and(u >= 0.0, before < 0.0),
+    "fall negative": lambda u, before: logic_and(u < 0.0, before >= 0.0),
+    "fall nonpositive": lambda u, before: logic_and(u <= 0.0, before > 0.0),
+}
+_PULSES = made("SineWave", frequency=2.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EdgeDetection(Block):
+    """Whether the input changed since the tick before: y(k) = 1 where u(k-1), u(k) are the edge asked for.
+
+    Simulink has one block for each edge: Detect Change, Detect Increase, Detect Decrease, Detect Rise
+    Positive, Detect Rise Nonnegative, Detect Fall Negative, Detect Fall Nonpositive.
+    """
+
+    title: ClassVar[str] = "Edge Detection"
+    spreads: ClassVar[tuple[str, ...]] = ("initial",)
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 at each tick at which the sine has become positive.",
+        parameters={"sample_time": 0.1},
+        inputs={"u": _PULSES},
+    )
+
+    edge: str = parameter("rise positive", choices=tuple(_EDGES), doc="what is looked for")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is watched"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "1 at the edge, else 0"),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("before", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _EDGES[self.edge](u["u"], x["before"])}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"before": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"before": p["initial"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SRFlipFlop(Block):
+    """Set and reset: Q(k) = 1 if S, 0 if R, as before if neither; with both, Q and its opposite are 0."""
+
+    title: ClassVar[str] = "S-R Flip-Flop"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Set by one pulse, reset by another.",
+        parameters={"sample_time": 0.1},
+        inputs={
+            "S": made("PulseGenerator", period=4.0, width=10.0, delay=1.0).named("set"),
+            "R": made("PulseGenerator", period=4.0, width=10.0, delay=3.0).named("reset"),
+        },
+    )
+
+    initial: bool = parameter(False, doc="whether Q is 1 before the first tick")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("S", "sets"), Port("R", "resets"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("Q", "the state"), Port("not_Q", "its opposite; 0 too while both inputs are true"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shape = broadcast(inputs)
+        return {"Q": shape, "not_Q": shape}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"Q": (), "not_Q": ()}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("state", broadcast(inputs), "Q at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        set_, reset = u["S"] != 0.0, u["R"] != 0.0
+        state = if_else(reset, 0.0, if_else(set_, 1.0, x["state"]))
+        return {"Q": state, "not_Q": logic_and(logic_not(state), logic_not(logic_and(set_, reset)))}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"state": self.outputs(t, x, u, p)["Q"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"state": SX(float(self.initial))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DFlipFlop(Block):
+    """Takes its input at the rising edge of a clock: Q(k) = D(k) if CLK(k-1) <= 0 < CLK(k), else as before.
+
+    With the trigger ``level`` it is the D latch: Q follows D while CLK is positive.
+    """
+
+    title: ClassVar[str] = "D Flip-Flop"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine, caught at each rising edge of the pulses.",
+        parameters={"sample_time": 0.1},
+        inputs={"D": made("SineWave"), "CLK": made("PulseGenerator", period=1.0, delay=0.5).named("clock")},
+    )
+
+    trigger: str = parameter("rising edge", choices=("rising edge", "level"), doc="when D is taken")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="Q before the first edge")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("D", "what is taken"), Port("CLK", "the clock", shape=()))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("Q", "the state"), Port("not_Q", "1 where Q is 0, else 0"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shape = broadcast({"D": inputs["D"], "initial": shape_of(self.initial)})
+        return {"Q": shape, "not_Q": shape}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"Q": shape_of(self.initial), "not_Q": shape_of(self.initial)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["Q"]
+        return (State("state", shape, "Q at the tick before"), State("clock", (), "CLK at the tick before"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        high = u["CLK"] > 0.0
+        takes = high if self.trigger == "level" else logic_and(high, x["clock"] <= 0.0)
+        state = if_else(takes, u["D"], x["state"])
+        return {"Q": state, "not_Q": state == 0.0}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"state": self.outputs(t, x, u, p)["Q"], "clock": u["CLK"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"state": p["initial"], "clock": SX(1.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JKFlipFlop(Block):
+    """Set, reset or toggled at the falling edge of a clock: J sets, K resets, both toggle, neither keeps Q.
+
+    The edge is CLK(k-1) > 0 >= CLK(k), as in Simulink.
+    """
+
+    title: ClassVar[str] = "J-K Flip-Flop"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="With J = K = 1 it halves the frequency of the pulses.",
+        parameters={"sample_time": 0.1},
+        inputs={
+            "J": made("Constant", value=1.0).named("one"),
+            "CLK": made("PulseGenerator", period=1.0, delay=0.25).named("clock"),
+            "K": made("Constant", value=1.0).named("one"),
+        },
+    )
+
+    initial: bool = parameter(False, doc="whether Q is 1 before the first edge")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("J", "sets"), Port("CLK", "the clock", shape=()), Port("K", "resets"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("Q", "the state"), Port("not_Q", "its opposite"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shape = broadcast({"J": inputs["J"], "K": inputs["K"]})
+        return {"Q": shape, "not_Q": shape}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"Q": (), "not_Q": ()}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = self.output_shapes(inputs)["Q"]
+        return (State("state", shape, "Q at the tick before"), State("clock", (), "CLK at the tick before"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        falls = logic_and(u["CLK"] <= 0.0, x["clock"] > 0.0)
+        # The characteristic equation: Q becomes J where it is 0 and not K where it is 1.
+        after = if_else(x["state"], u["K"] == 0.0, u["J"] != 0.0)
+        state = if_else(falls, after, x["state"])
+        return {"Q": state, "not_Q": logic_not(state)}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"state": self.outputs(t, x, u, p)["Q"], "clock": u["CLK"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"state": SX(float(self.initial)), "clock": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counter(Block):
+    """Counts rising edges: y(k) = y(k-1) + 1 where u(k-1) <= 0 < u(k); ``initial`` while reset."""
+
+    title: ClassVar[str] = "Counter"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The waves of a sine are counted, until a step sets the count back.",
+        parameters={"sample_time": 0.1},
+        inputs={"u": _PULSES, "reset": made("Step", time=8.0).named("reset")},
+    )
+
+    initial: float = parameter(0.0, doc="where it begins")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "whose edges are counted"), Port("reset", "sets back while not 0", shape=()))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the count"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
+    def assumed_output_shapes(self) -> Shapes:
+        return {"y": ()}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        before = State("before", inputs["u"], "the input at the tick before")
+        return (State("count", inputs["u"], "the count"), before)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        edge = logic_and(u["u"] > 0.0, x["before"] <= 0.0)
+        return {"y": if_else(u["reset"] != 0.0, p["initial"], x["count"] + edge)}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"count": self.outputs(t, x, u, p)["y"], "before": u["u"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"count": p["initial"], "before": SX(1.0)}

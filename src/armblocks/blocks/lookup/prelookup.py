@@ -1,0 +1,203 @@
+"""Lookup in two steps, where a position is found once for several tables; and reading entries by index."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, floor, fmax, fmin, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.blocks.interpolation import EXTRAPOLATIONS, cells, contract
+from armblocks.blocks.long_tables import is_long
+from armblocks.blocks.switching import zero_crossing_parameter
+from armblocks.blocks.table_axes import BlockWithAxes, by_element, numbers_of, read, rising
+from armblocks.diagram import (
+    Block,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.equations import flatten, read_entry
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prelookup(BlockWithAxes):
+    """Where a position lies between break points: u = b(k) + f (b(k+1) - b(k)), index k from 0, fraction f.
+
+    Several Interpolation Using Prelookup blocks can share it. The index never passes the last interval, so
+    that f is 1 at the last break point; beyond the ends ``clip`` holds f at 0 or 1, ``linear`` lets it go on.
+    """
+
+    title: ClassVar[str] = "Prelookup"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="In which interval of the positions the input lies, and which part of it has been passed.",
+        parameters={"positions": (0.0, 2.0, 5.0, 10.0)},
+        inputs={"u": made("Ramp")},
+        shown=("k", "f"),
+    )
+
+    positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def check(self) -> None:
+        rising("Prelookup", "positions", self.positions, *shape_of(self.positions))
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the position"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("k", "index of the interval, from 0"), Port("f", "fraction of the interval, 0 to 1"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"k": inputs["u"], "f": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        points = p["positions"] if self._is_long() else SX(numbers_of(self, "positions"))
+        cell = self._axes(p).cell("u", x, u)
+        n = points.numel()
+
+        def interval(cell: SX) -> SX:
+            return fmin(fmax(cell - 1.0, 0.0), n - 2.0) if self.extrapolation == "clip" else cell
+
+        def fraction(u: SX, cell: SX) -> SX:
+            k = interval(cell)
+            begin, end = (self._at(points, place) for place in (k, k + 1.0))
+            free = (u - begin) / (end - begin)
+            if self.extrapolation == "linear":
+                return free
+            return if_else(cell == 0.0, 0.0, if_else(cell == float(n), 1.0, free))
+
+        return {"k": by_element([cell], interval), "f": by_element([u["u"], cell], fraction)}
+
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.positions), "linear")
+
+    def _at(self, points: SX, place: SX) -> SX:
+        if self._is_long():
+            return read_entry(points, place)
+        return sum((if_else(place == float(k), points[k], 0.0) for k in range(points.numel())), SX(0.0))
+
+    def _along(self) -> Mapping[str, list[float]]:
+        return {"u": numbers_of(self, "positions")}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {"u": p["positions"]}
+
+    @property
+    def _method(self) -> str:
+        return "linear"
+
+
+@dataclass(frozen=True, kw_only=True)
+class InterpolationUsingPrelookup(Block):
+    """Linear interpolation at known intervals: y = (1 - f) table[k] + f table[k + 1], and so along each axis.
+
+    Indices and fractions come from Prelookup blocks, one pair for each axis of the table. An index is cut
+    down to an integer and held inside the table.
+    """
+
+    title: ClassVar[str] = "Interpolation Using Prelookup"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The curve whose interval and fraction a Prelookup has found.",
+        parameters={"table": (0.0, 3.0, 1.0, 2.0)},
+        inputs={
+            "k1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0))
+            .named("prelookup")
+            .by(u=made("Ramp"))
+            .at("k"),
+            "f1": made("Prelookup", positions=(0.0, 2.0, 5.0, 10.0)).named("prelookup").at("f"),
+        },
+    )
+
+    table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="values, two or more an axis")
+
+    def check(self) -> None:
+        if min(shape_of(self.table)) < 2:
+            raise InputError(
+                f"the table has shape {shape_of(self.table)}",
+                where="InterpolationUsingPrelookup",
+                allowed="two or more entries along each axis",
+                fix="leave out the axis of one entry",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        axes = range(1, len(shape_of(self.table)) + 1)
+        return tuple(
+            port
+            for k in axes
+            for port in (Port(f"k{k}", f"index along axis {k}"), Port(f"f{k}", f"fraction along axis {k}"))
+        )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        shape = shape_of(self.table)
+        entries = flatten(p["table"], shape)
+
+        def value(*pairs: SX) -> SX:
+            places = list(zip(pairs[::2], pairs[1::2], shape))
+            if is_long(shape):
+                return read(entries, shape, [_corners(*place) for place in places])
+            return contract(p["table"], shape, [_weights(*place) for place in places])
+
+        return {"y": by_element([*u.values()], value)}
+
+
+def _corners(k: SX, f: SX, n: int) -> list[tuple[SX, SX]]:
+    """Index and weight of the two entries that count for an index and a fraction."""
+    place = fmin(fmax(floor(k), 0.0), float(n - 2))
+    return [(place, 1.0 - f), (place + 1.0, f)]
+
+
+def _weights(k: SX, f: SX, n: int) -> list[SX]:
+    """Weights of all n entries."""
+    (place, left), (_, right) = _corners(k, f, n)
+    return [
+        if_else(place == float(i), left, 0.0) + if_else(place == float(i - 1), right, 0.0) for i in range(n)
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectLookup(Block):
+    """The entry of a table at given indices, which count from 0: y = table[u1, u2, …].
+
+    An index is cut down to an integer and held inside the table.
+    """
+
+    title: ClassVar[str] = "Direct Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A counter reads the table entry by entry.",
+        parameters={"table": (0.5, 2.0, 1.0, -1.0)},
+        inputs={"u": made("CounterLimited", upper=3)},
+    )
+
+    table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="the entries")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", len(shape_of(self.table)), "index along axis")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the entry"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        shape = shape_of(self.table)
+        entries = flatten(p["table"], shape)
+
+        def entry(*indices: SX) -> SX:
+            if is_long(shape):
+                held = (fmin(fmax(floor(u), 0.0), n - 1.0) for u, n in zip(indices, shape))
+                return read(entries, shape, [[(place, SX(1.0))] for place in held])
+            axes = [cells(u, [float(k) for k in range(1, n)]) for u, n in zip(indices, shape)]
+            return contract(p["table"], shape, axes)
+
+        return {"y": by_element([*u.values()], entry)}

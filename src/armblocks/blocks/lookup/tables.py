@@ -1,0 +1,254 @@
+"""Lookup tables. Break points are fixed, entries are tunable; signals are looked up element by element."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.blocks.interpolation import EXTRAPOLATIONS, METHODS
+from armblocks.blocks.long_tables import is_long
+from armblocks.blocks.switching import zero_crossing_parameter
+from armblocks.blocks.table_axes import Axes, BlockWithAxes, axis, numbers_of, rising
+from armblocks.diagram import (
+    Block,
+    Guard,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookupTable1D(BlockWithAxes):
+    """A curve through given points: y = table(u), between them by the method chosen.
+
+    ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``); ``flat`` takes the entry at or below
+    u, ``nearest`` the nearest. Beyond the ends ``clip`` holds the last value, ``linear`` goes straight on.
+    """
+
+    title: ClassVar[str] = "1-D Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A curve through five points: straight between them, held beyond the ends.",
+        parameters={"positions": (1.0, 3.0, 5.0, 6.0, 8.0), "table": (0.0, 2.0, 1.0, 1.5, 0.0)},
+        inputs={"u": made("Ramp")},
+    )
+
+    positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
+    table: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), doc="values there (n,)")
+    method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def check(self) -> None:
+        rising("LookupTable1D", "positions", self.positions, *shape_of(self.table))
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the position"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._value(x, u, p)}
+
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.table), self.method)
+
+    def _along(self) -> Mapping[str, list[float]]:
+        return {"u": numbers_of(self, "positions")}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {"u": p["positions"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookupTable2D(BlockWithAxes):
+    """A surface over given points: y = table(u1, u2), rows along u1 and columns along u2."""
+
+    title: ClassVar[str] = "2-D Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The table is crossed along its first axis while the second swings.",
+        parameters={
+            "positions1": (0.0, 5.0, 10.0),
+            "positions2": (-1.0, 1.0),
+            "table": ((0.0, 1.0), (2.0, 4.0), (1.0, 3.0)),
+        },
+        inputs={"u1": made("Ramp"), "u2": made("SineWave", frequency=2.0)},
+    )
+
+    positions1: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions of rows")
+    positions2: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="and of columns")
+    table: ArrayLike = parameter(((0.0, 1.0), (1.0, 2.0)), dimensions=(2,), doc="values (rows, columns)")
+    method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def check(self) -> None:
+        rows, columns = shape_of(self.table)
+        rising("LookupTable2D", "positions1", self.positions1, rows)
+        rising("LookupTable2D", "positions2", self.positions2, columns)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u1", "the position along the rows"), Port("u2", "the position along the columns"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._value(x, u, p)}
+
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.table), self.method)
+
+    def _along(self) -> Mapping[str, list[float]]:
+        return {"u1": numbers_of(self, "positions1"), "u2": numbers_of(self, "positions2")}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {"u1": p["positions1"], "u2": p["positions2"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookupTableND(BlockWithAxes):
+    """A table of one to four axes: y = table(u1, u2, …), one input for each axis.
+
+    ``positions`` holds the positions of the first axis, then those of the second, and so on: as many
+    numbers as the table has entries along each.
+    """
+
+    title: ClassVar[str] = "n-D Lookup Table"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A table of two axes, smooth by cubic splines, crossed along the first.",
+        parameters={
+            "positions": (0.0, 3.0, 6.0, 10.0, 0.0, 1.0, 2.0, 3.0),
+            "table": ((0.0, 1.0, 1.0, 0.0), (2.0, 3.0, 3.0, 2.0), (1.0, 2.0, 2.0, 1.0), (0.0, 1.0, 1.0, 0.0)),
+            "method": "cubic",
+        },
+        inputs={"u1": made("Ramp"), "u2": made("Constant", value=1.5)},
+    )
+
+    positions: ArrayLike = parameter(
+        (0.0, 1.0, 0.0, 1.0), dimensions=(1,), tunable=False, doc="positions, axis after axis, rising in each"
+    )
+    table: ArrayLike = parameter(((0.0, 1.0), (1.0, 2.0)), dimensions=(1, 2, 3, 4), doc="values")
+    method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def check(self) -> None:
+        shape, count = shape_of(self.table), shape_of(self.positions)[0]
+        if count != sum(shape):
+            raise InputError(
+                f"there are {count} break points for a table of shape {shape}",
+                where="LookupTableND",
+                allowed=f"{sum(shape)}: {' + '.join(map(str, shape))}",
+                fix="give the positions of every axis, one axis after the other",
+            )
+        for k, along in enumerate(self._along().values(), 1):
+            rising("LookupTableND", f"axis {k} of positions", along, shape[k - 1])
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", len(shape_of(self.table)), "position along axis")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._value(x, u, p)}
+
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.table), self.method)
+
+    def _along(self) -> Mapping[str, list[float]]:
+        points = numbers_of(self, "positions")
+        return {port: points[part] for port, part in self._parts().items()}
+
+    def _read_along(self, p: Signals) -> Mapping[str, SX]:
+        return {port: p["positions"][part] for port, part in self._parts().items()}
+
+    def _parts(self) -> dict[str, slice]:
+        """Where the positions along each input stand."""
+        ends = np.cumsum(shape_of(self.table)).tolist()
+        ports = (port.name for port in self.input_ports())
+        return {port: slice(start, end) for port, start, end in zip(ports, [0, *ends], ends)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LookupTableDynamic(Block):
+    """A curve whose points are signals: y = table(u), straight between them, held beyond the ends.
+
+    The positions must rise at every instant; where two of them are equal the value is not finite.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Lookup Table Dynamic"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A curve whose values grow while it is read.",
+        inputs={
+            "u": made("SineWave", bias=1.0),
+            "positions": made("Constant", value=(0.0, 1.0, 2.0)),
+            "values": made("Ramp", slope=(0.0, 0.2, 0.1)),
+        },
+        shown=("u", "y"),
+    )
+
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("u", "where to look"),
+            Port("positions", "positions (n,), rising"),
+            Port("values", "values there (n,)"),
+        )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        positions, values = inputs["positions"], inputs["values"]
+        if positions != values or len(positions) != 1 or math.prod(positions) < 2:
+            raise InputError(
+                f"the positions have shape {positions} and the values {values}",
+                allowed="two vectors of one length, of at least 2",
+                fix="change the width of one of the signals",
+            )
+        return {"y": inputs["u"]}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return self._axes(math.prod(inputs["positions"])).modes(inputs)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return self._axes(math.prod(inputs["positions"])).guards(inputs)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": self._axes(u["positions"]).value(u["values"], u["values"].shape[:1], x, u)}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(u["positions"]).guard_values(x, u)
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(u["positions"]).mode_values(x, u)
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return self._axes(u["positions"]).contradictions(x, u)
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return self._axes(u["positions"]).resets(x, u, e)
+
+    def _axes(self, positions: SX | int) -> Axes:
+        """The axis of positions that are signals; where only its borders are counted, any that rise."""
+        whole = isinstance(positions, int)
+        points = range(positions) if whole else (positions[k] for k in range(positions.numel()))
+        return Axes({"u": axis([*points], "linear", "clip")}, self.zero_crossing)

@@ -1,0 +1,1 @@
+"""Blocks that calculate outputs from inputs of the same time."""

@@ -1,0 +1,192 @@
+"""Angles: their units, polar coordinates, and the difference of two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import ClassVar
+
+from casadi import SX, atan2, cos, hypot, sin
+
+from armblocks.blocks.elementwise import common_unit
+from armblocks.blocks.maths.rounding import (
+    remainder,
+    remainder_of_turn,
+    step_after,
+    turn_guard_values,
+    turn_guards,
+    turn_modes,
+    turns_of,
+)
+from armblocks.blocks.switching import beyond, cell_of, zero_crossing_parameter
+from armblocks.diagram import (
+    Block,
+    Guard,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DegreesToRadians(Block):
+    """An angle in degrees told in radians: y = u pi / 180."""
+
+    title: ClassVar[str] = "Degrees to Radians"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An angle from 0 to 360 degrees, in radians from 0 to 2 pi.",
+        inputs={"u": made("Ramp", slope=36.0)},
+        shown=("y",),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "angle in degrees", "deg"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the same angle in radians", "rad"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] * (pi / 180.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadiansToDegrees(Block):
+    """An angle in radians told in degrees: y = u 180 / pi."""
+
+    title: ClassVar[str] = "Radians to Degrees"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An angle from 0 to 10 radians, in degrees.",
+        inputs={"u": made("Ramp")},
+        shown=("y",),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "angle in radians", "rad"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the same angle in degrees", "deg"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] * (180.0 / pi)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CartesianToPolar(Block):
+    """Magnitude and angle of the point (x, y): r = sqrt(x^2 + y^2), angle = atan2(y, x)."""
+
+    title: ClassVar[str] = "Cartesian to Polar"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which "
+            "wraps at pi."
+        ),
+        inputs={"x": made("SineWave", amplitude=2.0, phase=pi / 2), "y": made("SineWave")},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("x", "coordinate along x"), Port("y", "coordinate along y"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("r", "distance from the origin"), Port("angle", "angle, -pi to pi", "rad"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"r": broadcast(inputs), "angle": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"r": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"r": hypot(u["x"], u["y"]), "angle": atan2(u["y"], u["x"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolarToCartesian(Block):
+    """The point at a magnitude and an angle: x = r cos(angle), y = r sin(angle)."""
+
+    title: ClassVar[str] = "Polar to Cartesian"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Distance and angle grow evenly: the point runs along a spiral of Archimedes.",
+        inputs={
+            "r": made("Ramp", slope=0.1).named("distance"),
+            "angle": made("Ramp", slope=2.0).named("angle"),
+        },
+        across="x",
+        up="y",
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("r", "distance from the origin"), Port("angle", "angle from the x axis", "rad"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("x", "coordinate along x"), Port("y", "coordinate along y"))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"x": broadcast(inputs), "y": broadcast(inputs)}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"x": inputs["r"], "y": inputs["r"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": u["r"] * cos(u["angle"]), "y": u["r"] * sin(u["angle"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleDifference(Block):
+    """The difference of two angles the short way round: y = mod(a - b + pi, 2 pi) - pi, from -pi up to pi."""
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "angdiff"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="How far an angle that grows evenly is from 1 rad, the shorter way around.",
+        inputs={"a": made("Ramp"), "b": made("Constant")},
+    )
+
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("a", "one angle", "rad"), Port("b", "the angle that is taken away", "rad"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "a - b, at least -pi and below pi", "rad"),)
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return turn_modes(broadcast(inputs)) if self.zero_crossing else ()
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return turn_guards(broadcast(inputs)) if self.zero_crossing else ()
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if not self.zero_crossing:
+            return {"y": remainder("mod", _raised(u), _TURN) - pi}
+        return {"y": remainder_of_turn("mod", _raised(u), _TURN, x["turns"]) - pi}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return turn_guard_values("mod", _raised(u), _TURN, x["turns"]) if self.zero_crossing else {}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if not self.zero_crossing:
+            return {}
+        now = turns_of("mod", _raised(u), _TURN)
+        return {"turns": cell_of(now, x["turns"], self.guard_values(t, x, u, p))}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"turns": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return (
+            {"turns": step_after(turns_of("mod", _raised(u), _TURN), x["turns"], e)}
+            if self.zero_crossing
+            else {}
+        )
+
+
+_TURN = SX(2.0 * pi)
+
+
+def _raised(u: Signals) -> SX:
+    return u["a"] - u["b"] + pi

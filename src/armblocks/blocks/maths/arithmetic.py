@@ -1,0 +1,244 @@
+"""Elementwise arithmetic: every element of the output follows from the elements of the inputs beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import (
+    SX,
+    fabs,
+    hypot,
+    if_else,
+    sign,
+    sqrt,
+)
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import common_unit
+from armblocks.blocks.switching import located, zero_crossing_parameter
+from armblocks.diagram import (
+    Block,
+    Condition,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+)
+
+_ROOTS: Mapping[str, Callable[[SX], SX]] = {
+    "sqrt": sqrt,
+    "signedSqrt": lambda u: sign(u) * sqrt(fabs(u)),
+    "rSqrt": lambda u: 1.0 / sqrt(u),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Abs(Block):
+    """The absolute value of every element: y = abs(u)."""
+
+    title: ClassVar[str] = "Abs"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The lower half of the sine, turned up.",
+    )
+
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its absolute value"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, Condition("negative", inputs["u"], "1 where u < 0", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"negative": -u["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": if_else(x["negative"], -u["u"], u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bias(Block):
+    """A constant added to every element: y = u + bias."""
+
+    title: ClassVar[str] = "Bias"
+    spreads: ClassVar[tuple[str, ...]] = ("bias",)
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine, 1 higher.",
+        parameters={"bias": 1.0},
+    )
+
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the shifted signal"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] + p["bias"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnaryMinus(Block):
+    """The negative of every element: y = -u."""
+
+    title: ClassVar[str] = "Unary Minus"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine, upside down.",
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its negative"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": -u["u"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sign(Block):
+    """The sign of every element: y = 1 where u > 0, -1 where u < 0, 0 where u = 0."""
+
+    title: ClassVar[str] = "Sign"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="1 while the sine is positive, -1 while it is negative.",
+    )
+
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its sign"),)
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        above = Condition("positive", inputs["u"], "1 where u > 0", closed=False)
+        return located(self, above, Condition("negative", inputs["u"], "1 where u < 0", closed=False))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"positive": u["u"], "negative": -u["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["positive"] - x["negative"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sqrt(Block):
+    """A square root of every element: y = sqrt(u), sign(u) sqrt(abs(u)) or 1 / sqrt(u).
+
+    Of a negative number ``sqrt`` and ``rSqrt`` are not a number.
+    """
+
+    title: ClassVar[str] = "Sqrt"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The root of a straight rise.", inputs={"u": made("Ramp")}
+    )
+
+    function: str = parameter("sqrt", choices=tuple(_ROOTS), doc="root, signed root or reciprocal root")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the square"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the root"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _ROOTS[self.function](u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypot(Block):
+    """The hypotenuse, element by element: y = sqrt(u^2 + v^2), without overflow on the way."""
+
+    title: ClassVar[str] = "Hypot"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The longest side of a right triangle with one side of 3 and one that grows: it meets 5 at 4 s."
+        ),
+        inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "one leg"), Port("v", "the other leg"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the hypotenuse"),)
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": hypot(u["u"], u["v"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Divide(Block):
+    """One input by the other, element by element: y = dividend / divisor."""
+
+    title: ClassVar[str] = "Divide"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A sine divided by a divisor that rises from 1 to 3.",
+        inputs={"dividend": made("SineWave"), "divisor": made("Ramp", slope=0.2, initial=1.0)},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("dividend", "what is divided"), Port("divisor", "by what"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the quotient"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["dividend"] / u["divisor"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polynomial(Block):
+    """A polynomial of every element, the highest power first: y = c1 u^n + … + cn u + c(n+1).
+
+    Worked out by Horner's rule.
+    """
+
+    title: ClassVar[str] = "Polynomial"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The parabola u^2 - 1, over u.",
+        parameters={"coefficients": (1.0, 0.0, -1.0)},
+        inputs={"u": made("Ramp", slope=0.4, initial=-2.0)},
+        across="u",
+        up="y",
+    )
+
+    coefficients: ArrayLike = parameter((1.0, 0.0), dimensions=(1,), doc="c1 … c(n+1), highest power first")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the argument"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value of the polynomial"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        c = p["coefficients"]
+        value = c[0] * SX.ones(*u["u"].shape)
+        for k in range(1, c.numel()):
+            value = value * u["u"] + c[k]
+        return {"y": value}

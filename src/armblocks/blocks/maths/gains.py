@@ -1,0 +1,116 @@
+"""Gains and waves with a meaning: a slider, the sample time, an angle that comes from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, sin
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import parameters_shape
+from armblocks.blocks.switching import limits_in_order
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    sample_time_parameter,
+)
+from armblocks.errors import InputError
+
+_OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
+    "+": lambda u, time: u + time,
+    "-": lambda u, time: u - time,
+    "*": lambda u, time: u * time,
+    "/": lambda u, time: u / time,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SliderGain(Block):
+    """A gain to be moved between two ends while a model runs: y = gain u, low <= gain <= high."""
+
+    title: ClassVar[str] = "Slider Gain"
+
+    gain: float = parameter(1.0, doc="the factor")
+    low: float = parameter(0.0, tunable=False, doc="the lower end of the slider")
+    high: float = parameter(2.0, tunable=False, doc="the upper end of the slider")
+
+    def check(self) -> None:
+        limits_in_order(self, "low", "high")
+        if not self.low <= self.gain <= self.high:
+            raise InputError(
+                f"gain is {self.gain}",
+                where="SliderGain",
+                allowed=f"low <= gain <= high: {self.low} to {self.high}",
+                fix="move the gain or the ends",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is multiplied"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the product"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["gain"] * u["u"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class WeightedSampleTime(Block):
+    """A signal and the sample time T: y(k) = u(k) + weight T, and likewise with -, * or /."""
+
+    title: ClassVar[str] = "Weighted Sample Time Math"
+    spreads: ClassVar[tuple[str, ...]] = ("weight",)
+    sampled: ClassVar[bool] = True
+
+    operation: str = parameter("+", choices=tuple(_OPERATIONS), doc="what is done")
+    weight: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor of the sample time")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the result"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": _OPERATIONS[self.operation](u["u"], p["weight"] * p["T"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SineWaveFunction(Block):
+    """A sine of a time that comes from outside: y = amplitude sin(frequency u + phase) + bias."""
+
+    title: ClassVar[str] = "Sine Wave Function"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A time that passes twice as fast.", inputs={"u": made("Ramp", slope=2.0)}
+    )
+
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the way from peak to peak")
+    frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="angular frequency", unit="rad/s")
+    phase: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="angle at u = 0", unit="rad")
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+
+    def check(self) -> None:
+        parameters_shape(self, "amplitude", "frequency", "phase", "bias")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the time", "s"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the sine"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        own = parameters_shape(self, "amplitude", "frequency", "phase", "bias")
+        return {"y": broadcast({**inputs, "parameters": own})}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["amplitude"] * sin(p["frequency"] * u["u"] + p["phase"]) + p["bias"]}

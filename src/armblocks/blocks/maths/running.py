@@ -1,0 +1,66 @@
+"""The extreme of all values so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MinMaxRunningResettable(Block):
+    """The least or greatest input so far: y(k) = min(u(k), y(k-1)) or max, ``initial`` where it is reset."""
+
+    title: ClassVar[str] = "MinMax Running Resettable"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The greatest value so far of a sine that swells.",
+        parameters={"function": "max", "sample_time": 0.1},
+        inputs={
+            "u": made("Product").by(u1=made("SineWave", frequency=2.0), u2=made("Ramp", slope=0.1)),
+            "reset": made("Ground").named("zero"),
+        },
+    )
+
+    function: str = parameter("min", choices=("min", "max"), doc="which one")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="where it begins, and after a reset")
+    sample_time: ArrayLike = sample_time_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the signal"), Port("reset", "starts anew while not 0", shape=()))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the extreme so far"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("extreme", self.output_shapes(inputs)["y"], "the output at the tick before"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        further = (fmin if self.function == "min" else fmax)(u["u"], x["extreme"])
+        return {"y": if_else(u["reset"] != 0.0, p["initial"], further)}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"extreme": self.outputs(t, x, u, p)["y"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"extreme": p["initial"]}

@@ -1,0 +1,362 @@
+"""Matrix algebra on one wire: products, equations, and the shape of a matrix."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import ClassVar
+
+from casadi import SX, cross, diag, horzcat, mtimes, reshape, trace, vertcat
+
+from armblocks.blocks.elementwise import common_unit, numbered_ports
+from armblocks.blocks.elimination import determinant, solve
+from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.equations import Shape
+from armblocks.errors import InputError
+
+
+def _square(shape: Shape) -> Shape:
+    """A square matrix's shape as it is, that of one number as (1, 1)."""
+    if math.prod(shape) == 1:
+        return (1, 1)
+    if len(shape) != 2 or shape[0] != shape[1]:
+        raise InputError(f"the matrix has shape {shape}", allowed="a square matrix", fix="make it square")
+    return shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrossProduct(Block):
+    """The vector product of two vectors of three: y = u x v."""
+
+    title: ClassVar[str] = "Cross Product"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A vector that turns in the plane, crossed with z: it runs a quarter turn behind.",
+        inputs={
+            "u": made("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
+            "v": made("Constant", value=(0.0, 0.0, 1.0)),
+        },
+        shown=("y",),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the left vector", shape=(3,)), Port("v", "the right vector", shape=(3,)))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the vector product", shape=(3,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": cross(u["u"], u["v"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transpose(Block):
+    """Rows to columns: y = u'; a vector counts as a column and becomes a matrix of one row."""
+
+    title: ClassVar[str] = "Transpose"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The two entries off the diagonal change places.",
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the matrix"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its transpose"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shape = inputs["u"]
+        return {"y": (1, *shape) if len(shape) == 1 else shape[::-1]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"].T}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatrixInverse(Block):
+    """The inverse of a square matrix: u y = I, by elimination with pivots; not finite where u is singular."""
+
+    title: ClassVar[str] = "Matrix Inverse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The entries of the inverse of [1 a; 0 2] while a rises: only the one off the diagonal moves.",
+        inputs={"u": made("Ramp", slope=((0.0, 0.2), (0.0, 0.0)), initial=((1.0, 0.0), (0.0, 2.0)))},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the matrix (n, n)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its inverse (n, n)"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        _square(inputs["u"])
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": solve(u["u"], SX.eye(u["u"].shape[0]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearSolve(Block):
+    """The solution of linear equations: A y = B, by elimination; not finite where A is singular."""
+
+    title: ClassVar[str] = "Matrix Solve"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The solution of [2 1; 1 3] y = (sin t, cos t).",
+        inputs={
+            "A": made("Constant", value=((2.0, 1.0), (1.0, 3.0))),
+            "B": made("SineWave", phase=(0.0, 1.5707963267948966)),
+        },
+        shown=("B", "y"),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("A", "the matrix (n, n)"), Port("B", "the right side (n,) or (n, k)"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the solution, of the shape of B"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        rows = (*inputs["B"], 1)[0]
+        if _square(inputs["A"])[0] != rows:
+            raise InputError(
+                f"the matrix has shape {inputs['A']} and the right side {inputs['B']}",
+                allowed="A (n, n) with B (n,) or (n, k)",
+                fix="change the width of one of the signals",
+            )
+        return {"y": inputs["B"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": solve(u["A"], u["B"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Determinant(Block):
+    """The determinant of a square matrix: y = det(u), by elimination with pivots."""
+
+    title: ClassVar[str] = "Determinant"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The determinant of [1 a; a 1] while a swings: 1 - a^2.",
+        inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (1.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the matrix (n, n)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its determinant"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        _square(inputs["u"])
+        return {"y": ()}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": determinant(u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace(Block):
+    """The sum of the diagonal of a square matrix: y = u11 + u22 + …"""
+
+    title: ClassVar[str] = "Trace"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sum of the diagonal: one entry swings about 1, the other about 2.",
+        inputs={
+            "u": made(
+                "SineWave",
+                amplitude=((1.0, 0.0), (0.0, 0.5)),
+                bias=((1.0, 0.0), (0.0, 2.0)),
+                frequency=((1.0, 1.0), (1.0, 3.0)),
+            )
+        },
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the matrix (n, n)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its trace"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        _square(inputs["u"])
+        return {"y": ()}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": trace(u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatrixPower(Block):
+    """A square matrix times itself: y = u^exponent; 0 gives the identity, negative ones take the inverse."""
+
+    title: ClassVar[str] = "Matrix Power"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The square of [1 a; 0 1] is [1 2a; 0 1].",
+        inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (0.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
+    )
+
+    exponent: int = parameter(2, minimum=-100, maximum=100, doc="how many factors")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the matrix (n, n)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its power (n, n)"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        _square(inputs["u"])
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        unit = SX.eye(u["u"].shape[0])
+        factor = u["u"] if self.exponent >= 0 else solve(u["u"], unit)
+        power = unit
+        for digit in f"{abs(self.exponent):b}":  # square and multiply, the highest digit first
+            power = mtimes(power, power)
+            power = mtimes(power, factor) if digit == "1" else power
+        return {"y": power}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reshape(Block):
+    """The same elements in another shape, taken and laid column by column as in MATLAB.
+
+    ``vector`` (n,), ``column`` (n, 1), ``row`` (1, n), or ``matrix`` (rows, n / rows).
+    """
+
+    title: ClassVar[str] = "Reshape"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A matrix as a vector, column by column.",
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
+
+    output: str = parameter("vector", choices=("vector", "column", "row", "matrix"), doc="the new shape")
+    rows: int = parameter(1, minimum=1, doc="how many rows a matrix gets")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "any signal"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the same elements"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        n = math.prod(inputs["u"])
+        if self.output == "matrix" and n % self.rows:
+            raise InputError(
+                f"{n} elements make no matrix of {self.rows} rows",
+                allowed=f"a count of rows that divides {n}",
+                fix="change rows",
+            )
+        shapes = {"vector": (n,), "column": (n, 1), "row": (1, n), "matrix": (self.rows, n // self.rows)}
+        return {"y": shapes[self.output]}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": inputs["u"]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        n = u["u"].numel()
+        rows = {"vector": n, "column": n, "row": 1, "matrix": self.rows}[self.output]
+        return {"y": reshape(u["u"], rows, n // rows)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatrixConcatenate(Block):
+    """Matrices one beside the other or one under the other: y = [u1 u2 …] or [u1; u2; …].
+
+    Vectors count as columns. Scalars and vectors one under the other give a vector.
+    """
+
+    title: ClassVar[str] = "Matrix Concatenate"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two vectors side by side are the columns of a matrix.",
+        inputs={"u1": made("SineWave", amplitude=(1.0, 2.0)), "u2": made("Constant", value=(-1.0, 1.0))},
+    )
+
+    inputs: int = parameter(2, minimum=1, doc="how many inputs")
+    direction: str = parameter("horizontal", choices=("horizontal", "vertical"), doc="beside or under")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "part")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "all parts in one matrix"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        along = 1 if self.direction == "horizontal" else 0
+        full = [(*shape, 1, 1)[:2] for shape in inputs.values()]
+        if len({shape[1 - along] for shape in full}) > 1:
+            raise InputError(
+                f"the parts have shapes {', '.join(map(str, inputs.values()))}",
+                allowed="equal rows beside each other, equal columns under each other",
+                fix="change the direction or one of the parts",
+            )
+        length = sum(shape[along] for shape in full)
+        if along == 0 and all(len(shape) < 2 for shape in inputs.values()):
+            return {"y": (length,)}
+        return {"y": (full[0][0], length) if along else (length, full[0][1])}
+
+    def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
+        return {"y": common_unit(inputs)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": (horzcat if self.direction == "horizontal" else vertcat)(*u.values())}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagonalMatrix(Block):
+    """The square matrix with a vector on its diagonal and zeros elsewhere: y = diag(u)."""
+
+    title: ClassVar[str] = "Create Diagonal Matrix"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two numbers on the diagonal, zeros elsewhere.",
+        inputs={"u": made("SineWave", amplitude=(1.0, 2.0))},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the diagonal (n,)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the matrix (n, n)"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        if len(inputs["u"]) > 1:
+            raise InputError(
+                f"the diagonal 'u' has shape {inputs['u']}",
+                allowed="a scalar or a vector",
+                fix="put an ExtractDiagonal before the block",
+            )
+        return {"y": (math.prod(inputs["u"]),) * 2}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": diag(u["u"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtractDiagonal(Block):
+    """The diagonal of a square matrix as a vector: y = (u11, u22, …)."""
+
+    title: ClassVar[str] = "Extract Diagonal"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The diagonal of a matrix.",
+        inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the matrix (n, n)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its diagonal (n,)"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": _square(inputs["u"])[:1]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": diag(u["u"])}

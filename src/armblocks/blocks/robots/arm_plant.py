@@ -1,0 +1,371 @@
+"""The arm as a machine: joints that stick and slip, end stops, a payload that may change, a force at the tip.
+
+The equations are those of :mod:`armblocks.dynamics.held_joints`, which names the sources.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from casadi import SX, dot, fmax, fmin, if_else, logic_and, logic_not, logic_or, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.robots.ports import check_joint_values, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.switching import JUST
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+)
+from armblocks.dynamics.held_joints import (
+    DryFriction,
+    JointEquations,
+    Rest,
+    settled,
+    viscous_friction,
+)
+from armblocks.errors import InputError
+from armblocks.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmPlant(Block):
+    """The robot with friction that sticks: M(q) q'' + C q' + g + friction = tau + stops - J' wrench.
+
+    Friction is that of the robot's motors by its friction model. A joint without speed is held, with exactly
+    no acceleration, while the torque that this takes, which the other joints' motion has a part in, lies
+    within ``breakaway`` times its Coulomb friction; beyond, it slides. The plain block Robot
+    (ForwardDynamics) lets joints creep there.
+
+    End stops stand at the robot's own joint limits. ``elastic``: torque stiffness (limit - q) - damping qd
+    beyond a limit, and never a pull. ``hard``: the joint stops at once (impact without rebound, whose
+    impulse the other joints feel) and rests exactly at the limit until something moves it away; joints that
+    rest at their stops already stay there through the impact.
+
+    ``payload``: mass, centre x y z and inertia xx yy zz xy yz xz about it, in the tool frame. Where it jumps,
+    the speeds stay: what is picked up has the tool's speed already, and what is dropped takes its own along.
+    ``wrench``: force, then moment, that the tip exerts on its surroundings, in the last link's axes.
+    """
+
+    title: ClassVar[str] = "Arm Plant"
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The Puma falls onto the end stop of its shoulder and, by the friction of its motors, to rest.",
+        parameters={"robot": "puma560", "q0": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), "stops": "hard"},
+        inputs={"tau": made("Constant", value=(0.0,) * 6)},
+        shown=("q", "qd", "friction"),
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    q0: ArrayLike = parameter(
+        0.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="joint coordinates at t = 0 (n,), or one number for all",
+        unit="rad",
+    )
+    qd0: ArrayLike = parameter(
+        0.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="joint speeds at t = 0 (n,), or one number for all",
+        unit="rad/s",
+    )
+    breakaway: ArrayLike = parameter(
+        1.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="static over sliding friction (n,), or one number for all",
+        minimum=1.0,
+    )
+    stops: str = parameter("none", choices=("none", "elastic", "hard"), doc="end stops at the joint limits")
+    stiffness: ArrayLike = parameter(
+        1e5,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="of elastic stops (n,), or one number for all",
+        unit="N m/rad",
+        minimum=0.0,
+    )
+    damping: ArrayLike = parameter(
+        1e3,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="of elastic stops (n,), or one number for all",
+        unit="N m s/rad",
+        minimum=0.0,
+    )
+    payload_input: bool = parameter(False, doc="whether there is an input for the payload")
+    wrench_input: bool = parameter(False, doc="whether there is an input for a force at the tip")
+
+    def check(self) -> None:
+        for name in ("q0", "qd0", "breakaway", "stiffness", "damping"):
+            check_joint_values(self, self.robot, name)
+        friction = DryFriction.of(self.robot)
+        for k, name in enumerate(self.robot.joint_names):
+            if friction.forward[k] < 0.0 or friction.backward[k] > 0.0:
+                raise InputError(
+                    f"the Coulomb friction of joint '{name}' drives it",
+                    where="ArmPlant",
+                    allowed="friction against the motion, forwards >= 0 >= backwards",
+                    fix="correct the robot's Coulomb friction, or choose the friction model squared-gear",
+                )
+            low, high = self.robot.qlim[k]
+            q0 = np.broadcast_to(np.asarray(self.q0), (self.robot.n,))[k]
+            if self.stops == "hard" and not low <= q0 <= high:
+                raise InputError(
+                    f"joint '{name}' starts at {q0:g}, behind its stop",
+                    where="ArmPlant.q0",
+                    allowed=f"{low:g} … {high:g}",
+                    fix="start within the limits, or choose elastic stops",
+                )
+
+    # -- description
+
+    def input_ports(self) -> tuple[Port, ...]:
+        ports = [tau_port(self.robot, "torque or force at the joints")]
+        if self.wrench_input:
+            ports.append(Port("wrench", "force (N) and moment (N m) on the surroundings", shape=(6,)))
+        if self.payload_input:
+            ports.append(Port("payload", "mass, centre, inertia", shape=(10,)))
+        return tuple(ports)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        unit = tau_port(self.robot, "").unit
+        return (
+            q_port(self.robot),
+            qd_port(self.robot),
+            qdd_port(self.robot),
+            Port("friction", "torque or force of friction against the motion", unit, (self.robot.n,)),
+            Port("stop", "torque or force of the end stops on the joints", unit, (self.robot.n,)),
+        )
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return tuple(
+            State(port.name, (self.robot.n,), port.doc, port.unit) for port in self.output_ports()[:2]
+        )
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        shape = (self.robot.n,)
+        found: list[State] = []
+        if self._holdable():
+            found.append(State("mode", shape, "1 sliding forwards or free, -1 sliding backwards, 0 held"))
+        if self._lower() or self._upper():
+            found.append(State("contact", shape, "1 at the upper stop, -1 at the lower, 0 at none"))
+        return tuple(found)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        elastic = self.stops == "elastic"
+        found = (
+            ("rest", self._dry(), "a sliding joint comes to rest", -1),
+            ("forwards", self._holdable(), "a held joint breaks away forwards", 1),
+            ("backwards", self._holdable(), "a held joint breaks away backwards", -1),
+            ("upper", self._upper(), "a joint meets its upper stop", 0 if elastic else 1),
+            ("lower", self._lower(), "a joint meets its lower stop", 0 if elastic else -1),
+        )
+        return tuple(
+            Guard(name, (len(joints),), doc, direction) for name, joints, doc, direction in found if joints
+        )
+
+    # -- equations
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        equations, torque, qdd = self._motion(x, u, p)
+        unbalanced = equations.unbalanced(torque, qdd)
+        mode, contact = self._mode(x), self._rigid(self._contact(x))
+        dry = DryFriction.of(self.robot)
+        forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
+        holding = fmin(fmax(unbalanced, backward), forward)
+        friction = if_else(mode == 0.0, holding, dry.sliding(mode))
+        rigid = if_else(logic_and(mode == 0.0, contact != 0.0), holding - unbalanced, 0.0)
+        return {
+            "q": x["q"],
+            "qd": x["qd"],
+            "qdd": qdd,
+            "friction": friction + SX(viscous_friction(self.robot)) * x["qd"],
+            "stop": rigid + self._elastic_stops(x, p),
+        }
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"q": x["qd"], "qd": self._motion(x, u, p)[2]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"q": p["q0"], "qd": p["qd0"]}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        mode, contact, q, qd = self._mode(x), self._contact(x), x["q"], x["qd"]
+        values: dict[str, SX] = {"rest": if_else(mode == 0.0, 1.0, mode * qd)}
+        if self._holdable():
+            equations, torque, qdd = self._motion(x, u, p)
+            unbalanced = equations.unbalanced(torque, qdd)
+            dry = DryFriction.of(self.robot)
+            forward, backward = (p["breakaway"] * SX(side) for side in (dry.forward, dry.backward))
+            held, rigid = mode == 0.0, self._rigid(contact)
+            free_forwards, free_backwards = logic_and(held, rigid <= 0.0), logic_and(held, rigid >= 0.0)
+            values["forwards"] = if_else(free_forwards, unbalanced - forward - JUST, -1.0)
+            values["backwards"] = if_else(free_backwards, unbalanced - backward + JUST, 1.0)
+        over, under = q - self._limits(1), q - self._limits(0)
+        if self.stops == "elastic":
+            drag = p["damping"] * qd
+            values["upper"] = fmin(over, p["stiffness"] * over + drag) - JUST
+            values["lower"] = fmax(under, p["stiffness"] * under + drag) + JUST
+        else:
+            values["upper"] = if_else(contact > 0.0, -1.0, over - JUST)
+            values["lower"] = if_else(contact < 0.0, 1.0, under + JUST)
+        names = [guard.name for guard in self.guards({})]
+        return {name: values[name][list(self._joints_of(name))] for name in names}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        q, qd = x["q"], x["qd"]
+        if self.stops == "hard":
+            resting = qd == 0.0
+            upper, lower = self._marked("upper"), self._marked("lower")
+            at_upper = logic_and(logic_and(upper, q >= self._limits(1)), resting)
+            at_lower = logic_and(logic_and(lower, q <= self._limits(0)), resting)
+            contact = at_upper - at_lower
+            guess = Rest(if_else(contact != 0.0, 0.0, self._mode(x)), contact)
+        else:
+            contact = self._elastic_contact(q, qd, p)
+            guess = Rest(self._mode(x), self._rigid(contact))
+        found = self._settled({**x, "contact": contact}, u, p, guess) if self._holdable() else guess
+        values = {"mode": found.mode, "contact": found.contact if self.stops == "hard" else contact}
+        return {state.name: values[state.name] for state in self.modes({})}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # By the guards: the consistent modes themselves are the solution of a complementarity problem.
+        found = dict[str, SX]()
+        guards = self.guard_values(t, x, u, p)
+        if self._holdable():
+            turned = self._spread("rest", guards) < 0.0 if "rest" in guards else SX.zeros(self.robot.n)
+            away = logic_or(self._spread("forwards", guards) > 0.0, self._spread("backwards", guards) < 0.0)
+            found["mode"] = logic_or(turned, away)
+        if self._lower() or self._upper():
+            contact = self._elastic_contact(x["q"], x["qd"], p) if self.stops == "elastic" else x["contact"]
+            found["contact"] = contact != x["contact"]
+        return found
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        if not e:
+            return {}
+        fired = {name: self._spread(name, e) for name in ("rest", "forwards", "backwards", "upper", "lower")}
+        contact, mode, q, qd = self._contact(x), self._mode(x), x["q"], x["qd"]
+        hits_upper, hits_lower = fired["upper"] > 0.0, fired["lower"] < 0.0
+        contact = if_else(hits_upper, 1.0, if_else(hits_lower, -1.0, contact))
+        if self.stops == "elastic":
+            left = logic_or(fired["upper"] < 0.0, fired["lower"] > 0.0)
+            contact = if_else(left, 0.0, contact)
+        if not self._holdable():
+            return {"contact": contact}
+        stopping = fired["rest"] < 0.0
+        qd = if_else(stopping, 0.0, qd)
+        if self.stops == "hard":
+            hit = logic_or(hits_upper, hits_lower)
+            resting = logic_or(hit, contact != 0.0)
+            after = JointEquations(self.robot, q, qd, u.get("wrench"), u.get("payload")).stopped(qd, resting)
+            qd = if_else(dot(hit, hit) > 0.0, after, qd)
+            q = if_else(hits_upper, self._limits(1), if_else(hits_lower, self._limits(0), q))
+            stopping = logic_or(stopping, hit)
+        away = (fired["forwards"] > 0.0) - (fired["backwards"] < 0.0)
+        guess = if_else(stopping, 0.0, if_else(away != 0.0, away, mode))
+        moved = {**x, "q": q, "qd": qd, "contact": contact}
+        found = self._settled(moved, u, p, Rest(guess, if_else(guess == 0.0, self._rigid(contact), 0.0)))
+        values = {"q": q, "qd": qd, "mode": found.mode}
+        if self._lower() or self._upper():
+            values["contact"] = found.contact if self.stops == "hard" else contact
+        happened = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
+        after = {name: if_else(happened, value, x[name]) for name, value in values.items()}
+        # At rest the speed is 0 whatever the parameters are: the derivatives of the speed are 0 too.
+        rests = logic_and(found.mode == 0.0, x["qd"] == 0.0)
+        return {**after, "qd": if_else(logic_and(rests, logic_not(happened)), 0.0, after["qd"])}
+
+    # -- parts
+
+    def _dry(self) -> tuple[int, ...]:
+        return DryFriction.of(self.robot).joints
+
+    def _upper(self) -> tuple[int, ...]:
+        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 1])).tolist()) if self._stops() else ()
+
+    def _lower(self) -> tuple[int, ...]:
+        return tuple(np.flatnonzero(np.isfinite(self.robot.qlim[:, 0])).tolist()) if self._stops() else ()
+
+    def _stops(self) -> bool:
+        return self.stops != "none"
+
+    def _holdable(self) -> tuple[int, ...]:
+        """The joints that can be held: by friction or by a rigid stop."""
+        stops = (*self._upper(), *self._lower()) if self.stops == "hard" else ()
+        return tuple(sorted({*self._dry(), *stops}))
+
+    def _joints_of(self, guard: str) -> tuple[int, ...]:
+        sets = {"rest": self._dry, "upper": self._upper, "lower": self._lower}
+        return sets.get(guard, self._holdable)()
+
+    def _marked(self, guard: str) -> SX:
+        """1 for each joint (n,) that has the guard."""
+        marks = np.zeros(self.robot.n)
+        marks[list(self._joints_of(guard))] = 1.0
+        return SX(marks)
+
+    def _spread(self, guard: str, e: Signals) -> SX:
+        """The events of a guard as (n,), 0 for joints without it."""
+        marks = SX.zeros(self.robot.n)
+        if guard in e:
+            marks[list(self._joints_of(guard))] = e[guard]
+        return marks
+
+    def _limits(self, side: int) -> SX:
+        """Lower (0) or upper (1) limits (n,), 0 where there is none."""
+        limits = self.robot.qlim[:, side]
+        return SX(np.where(np.isfinite(limits), limits, 0.0))
+
+    def _mode(self, x: Signals) -> SX:
+        return x["mode"] if self._holdable() else SX.ones(self.robot.n)
+
+    def _contact(self, x: Signals) -> SX:
+        return x["contact"] if self._lower() or self._upper() else SX.zeros(self.robot.n)
+
+    def _rigid(self, contact: SX) -> SX:
+        """Contact with stops that hold joints: none where the stops give way."""
+        return contact if self.stops == "hard" else SX.zeros(self.robot.n)
+
+    def _elastic_stops(self, x: Signals, p: Signals) -> SX:
+        if self.stops != "elastic":
+            return SX.zeros(self.robot.n)
+        contact = self._contact(x)
+        limit = if_else(contact > 0.0, self._limits(1), self._limits(0))
+        push = p["stiffness"] * (limit - x["q"]) - p["damping"] * x["qd"]
+        return if_else(contact != 0.0, push, 0.0)
+
+    def _elastic_contact(self, q: SX, qd: SX, p: Signals) -> SX:
+        over, under, drag = q - self._limits(1), q - self._limits(0), p["damping"] * qd
+        above = logic_and(self._marked("upper"), fmin(over, p["stiffness"] * over + drag) > 0.0)
+        below = logic_and(self._marked("lower"), fmax(under, p["stiffness"] * under + drag) < 0.0)
+        return above - below
+
+    def _driving(self, x: Signals, u: Signals, p: Signals) -> SX:
+        """All torque at the joints but dry friction and rigid stops."""
+        return u["tau"] - SX(viscous_friction(self.robot)) * x["qd"] + self._elastic_stops(x, p)
+
+    def _motion(self, x: Signals, u: Signals, p: Signals) -> tuple[JointEquations, SX, SX]:
+        equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
+        mode = self._mode(x)
+        torque = self._driving(x, u, p) - DryFriction.of(self.robot).sliding(mode)
+        free = mode != 0.0 if self._holdable() else SX.ones(self.robot.n)
+        return equations, torque, equations.accelerations(torque, free)
+
+    def _settled(self, x: Signals, u: Signals, p: Signals, guess: Rest) -> Rest:
+        equations = JointEquations(self.robot, x["q"], x["qd"], u.get("wrench"), u.get("payload"))
+        breakaway = p["breakaway"] * SX.ones(self.robot.n)
+        driving = self._driving(x, u, p)
+        return settled(equations, x["qd"], driving, guess, DryFriction.of(self.robot), breakaway)

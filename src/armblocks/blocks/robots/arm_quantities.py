@@ -1,0 +1,179 @@
+"""Quantities of an arm for controllers: inverses of the Jacobian, manipulability, energy, loaded torques.
+
+Source: Siciliano et al., Robotics, 2009, 3.5 (inverses of the Jacobian).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, mtimes
+
+from armblocks import dynamics
+from armblocks.blocks.elimination import solve
+from armblocks.blocks.robots.ports import apply_traced, q_port, qd_port, qdd_port, tau_port
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+)
+from armblocks.errors import InputError
+from armblocks.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class JacobianInverse(Block):
+    """What undoes a Jacobian (m, n): Ji (n, m) = J^-1, J', the pseudo-inverse, or J'(J J' + damping^2 I)^-1.
+
+    ``inverse`` wants a square one and is not finite where the arm is singular. ``pseudo`` gives the least
+    joint speeds (n >= m) or the least error (n < m), of an arm that is not singular. ``damped`` (damped
+    least squares) stays finite everywhere, at the price of an error where the arm is nearly singular.
+    """
+
+    title: ClassVar[str] = "ijacob"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The pseudo-inverse of the Jacobian while an arm unfolds: the speeds that a motion asks for grow."
+        ),
+        parameters={"method": "pseudo"},
+        inputs={
+            "J": made("SubMatrix", last_row=3)
+            .named("linear rows")
+            .by(u=made("Jacob0").by(q=made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.4), tmax=8.0).named("motion")))
+        },
+        shown=("Ji",),
+    )
+
+    method: str = parameter("inverse", choices=("inverse", "transpose", "pseudo", "damped"), doc="which one")
+    damping: float = parameter(0.1, above=0.0, doc="damping, for 'damped' only")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("J", "the Jacobian (m, n)"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("Ji", "its inverse of the chosen kind (n, m)"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        shape = inputs["J"]
+        if len(shape) != 2 or (self.method == "inverse" and shape[0] != shape[1]):
+            raise InputError(
+                f"the Jacobian has shape {shape}",
+                allowed="a matrix, which is square for 'inverse'",
+                fix="choose 'pseudo' or 'damped'",
+            )
+        return {"Ji": shape[::-1]}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        J = u["J"]
+        m, n = J.shape
+        if self.method == "inverse":
+            return {"Ji": solve(J, SX.eye(n))}
+        if self.method == "transpose":
+            return {"Ji": J.T}
+        if self.method == "pseudo" and m > n:
+            return {"Ji": solve(mtimes(J.T, J), J.T)}
+        square = mtimes(J, J.T)
+        if self.method == "damped":
+            square = square + p["damping"] * p["damping"] * SX.eye(m)
+        return {"Ji": solve(square, J).T}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manipulability(Block):
+    """How far an arm is from a singularity: w = sqrt(det(J J')), Yoshikawa's measure."""
+
+    title: ClassVar[str] = "manipulability"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An arm with two links unfolds: the nearer it is to being stretched, the smaller the measure.",
+        inputs={"q": made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("w", "Yoshikawa's measure", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"w": apply_traced(dynamics.trace_manipulability(self.robot), u["q"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotEnergy(Block):
+    """Kinetic and potential energy of an arm: T = 1/2 qd' M(q) qd, V = -sum of m g . r."""
+
+    title: ClassVar[str] = "Energy"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A double pendulum without friction: kinetic and potential energy change places, their sum stays."
+        ),
+        inputs={
+            "q": made("ForwardDynamics")
+            .named("arm")
+            .by(tau=made("Constant", value=(0.0, 0.0)).named("no torque"))
+            .at("q"),
+            "qd": made("ForwardDynamics")
+            .named("arm")
+            .by(tau=made("Constant", value=(0.0, 0.0)).named("no torque"))
+            .at("qd"),
+        },
+        shown=("kinetic", "potential", made("Sum").named("sum").by(u1="kinetic", u2="potential")),
+        stop_time=5.0,
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return q_port(self.robot), qd_port(self.robot)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("kinetic", "kinetic energy", "J", ()),
+            Port("potential", "potential energy, 0 at the world's origin", "J", ()),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {
+            "kinetic": apply_traced(dynamics.trace_kinetic_energy(self.robot), u["q"], u["qd"]),
+            "potential": apply_traced(dynamics.trace_potential_energy(self.robot), u["q"]),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadedRne(Block):
+    """Inverse dynamics with a force at the tip and a payload: tau = rne(q, qd, qdd) + their part.
+
+    ``wrench`` (force, moment) is what the tip exerts on its surroundings, in the last link's axes; the
+    payload is mass, centre of mass (3) and inertia xx yy zz xy yz xz about it, in the tool frame.
+    """
+
+    title: ClassVar[str] = "rne with load"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The torques that hold the arm on its way with 2 kg at the tool.",
+        inputs={
+            "wrench": made("Constant", value=(0.0,) * 6).named("no force"),
+            "payload": made("Constant", value=(2.0,) + (0.0,) * 9).named("2 kg"),
+        },
+        shown=("q", "tau"),
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        motion = (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
+        wrench = Port("wrench", "force (N) and moment (N m) on the surroundings", shape=(6,))
+        return *motion, wrench, Port("payload", "mass, centre, inertia", shape=(10,))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force at the joints"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"tau": apply_traced(dynamics.trace_rne_loaded(self.robot), *u.values())}

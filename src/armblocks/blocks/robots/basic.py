@@ -1,0 +1,340 @@
+"""The robot blocks of the toolbox's roblocks: trajectory, kinematics, dynamics, and the moving picture.
+
+Their equations are those of :mod:`armblocks.dynamics`, with the robot's numbers in place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks import dynamics
+from armblocks.blocks.example_signals import position_of
+from armblocks.blocks.robots.ports import (
+    apply_traced,
+    check_joint_values,
+    q_port,
+    qd_port,
+    qdd_port,
+    tau_port,
+)
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    View,
+    ViewKind,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+from armblocks.robot import Robot
+from armblocks.trajectories import Quintic
+
+
+@dataclass(frozen=True, kw_only=True)
+class JTraj(Block):
+    """The quintic from q0 to qf in tmax, at rest at both ends: q = q0 + (qf - q0)(10 s^3 - 15 s^4 + 6 s^5).
+
+    s = t / tmax; qd and qdd are its exact derivatives. After tmax the joints stand still at qf, as in the
+    toolbox since release 10; up to release 9.10 its block gave NaN there. The toolbox interpolates a table
+    of 101 points linearly; this block evaluates the polynomial (they differ by up to 7.2e-5 (qf - q0)).
+    """
+
+    title: ClassVar[str] = "jtraj"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two joints leave and arrive at rest; position, speed and acceleration are smooth.",
+        parameters={"tmax": 8.0, "q0": (0.0, 0.0), "qf": (1.0, -1.5)},
+    )
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
+
+    q0: ArrayLike = parameter((0.0,) * 6, dimensions=(1,), doc="joint coordinates at t = 0", unit="rad")
+    qf: ArrayLike = parameter(
+        (0.7853981633974483, 1.5707963267948966, -1.5707963267948966, 0.0, 0.0, 0.0),
+        dimensions=(1,),
+        doc="joint coordinates at t = tmax",
+        unit="rad",
+    )
+    tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
+
+    def check(self) -> None:
+        n, m = shape_of(self.q0)[0], shape_of(self.qf)[0]
+        if n != m:
+            raise InputError(
+                f"q0 has {n} joints and qf has {m}",
+                where="JTraj",
+                allowed="the same count",
+                fix="correct one",
+            )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        shape = shape_of(self.q0)
+        return (
+            Port("q", "joint coordinates", "rad", shape),
+            Port("qd", "joint speeds", "rad/s", shape),
+            Port("qdd", "joint accelerations", "rad/s2", shape),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return Quintic(q0=p["q0"], qf=p["qf"], tmax=p["tmax"]).at(t)._asdict()
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        return (p["tmax"],)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fkine(Block):
+    """Forward kinematics: T = fkine(q), the pose of the tool in the world frame."""
+
+    title: ClassVar[str] = "fkine"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The path of the tool of an arm with two links, in its vertical plane.",
+        across=position_of("T")[0],
+        up=position_of("T")[2],
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "pose of the tool in the world frame", shape=(4, 4)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": apply_traced(dynamics.trace_fkine(self.robot), u["q"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jacob0(Block):
+    """The Jacobian in the world frame: (v; w) = J qd, rows linear then angular, point = tool origin."""
+
+    title: ClassVar[str] = "jacob0"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The linear rows of the Jacobian: how far the tool moves along x, y, z for each joint.",
+        shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("J", "Jacobian in the world frame", shape=(6, self.robot.n)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"J": apply_traced(dynamics.trace_jacob0(self.robot), u["q"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jacobe(Block):
+    """The Jacobian in the tool frame: (v; w) = J qd, rows linear then angular (jacobn in the toolbox)."""
+
+    title: ClassVar[str] = "jacobn"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The linear rows of the Jacobian in the axes of the tool.",
+        shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("J", "Jacobian in the tool frame", shape=(6, self.robot.n)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"J": apply_traced(dynamics.trace_jacobe(self.robot), u["q"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rne(Block):
+    """Inverse dynamics: tau = rne(q, qd, qdd), with friction and motor inertia; gravity is the robot's.
+
+    (The mask of the toolbox's block has a gravity that no release has ever used.)
+    """
+
+    title: ClassVar[str] = "rne"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The torques that a motion of two joints asks for; at the end they only hold the arm "
+            "against gravity."
+        ),
+        shown=("q", "tau"),
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force that the motion needs"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], u["qdd"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravload(Block):
+    """The torques that hold the robot still against gravity: tau = gravload(q)."""
+
+    title: ClassVar[str] = "gravload"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The torques that hold the arm against gravity, on its way up.",
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force against gravity"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"tau": apply_traced(dynamics.trace_gravload(self.robot), u["q"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inertia(Block):
+    """The joint-space inertia matrix: M = inertia(q), motors included."""
+
+    title: ClassVar[str] = "inertia"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The entries of the inertia matrix: the first joint feels less inertia the more the arm "
+            "is folded."
+        ),
+        inputs={"q": made("JTraj", q0=(0.0, 0.0), qf=(0.0, 2.5), tmax=8.0).named("motion")},
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("M", "joint-space inertia matrix", shape=(self.robot.n, self.robot.n)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"M": apply_traced(dynamics.trace_inertia(self.robot), u["q"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coriolis(Block):
+    """The matrix of Coriolis and centrifugal terms: C = coriolis(q, qd), with torque C qd."""
+
+    title: ClassVar[str] = "coriolis"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The entries of the Coriolis matrix: they vanish with the speeds.",
+        shown=("qd", "C"),
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot), qd_port(self.robot))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("C", "Coriolis matrix", shape=(self.robot.n, self.robot.n)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"C": apply_traced(dynamics.trace_coriolis(self.robot), u["q"], u["qd"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForwardDynamics(Block):
+    """The robot moved by torques: q'' = accel(q, q', tau), from q(0) = q0 at speed qd0.
+
+    Where joints come to rest against Coulomb friction, its equations jump at every turn and steps become
+    tiny: take ArmPlant there, whose joints stick, or a robot without that friction.
+
+    This is the toolbox's block Robot. There, q0 is the start since the tags 9.7 (2013); before, the
+    parameter was not connected and the robot started at zero. qd0 is zero there.
+    """
+
+    title: ClassVar[str] = "Robot"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Let go from the horizontal without torque: a double pendulum.",
+        inputs={"tau": made("Constant", value=(0.0, 0.0)).named("no torque")},
+        shown=("q",),
+        stop_time=5.0,
+    )
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    q0: ArrayLike = parameter(
+        0.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="joint coordinates (n,) at t = 0, or one number for all",
+        unit="rad",
+    )
+    qd0: ArrayLike = parameter(
+        0.0,
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        doc="joint speeds (n,) at t = 0, or one number for all",
+        unit="rad/s",
+    )
+
+    def check(self) -> None:
+        for name in ("q0", "qd0"):
+            check_joint_values(self, self.robot, name)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force at the joints"),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return tuple(
+            State(port.name, (self.robot.n,), port.doc, port.unit) for port in self.output_ports()[:2]
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {**x, "qdd": apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"q": x["qd"], "qd": apply_traced(dynamics.trace_accel(self.robot), x["q"], x["qd"], u["tau"])}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"q": p["q0"], "qd": p["qd0"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotPlot(Block):
+    """The moving robot: records the poses of all its links, so that a view needs no kinematics."""
+
+    title: ClassVar[str] = "plot"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The arm at six moments of its motion, with the path of the tool.",
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (q_port(self.robot),)
+
+    def record_ports(self) -> tuple[Port, ...]:
+        doc = "world poses of the base, every link in order, and the tool"
+        return (Port("poses", doc, shape=(len(self.robot.links) + 2, 4, 4)),)
+
+    def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"poses": apply_traced(dynamics.trace_link_poses(self.robot), u["q"])}
+
+    def views(self) -> tuple[View, ...]:
+        return (View(kind=ViewKind.ROBOT, signals=("poses",), title=self.robot.name, subject=self.robot),)

@@ -1,0 +1,208 @@
+"""Joint controllers.
+
+Sources: Siciliano et al., Robotics, 2009, 8.3 (feed-forward), 8.5.1 (PD with gravity compensation), 8.5.2
+(inverse dynamics).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX
+from numpy.typing import ArrayLike
+
+from armblocks import dynamics
+from armblocks.blocks.robots.ports import apply_traced, q_port, qd_port, qdd_port, tau_port
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+from armblocks.robot import Robot
+
+
+def _check_gains(block: Block, robot: Robot) -> None:
+    for name in ("Kp", "Kd"):
+        shape = shape_of(block.parameter_value(name))
+        if shape not in ((), (robot.n,)):
+            raise InputError(
+                f"{name} has {shape[0]} gains",
+                where=block.type_name(),
+                allowed=f"{robot.n}, as '{robot.name}' has joints, or one number for all",
+                fix=f"correct {name}",
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPD(Block):
+    """A PD controller of joints: tau = Kp (qr - q) + Kd (qdr - qd), each joint by itself."""
+
+    title: ClassVar[str] = "PD Joint Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A PD controller alone: the arm follows, and sags under gravity by a constant error.",
+        parameters={"Kp": 200.0, "Kd": 40.0},
+        inputs={
+            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
+
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+
+    def check(self) -> None:
+        broadcast({"Kp": shape_of(self.Kp), "Kd": shape_of(self.Kd)})
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("qr", "wanted coordinates"),
+            Port("qdr", "wanted speeds"),
+            Port("q", "coordinates"),
+            Port("qd", "speeds"),
+        )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("tau", "torque or force at the joints"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"tau": broadcast({**inputs, "Kp": shape_of(self.Kp), "Kd": shape_of(self.Kd)})}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"tau": p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class GravityCompensation(Block):
+    """PD with gravity compensation: tau = g(q) + Kp (qr - q) - Kd qd, which rests at qr and nowhere else."""
+
+    title: ClassVar[str] = "PD with Gravity Compensation"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="From rest to a wanted posture: gravity is compensated, so that no error remains.",
+        inputs={
+            "qr": made("Constant", value=(1.0, -0.5)).named("wanted"),
+            "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics").named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+
+    def check(self) -> None:
+        _check_gains(self, self.robot)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return q_port(self.robot, "qr"), q_port(self.robot), qd_port(self.robot)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force at the joints"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        gravity = apply_traced(dynamics.trace_gravload(self.robot), u["q"])
+        return {"tau": gravity + p["Kp"] * (u["qr"] - u["q"]) - p["Kd"] * u["qd"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComputedTorque(Block):
+    """Inverse dynamics control: tau = M(q) (qddr + Kd e' + Kp e) + C qd + g + friction, e = qr - q.
+
+    With the true robot the errors obey e'' + Kd e' + Kp e = 0, each joint by itself: critically damped for
+    Kd = 2 sqrt(Kp).
+    """
+
+    title: ClassVar[str] = "Computed Torque Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The arm starts 0.2 rad beside the wanted motion; the errors vanish as those of a "
+            "critically damped oscillator."
+        ),
+        inputs={
+            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "qddr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
+            "q": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
+    Kp: ArrayLike = parameter(
+        100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position", unit="1/s2"
+    )
+    Kd: ArrayLike = parameter(
+        20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed", unit="1/s"
+    )
+
+    def check(self) -> None:
+        _check_gains(self, self.robot)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        robot = self.robot
+        wanted = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
+        return *wanted, q_port(robot), qd_port(robot)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force at the joints"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        wanted = u["qddr"] + p["Kd"] * (u["qdr"] - u["qd"]) + p["Kp"] * (u["qr"] - u["q"])
+        return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], wanted)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FeedForward(Block):
+    """The torque of the wanted motion plus PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd)."""
+
+    title: ClassVar[str] = "Feed-Forward Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "The torques of the wanted motion are given beforehand; PD corrects what is left of the "
+            "start beside it."
+        ),
+        inputs={
+            "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
+            "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
+            "qddr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qdd"),
+            "q": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("q"),
+            "qd": made("ForwardDynamics", q0=(0.2, -0.2)).named("arm").by(tau="tau").at("qd"),
+        },
+        shown=("q", made("Sum", signs="+-").named("error").by(u1="qr", u2="q")),
+        stop_time=5.0,
+    )
+
+    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+
+    def check(self) -> None:
+        _check_gains(self, self.robot)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        robot = self.robot
+        wanted = (q_port(robot, "qr"), qd_port(robot, "qdr"), qdd_port(robot, "qddr"))
+        return *wanted, q_port(robot), qd_port(robot)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (tau_port(self.robot, "torque or force at the joints"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        known = apply_traced(dynamics.trace_rne(self.robot), u["qr"], u["qdr"], u["qddr"])
+        return {"tau": known + p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"])}

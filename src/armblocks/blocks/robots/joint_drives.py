@@ -1,0 +1,174 @@
+"""What stands between a controller and a joint: the limits of a drive, and end stops.
+
+Source: Siciliano et al., Robotics, 2009, 5.2 (drives).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, if_else, logic_and
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.switching import located, zero_crossing_parameter
+from armblocks.diagram import (
+    Block,
+    Condition,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorDrive(Block):
+    """A drive's limits: y = u held within its current limit, peak, and voltage limit, stall (1 -+ w / w0).
+
+    The voltage limit is the torque-speed line of a DC motor: ``stall`` at rest and 0 at ``no_load_speed`` w0,
+    for torques that drive; beyond w0 the drive can only brake.
+    """
+
+    title: ClassVar[str] = "Motor Drive"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A wanted torque of 15 N m: the current limit holds it at 10, and with rising speed the "
+            "voltage limit takes it to 0."
+        ),
+        inputs={
+            "u": made("Constant", value=15.0).named("wanted"),
+            "w": made("Ramp", slope=12.0).named("speed"),
+        },
+        shown=("u", "y"),
+    )
+
+    peak: ArrayLike = parameter(10.0, kind=ParameterKind.ARRAY, above=0.0, doc="torque at most", unit="N m")
+    stall: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, above=0.0, doc="torque at rest", unit="N m")
+    no_load_speed: ArrayLike = parameter(
+        100.0, kind=ParameterKind.ARRAY, above=0.0, doc="speed w0 at which no torque is left", unit="rad/s"
+    )
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "wanted torque", "N m"), Port("w", "speed", "rad/s"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "torque", "N m"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        names = ("peak", "stall", "no_load_speed")
+        return {"y": broadcast({**inputs, **{name: shape_of(self.parameter_value(name)) for name in names}})}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["y"]
+        docs = {
+            "fast": "1 where the speed lowers the upper limit",
+            "overrun": "1 where it makes it brake",
+            "fast_back": "1 where the speed backwards raises the lower limit",
+            "overrun_back": "1 where it makes it brake",
+            "above": "1 above the upper limit",
+            "below": "1 below the lower limit",
+        }
+        return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        forwards, backwards = self._lines(u, p)
+        upper, lower = self._limits(x, u, p)
+        return {
+            "fast": p["peak"] - forwards,
+            "overrun": -p["peak"] - forwards,
+            "fast_back": p["peak"] + backwards,
+            "overrun_back": backwards - p["peak"],
+            "above": u["u"] - upper,
+            "below": lower - u["u"],
+        }
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        upper, lower = self._limits(x, u, p)
+        return {"y": if_else(x["above"], upper, if_else(x["below"], lower, u["u"]))}
+
+    @staticmethod
+    def _lines(u: Signals, p: Signals) -> tuple[SX, SX]:
+        """The voltage limits of both directions."""
+        ratio = u["w"] / p["no_load_speed"]
+        return p["stall"] * (1.0 - ratio), -p["stall"] * (1.0 + ratio)
+
+    def _limits(self, x: Signals, u: Signals, p: Signals) -> tuple[SX, SX]:
+        forwards, backwards = self._lines(u, p)
+        upper = if_else(x["overrun"], -p["peak"], if_else(x["fast"], forwards, p["peak"]))
+        return upper, if_else(x["overrun_back"], p["peak"], if_else(x["fast_back"], backwards, -p["peak"]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointStops(Block):
+    """End stops that push back: tau = stiffness (lower - q) - damping qd below lower, likewise above upper.
+
+    A stop never pulls: while a joint leaves it quickly the torque is 0.
+    """
+
+    title: ClassVar[str] = "Joint Stops"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A joint runs 0.05 rad into its stops at -1 and 1 rad, which push back.",
+        inputs={
+            "q": made("SineWave", amplitude=1.05).named("q"),
+            "qd": made("Derivative").by(u=made("SineWave", amplitude=1.05).named("q")),
+        },
+        shown=("q", "tau"),
+    )
+
+    lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="lower stop", unit="rad")
+    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="upper stop", unit="rad")
+    stiffness: ArrayLike = parameter(
+        1e4, kind=ParameterKind.ARRAY, minimum=0.0, doc="of the stops", unit="N m/rad"
+    )
+    damping: ArrayLike = parameter(
+        100.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="of the stops", unit="N m s/rad"
+    )
+    zero_crossing: bool = zero_crossing_parameter()
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("q", "coordinates", "rad"), Port("qd", "speeds", "rad/s"))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("tau", "torque of the stops on the joints", "N m"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        names = [rule.name for rule in self.parameters()]
+        shapes = {name: shape_of(self.parameter_value(name)) for name in names}
+        return {"tau": broadcast({**inputs, **shapes})}
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        shape = self.output_shapes(inputs)["tau"]
+        docs = {
+            "low": "1 below the lower stop",
+            "pushed_up": "1 where spring and damper of the lower stop push",
+            "high": "1 above the upper stop",
+            "pushed_down": "1 where spring and damper of the upper stop push",
+        }
+        return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        up, down = self._pushes(u, p)
+        return {
+            "low": p["lower"] - u["q"],
+            "pushed_up": up,
+            "high": u["q"] - p["upper"],
+            "pushed_down": -down,
+        }
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        up, down = self._pushes(u, p)
+        low = if_else(logic_and(x["low"], x["pushed_up"]), up, 0.0)
+        return {"tau": low + if_else(logic_and(x["high"], x["pushed_down"]), down, 0.0)}
+
+    @staticmethod
+    def _pushes(u: Signals, p: Signals) -> tuple[SX, SX]:
+        """What spring and damper of the lower and of the upper stop would give in contact."""
+        drag = p["damping"] * u["qd"]
+        return p["stiffness"] * (p["lower"] - u["q"]) - drag, p["stiffness"] * (p["upper"] - u["q"]) - drag

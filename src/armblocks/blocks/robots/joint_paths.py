@@ -1,0 +1,257 @@
+"""Paths over time: trapezoidal and multi-segment joint motions, and straight and round motions of the tool.
+
+Sources: Siciliano et al., Robotics, 2009, 4.2 (trapezoidal profile, blends at via points) and 4.3 (straight
+path with the axis-angle rotation between two orientations); Corke, Robotics Toolbox (lspb, mstraj, ctraj).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, cos, fmax, fmin, if_else, logic_and, mtimes, sin, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import parameters_shape
+from armblocks.blocks.example_signals import ZERO, pose_along_x, position_of
+from armblocks.blocks.transforms.orientations import pose
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    made,
+    parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+from armblocks.spatial.orientation import from_quaternion, part_of_turn, to_quaternion
+from armblocks.trajectories import Quintic
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trapezoidal(Block):
+    """From q0 to qf in tmax with even ramps: qd rises, is cruise (qf - q0) / tmax, and falls.
+
+    This is the toolbox's ``lspb``. ``cruise`` is the speed of the middle part in units of the mean speed:
+    1.5, the toolbox's default, makes three equal parts, 2 a triangle. The ramps take tmax (1 - 1 / cruise)
+    each. Before 0 and after tmax the joints stand still.
+    """
+
+    title: ClassVar[str] = "lspb"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Even ramps of the speed with a stretch of even speed between them.",
+        parameters={"q0": (0.0, 0.0), "qf": (1.0, -0.5), "tmax": 8.0},
+    )
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
+
+    q0: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="start (n,)", unit="rad")
+    qf: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="end (n,)", unit="rad")
+    tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
+    cruise: float = parameter(1.5, above=1.0, maximum=2.0, doc="greatest speed over mean speed")
+
+    def check(self) -> None:
+        parameters_shape(self, "q0", "qf")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("q", "coordinates", "rad"),
+            Port("qd", "speeds", "rad/s"),
+            Port("qdd", "accelerations", "rad/s2"),
+        )
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return dict.fromkeys(("q", "qd", "qdd"), parameters_shape(self, "q0", "qf"))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        ramp, end, T = self.breakpoints(p)
+        now = fmin(fmax(t, 0.0), T)
+        left = T - now
+        speed = p["cruise"] / T
+        rise, way = speed / ramp, p["qf"] - p["q0"]
+        first, last = now < ramp, now >= end
+        share = if_else(first, rise * now * now / 2.0, speed * (now - ramp / 2.0))
+        share = if_else(last, 1.0 - rise * left * left / 2.0, share)
+        moving = logic_and(t >= 0.0, t < T)
+        rate = if_else(moving, if_else(first, rise, 0.0) - if_else(last, rise, 0.0), 0.0)
+        return {
+            "q": p["q0"] + way * share,
+            "qd": way * fmin(speed, rise * fmin(now, left)),
+            "qdd": way * rate,
+        }
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        end = p["tmax"] / p["cruise"]
+        return p["tmax"] - end, end, p["tmax"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MultiSegment(Block):
+    """Straight through points with rounded corners: segment k takes durations(k), each corner blend.
+
+    This is the toolbox's ``mstraj`` for given times. The speed of a segment is constant and changes evenly
+    within blend / 2 of the instant of each point, so that the path passes close to inner points and exactly
+    through the first and the last. It begins at t = 0 and ends after the sum of durations plus one blend:
+    q = p1 + sum of (p(k+1) - p(k)) g_k(t), with each g_k going from 0 to 1.
+    """
+
+    title: ClassVar[str] = "mstraj"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Through three corners: the joint goes straight and rounds each corner within 0.6 s.",
+        parameters={"points": ((0.0,), (1.0,), (0.5,), (1.5,)), "durations": (3.0, 3.0, 3.0), "blend": 0.6},
+    )
+    output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
+
+    points: ArrayLike = parameter(
+        ((0.0,), (1.0,), (0.5,)),
+        dimensions=(2,),
+        doc="coordinates (k, n), one row for each point",
+        unit="rad",
+    )
+    durations: ArrayLike = parameter(
+        (1.0, 1.0), dimensions=(1,), above=0.0, doc="of segments (k - 1,)", unit="s"
+    )
+    blend: float = parameter(0.2, above=0.0, doc="how long the speed takes to change", unit="s")
+
+    def check(self) -> None:
+        segments, given = shape_of(self.points)[0] - 1, shape_of(self.durations)[0]
+        if segments != given:
+            raise InputError(
+                f"{segments + 1} points make {segments} segments but {given} durations are given",
+                where="MultiSegment",
+                allowed="one duration fewer than points",
+                fix="correct the points or the durations",
+            )
+        shortest = min(self.durations)  # pyright: ignore[reportUnknownVariableType, reportArgumentType, reportCallIssue]
+        if self.blend > shortest:
+            raise InputError(
+                f"corners of {self.blend:g} s do not fit into a segment of {shortest:g} s",
+                where="MultiSegment",
+                allowed="a blend no longer than any duration",
+                fix="shorten the blend or lengthen the segment",
+            )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        shape = shape_of(self.points)[1:]
+        return (
+            Port("q", "coordinates", "rad", shape),
+            Port("qd", "speeds", "rad/s", shape),
+            Port("qdd", "accelerations", "rad/s2", shape),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        points, blend, instants = p["points"], p["blend"], self.breakpoints(p)
+        now = fmin(t, instants[-1])
+        ramps = [_rounded_ramp(now, begin, end, blend) for begin, end in zip(instants[::2], instants[1::2])]
+        n = points.shape[1]
+        q, qd, qdd = points[0, :].T, SX.zeros(n), SX.zeros(n)
+        for k in range(points.shape[0] - 1):
+            way = (points[k + 1, :] - points[k, :]).T / p["durations"][k]
+            ends = zip(ramps[k], ramps[k + 1])
+            place, speed, change = (begin - end for begin, end in ends)
+            q, qd, qdd = q + way * place, qd + way * speed, qdd + way * change
+        return {"q": q, "qd": qd, "qdd": qdd}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        starts = [SX(0.0)]
+        for k in range(p["durations"].numel()):
+            starts.append(starts[-1] + p["durations"][k])
+        return tuple(instant for start in starts for instant in (start, start + p["blend"]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CTraj(Block):
+    """The tool's straight way from pose T0 to T1 in tmax: p = p0 + s (p1 - p0), R = R0 turn(axis, s angle).
+
+    Axis and angle are those of R0' R1, so that the turn is the shortest and even. s goes from 0 to 1 by the
+    quintic of ``jtraj`` or the trapezoidal profile of ``lspb``.
+    """
+
+    title: ClassVar[str] = "ctraj"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="From one pose straight to another that is turned by 90 degrees, by a trapezoidal profile.",
+        parameters={"tmax": 8.0},
+        inputs={
+            "T0": pose_along_x(ZERO).named("start"),
+            "T1": made("Rp2T")
+            .named("end")
+            .by(
+                R=made("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))).named(
+                    "turned"
+                ),
+                p=made("Constant", value=(1.0, 0.5, 0.0)).named("p"),
+            ),
+        },
+        shown=position_of("T"),
+    )
+
+    tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
+    profile: str = parameter("lspb", choices=("lspb", "quintic"), doc="how s goes from 0 to 1")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("T0", "pose at t = 0", shape=(4, 4)), Port("T1", "pose at t = tmax", shape=(4, 4)))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("T", "pose of the tool", shape=(4, 4)), Port("s", "part of the way, 0 to 1", shape=()))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.profile == "lspb":
+            s = Trapezoidal().outputs(t, {}, {}, self._way(p))["q"]
+        else:
+            s = Quintic(q0=SX(0.0), qf=SX(1.0), tmax=p["tmax"]).at(t).q
+        T0, T1 = u["T0"], u["T1"]
+        whole = to_quaternion(mtimes(T0[:3, :3].T, T1[:3, :3]))
+        R = mtimes(T0[:3, :3], from_quaternion(part_of_turn(whole, s)))
+        return {"T": pose(R, T0[:3, 3] + s * (T1[:3, 3] - T0[:3, 3])), "s": s}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        return Trapezoidal().breakpoints(self._way(p)) if self.profile == "lspb" else (p["tmax"],)
+
+    @staticmethod
+    def _way(p: Signals) -> Signals:
+        """The parameters of s as a trapezoidal profile."""
+        return {"q0": SX(0.0), "qf": SX(1.0), "tmax": p["tmax"], "cruise": SX(1.5)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CirclePath(Block):
+    """A point that goes round: y = centre + radius (cos(a), sin(a), 0), a = 2 pi frequency t + phase."""
+
+    title: ClassVar[str] = "Circle Path"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A point that goes around once in ten seconds.",
+        parameters={"frequency": 0.1},
+    )
+
+    radius: float = parameter(1.0, minimum=0.0, doc="radius", unit="m")
+    centre: ArrayLike = parameter((0.0, 0.0, 0.0), dimensions=(1,), doc="centre (3,)", unit="m")
+    frequency: float = parameter(1.0, doc="rounds per second", unit="Hz")
+    phase: float = parameter(0.0, doc="angle at t = 0", unit="rad")
+
+    def check(self) -> None:
+        if shape_of(self.centre) != (3,):
+            raise InputError(
+                f"the centre has {shape_of(self.centre)[0]} numbers",
+                where="CirclePath.centre",
+                allowed="3: x, y, z",
+                fix="give the middle of the circle in m",
+            )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the point", "m", (3,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        angle = 2.0 * math.pi * p["frequency"] * t + p["phase"]
+        return {"y": p["centre"] + p["radius"] * vertcat(cos(angle), sin(angle), 0.0)}
+
+
+def _rounded_ramp(t: SX, begin: SX, end: SX, blend: SX) -> tuple[SX, SX, SX]:
+    """A ramp whose slope rises from 0 to 1 between two instants, ``blend`` apart; its two derivatives."""
+    rising = fmin(fmax(t - begin, 0.0), blend)
+    within = logic_and(t >= begin, t < end)
+    value = rising * rising / (2.0 * blend) + fmax(t - end, 0.0)
+    return value, rising / blend, if_else(within, 1.0 / blend, 0.0)

@@ -1,0 +1,200 @@
+"""PID controllers of joints with limited torque, running all the time or at the ticks of a clock.
+
+Source: Siciliano et al., Robotics, 2009, 8.3; Åström, Hägglund, Advanced PID Control, 2006, 3.5 (windup).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin, if_else, logic_and
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.switching import limits_in_order, zone, zone_after
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    broadcast,
+    made,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+from armblocks.equations import Shape
+
+_PORTS = (
+    Port("qr", "wanted coordinates"),
+    Port("qdr", "wanted speeds"),
+    Port("q", "coordinates"),
+    Port("qd", "speeds"),
+)
+_LOOP = {
+    "qr": made("Constant", value=1.0),
+    "qdr": made("Constant", value=0.0),
+    "q": made("Integrator").named("angle").by(u=made("Integrator").named("speed").by(u="tau")),
+    "qd": "speed/y",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointPID(Block):
+    """PID of joints: tau = limit(Kp (qr - q) + Kd (qdr - qd) + i), i' = Ki (qr - q) + Kb (tau - unlimited).
+
+    Each joint by itself. The last term, back-calculation, lets the integral go with the limits of the
+    torque instead of winding up; with Kb = 0 it winds up. The speeds are measured: nothing is differentiated.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "PID Joint Controller"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An inertia of 1 goes to 1 rad under a torque of at most 0.5.",
+        parameters={"Kp": 10.0, "Ki": 5.0, "Kd": 5.0, "lower": -0.5, "upper": 0.5},
+        inputs=_LOOP,
+        shown=("q", "tau"),
+    )
+
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
+    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of its integral")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+    Kb: ArrayLike = parameter(
+        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="back-calculation gain", unit="1/s"
+    )
+    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least torque")
+    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest torque")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the integral action at t = 0")
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+        self._shape({})
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _PORTS
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("tau", "torque or force at the joints"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"tau": self._shape(inputs)}
+
+    def states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("integral", self._shape(inputs), "the integral action"),)
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("mode", self._shape(inputs), "-1 at the lower limit, 1 at the upper, 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        shape = self._shape(inputs)
+        return (
+            Guard("upper", shape, "the torque reaches its upper limit"),
+            Guard("lower", shape, "the torque reaches its lower limit"),
+        )
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"tau": self._limited(x, u, p)}
+
+    def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        excess = _free(x, u, p) - self._limited(x, u, p)
+        return {"integral": p["Ki"] * (u["qr"] - u["q"]) - p["Kb"] * excess}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"integral": p["initial"]}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        free = _free(x, u, p)
+        return {"upper": free - p["upper"], "lower": free - p["lower"]}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"mode": zone(_free(x, u, p), p["lower"], p["upper"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"mode": zone_after(x["mode"], e)}
+
+    def _limited(self, x: Signals, u: Signals, p: Signals) -> SX:
+        below = if_else(x["mode"] < 0.0, p["lower"], _free(x, u, p))
+        return if_else(x["mode"] > 0.0, p["upper"], below)
+
+    def _shape(self, inputs: Shapes) -> Shape:
+        return _common_shape(self, inputs)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledJointPID(Block):
+    """PID of joints at ticks: tau(k) = limit(Kp e + Kd (qdr - qd) + i(k)), i(k+1) = i(k) + T Ki e.
+
+    e = qr - q. Each joint by itself. Clamping: the integral stands still while the torque is at a limit and
+    e would drive it further out.
+    """
+
+    title: ClassVar[str] = "Sampled PID Joint Controller"
+    sampled: ClassVar[bool] = True
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="An inertia of 1 goes to 1 rad under a torque of at most 0.5 that changes each 0.1 s.",
+        parameters={
+            "Kp": 10.0,
+            "Ki": 5.0,
+            "Kd": 5.0,
+            "lower": -0.5,
+            "upper": 0.5,
+            "sample_time": 0.1,
+        },
+        inputs=_LOOP,
+        shown=("q", "tau"),
+    )
+
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
+    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of its integral")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least torque")
+    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest torque")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the integral action at first")
+    sample_time: ArrayLike = sample_time_parameter(1e-3)
+
+    def check(self) -> None:
+        limits_in_order(self, "lower", "upper")
+        self._shape({})
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _PORTS
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("tau", "torque or force at the joints"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"tau": self._shape(inputs)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("integral", self._shape(inputs), "the integral action"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"tau": fmin(fmax(_free(x, u, p), p["lower"]), p["upper"])}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        free = _free(x, u, p)
+        excess = free - fmin(fmax(free, p["lower"]), p["upper"])
+        rate = p["Ki"] * (u["qr"] - u["q"])
+        outwards = logic_and(excess != 0.0, excess * rate > 0.0)
+        return {"integral": x["integral"] + p["T"] * if_else(outwards, 0.0, rate)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"integral": p["initial"]}
+
+    def _shape(self, inputs: Shapes) -> Shape:
+        return _common_shape(self, inputs)
+
+
+def _free(x: Signals, u: Signals, p: Signals) -> SX:
+    """The torque without limits."""
+    return p["Kp"] * (u["qr"] - u["q"]) + p["Kd"] * (u["qdr"] - u["qd"]) + x["integral"]
+
+
+def _common_shape(block: Block, inputs: Shapes) -> Shape:
+    names = [rule.name for rule in block.parameters() if rule.name != "sample_time"]
+    return broadcast({**inputs, **{name: shape_of(block.parameter_value(name)) for name in names}})

@@ -1,0 +1,1 @@
+"""Blocks that combine, split, select and switch signals."""

@@ -1,0 +1,1 @@
+"""Blocks that show or store signals, or end a run."""

@@ -1,0 +1,217 @@
+"""Blocks that show or keep what they receive: they have no outputs, only views."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.diagram import (
+    Block,
+    FileSettings,
+    Port,
+    SpectrumSettings,
+    View,
+    ViewKind,
+    WorkedExample,
+    made,
+    parameter,
+)
+from armblocks.errors import InputError
+
+FILE_SUFFIXES = ("csv", "npz", "mat", "parquet")
+QUANTITIES = ("amplitude", "power density")
+WINDOWS = ("hann", "hamming", "blackman", "flat top", "rectangular")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scope(Block):
+    """Traces of all inputs over time."""
+
+    title: ClassVar[str] = "Scope"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two signals of one unit, in one panel.",
+        parameters={"inputs": 2},
+        inputs={"u1": made("SineWave"), "u2": made("PulseGenerator")},
+    )
+
+    inputs: int = parameter(1, minimum=1, doc="how many inputs")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "what is traced")
+
+    def views(self) -> tuple[View, ...]:
+        return (View(kind=ViewKind.TRACES, signals=tuple(port.name for port in self.input_ports())),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class XYGraph(Block):
+    """The path of one signal over another."""
+
+    title: ClassVar[str] = "XY Graph"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A figure of Lissajous: two sines of different frequency, one over the other.",
+        inputs={"x": made("SineWave", frequency=2.0), "y": made("SineWave", frequency=3.0)},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("x", "along the horizontal axis"), Port("y", "along the vertical axis"))
+
+    def views(self) -> tuple[View, ...]:
+        return (View(kind=ViewKind.PATH, signals=("x", "y")),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Display(Block):
+    """The numbers themselves: of one signal, or of several."""
+
+    title: ClassVar[str] = "Display"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The number as it stands at the end of the run.",
+        inputs={"u": made("Ramp", slope=0.5)},
+    )
+
+    inputs: int = parameter(1, minimum=1, doc="how many inputs")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "what is shown")
+
+    def views(self) -> tuple[View, ...]:
+        return (View(kind=ViewKind.VALUE, signals=tuple(port.name for port in self.input_ports())),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToWorkspace(Block):
+    """Keeps the signal under a name in the exported data."""
+
+    title: ClassVar[str] = "To Workspace"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The signal is kept under the name that is given; a scope shows it here.",
+        inputs={"u": made("SineWave")},
+        shown=("u",),
+    )
+
+    variable: str = parameter("simout", doc="the name of the variable")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is kept"),)
+
+    def views(self) -> tuple[View, ...]:
+        return (View(kind=ViewKind.DATA, signals=("u",), labels=(self.variable,)),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToFile(Block):
+    """Keeps the signal in a file of its own: CSV, NPZ, MAT or Parquet by the file's ending.
+
+    The run itself writes nothing. ``write_report``, and so ``armblocks run``, writes the file into the
+    report's folder, ``write_files`` into a folder that is given; never outside of it. Rows are the recorded
+    instants: every ``decimation``-th from the first on, of these the last ``limit``.
+    """
+
+    title: ClassVar[str] = "To File"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The signal goes to a file beside the report; a scope shows it here.",
+        parameters={"file": "wave.csv", "variable": "wave"},
+        inputs={"u": made("SineWave")},
+        shown=("u",),
+    )
+
+    file: str = parameter("simout.csv", doc="path of the file in the folder that the caller gives")
+    variable: str = parameter("simout", doc="the name of the variable in it")
+    decimation: int = parameter(1, minimum=1, doc="of how many recorded instants one is kept")
+    limit: int = parameter(
+        1_000_000, minimum=1, maximum=10_000_000, doc="at most so many rows, the last ones"
+    )
+
+    def check(self) -> None:
+        parts = self.file.split("/")
+        plain = all(part.strip(". ") and not set(part) & set('\\:*?"<>|') for part in parts)
+        if not plain or not self.file.isprintable() or parts[-1].rpartition(".")[2] not in FILE_SUFFIXES:
+            raise InputError(
+                f"the file is '{self.file}'"[:120],
+                where="ToFile.file",
+                allowed="a path inside a folder that ends in "
+                + ", ".join("." + end for end in FILE_SUFFIXES),
+                fix="leave out '..' and leading '/'; the caller says which folder it is",
+            )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is kept"),)
+
+    def views(self) -> tuple[View, ...]:
+        settings = FileSettings(file=self.file, decimation=self.decimation, limit=self.limit)
+        return (View(kind=ViewKind.FILE, signals=("u",), labels=(self.variable,), subject=settings),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spectrum(Block):
+    """How a signal spreads over the frequencies: amplitudes, or power density by Welch's method.
+
+    ``amplitude``: that of a sine at each frequency, A = 2 |X| / sum(w); ``power density``: one-sided,
+    2 |X|^2 / (rate sum(w^2)), its integral over the frequency the mean square. X is the discrete Fourier
+    transform of evenly spaced samples times the window w. Several half-overlapping segments are averaged
+    (Welch, IEEE Trans. Audio Electroacoustics 15, 1967). Signals are those of the recorded instants, straight
+    between them: record finely enough (``sample_time``), nothing filters what is faster.
+    """
+
+    title: ClassVar[str] = "Spectrum"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two sines of 0.5 and 2 Hz, the second a tenth as large.",
+        parameters={"decibels": False},
+        inputs={
+            "u": made("Sum").by(
+                u1=made("SineWave", frequency=math.pi),
+                u2=made("SineWave", amplitude=0.1, frequency=4 * math.pi),
+            )
+        },
+        shown=("u",),
+    )
+
+    inputs: int = parameter(1, minimum=1, doc="how many inputs")
+    quantity: str = parameter("amplitude", choices=QUANTITIES, doc="what is shown")
+    window: str = parameter("hann", choices=WINDOWS, doc="the weights of a segment's samples")
+    averages: int = parameter(1, minimum=1, doc="how many half-overlapping segments are averaged")
+    sample_rate: float = parameter(
+        0.0, minimum=0.0, tunable=False, unit="Hz", doc="samples a second; 0 takes the recorded instants"
+    )
+    begin: float = parameter(0.0, tunable=False, unit="s", doc="what was before is left out")
+    remove_mean: bool = parameter(True, doc="whether the mean of each segment is taken off")
+    decibels: bool = parameter(True, doc="whether the vertical axis is in decibels")
+    logarithmic: bool = parameter(False, doc="whether the frequency axis is logarithmic")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "what is looked at")
+
+    def views(self) -> tuple[View, ...]:
+        settings = SpectrumSettings(
+            quantity=self.quantity,
+            window=self.window,
+            averages=self.averages,
+            sample_rate=self.sample_rate,
+            begin=self.begin,
+            remove_mean=self.remove_mean,
+            decibels=self.decibels,
+            logarithmic=self.logarithmic,
+        )
+        signals = tuple(port.name for port in self.input_ports())
+        return (View(kind=ViewKind.SPECTRUM, signals=signals, subject=settings),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terminator(Block):
+    """Takes a signal that nobody needs."""
+
+    title: ClassVar[str] = "Terminator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Nothing is done with the signal; a scope shows it here.",
+        inputs={"u": made("SineWave")},
+        shown=("u",),
+    )
+
+    def bus_inputs(self) -> tuple[str, ...]:
+        return ("u",)
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what is not needed"),)

@@ -1,0 +1,55 @@
+"""Blocks that watch a condition: one ends the run where it is met, the other where it is broken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, if_else
+
+from armblocks.diagram import Block, Guard, Port, Shapes, Signals, WorkedExample, made, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopSimulation(Block):
+    """Ends the run, exactly where its input becomes other than 0: the run is then complete, and says so."""
+
+    title: ClassVar[str] = "Stop Simulation"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The run ends when the ramp exceeds 5.",
+        inputs={"u": made("CompareToConstant", relation=">", constant=5.0).by(u=made("Ramp"))},
+        shown=("u",),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "ends the run where it is not 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("stop", inputs["u"], "positive where u is not 0", 1, "stop"),)
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"stop": if_else(u["u"] == 0.0, -1.0, 1.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assertion(Block):
+    """Says that its input is never 0: where it becomes 0 the run fails there, or tells so at its end."""
+
+    title: ClassVar[str] = "Assertion"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="That the sine stays below 0.9 does not hold: the run goes on, and its message says so.",
+        parameters={"action": "warn"},
+        inputs={"u": made("CompareToConstant", relation="<", constant=0.9).by(u=made("SineWave"))},
+        shown=("u",),
+    )
+
+    action: str = parameter("fail", choices=("fail", "warn"), doc="what happens where the input becomes 0")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "what must not be 0"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("broken", inputs["u"], "positive where u is 0", 1, self.action),)
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"broken": if_else(u["u"] == 0.0, 1.0, -1.0)}

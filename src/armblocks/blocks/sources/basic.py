@@ -1,0 +1,141 @@
+"""Blocks that make a signal from nothing but the time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, if_else, sin
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import parameters_shape
+from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, WorkedExample, parameter, shape_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constant(Block):
+    """A number, vector or matrix that does not change: y = value."""
+
+    title: ClassVar[str] = "Constant"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The same value at all times.",
+        parameters={"value": 2.0},
+    )
+
+    value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="what comes out")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the value"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": shape_of(self.value)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["value"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clock(Block):
+    """The time of the simulation: y = t."""
+
+    title: ClassVar[str] = "Clock"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The time itself: a slope of 1.",
+    )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "time since the start", "s", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": t}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step(Block):
+    """A jump at a known time: y = initial for t < time, y = final from there on.
+
+    A Derivative block behind it ignores the jump.
+    """
+
+    title: ClassVar[str] = "Step"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="From 0 to 1 at 2 s.",
+        parameters={"time": 2.0},
+    )
+
+    time: float = parameter(1.0, doc="when it jumps", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the value before")
+    final: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the value from the jump on")
+
+    def check(self) -> None:
+        parameters_shape(self, "initial", "final")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the step"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": parameters_shape(self, "initial", "final")}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": if_else(t < p["time"], p["initial"], p["final"])}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        return (p["time"],)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(Block):
+    """A straight rise from a known time on: y = initial + slope max(t - start, 0)."""
+
+    title: ClassVar[str] = "Ramp"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Level until 2 s, then a rise of 0.5 a second.",
+        parameters={"slope": 0.5, "start": 2.0},
+    )
+
+    slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="rise per second", unit="1/s")
+    start: float = parameter(0.0, doc="when the rise begins", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the value before")
+
+    def check(self) -> None:
+        parameters_shape(self, "slope", "initial")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the ramp"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": parameters_shape(self, "slope", "initial")}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["initial"] + p["slope"] * fmax(t - p["start"], 0.0)}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        return (p["start"],)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SineWave(Block):
+    """A sine of the time: y = amplitude sin(frequency t + phase) + bias."""
+
+    title: ClassVar[str] = "Sine Wave"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Two radians a second, about the bias 1.",
+        parameters={"amplitude": 2.0, "frequency": 2.0, "bias": 1.0},
+    )
+
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the way from peak to peak")
+    frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="angular frequency", unit="rad/s")
+    phase: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="angle at t = 0", unit="rad")
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+
+    def check(self) -> None:
+        parameters_shape(self, "amplitude", "frequency", "phase", "bias")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the sine"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": parameters_shape(self, "amplitude", "frequency", "phase", "bias")}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["amplitude"] * sin(p["frequency"] * t + p["phase"]) + p["bias"]}

@@ -1,0 +1,102 @@
+"""Sources that count ticks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.diagram import (
+    Block,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    sample_time_parameter,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CounterLimited(Block):
+    """Counts the ticks and starts again: y(k) = k mod (upper + 1)."""
+
+    title: ClassVar[str] = "Counter Limited"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Counts 0, 1, 2, 3 at its ticks and starts again.",
+        parameters={"upper": 3, "sample_time": 0.5},
+    )
+    sampled: ClassVar[bool] = True
+
+    upper: int = parameter(7, minimum=0, doc="the greatest count")
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the count", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("x", (), "the count"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["x"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"x": if_else(x["x"] >= self.upper, 0.0, x["x"] + 1.0)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"x": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DigitalClock(Block):
+    """The time at the last tick: y = k T + offset."""
+
+    title: ClassVar[str] = "Digital Clock"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The time of the last tick, beside the time itself.",
+        inputs={},
+        shown=("y", made("Clock")),
+    )
+    sampled: ClassVar[bool] = True
+
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "time of the last tick", "s", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": t}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CounterFreeRunning(Block):
+    """Counts the ticks and overflows as an unsigned integer does: y(k) = k mod 2^bits."""
+
+    title: ClassVar[str] = "Counter Free-Running"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A counter of two bits: after 3 comes 0.",
+        parameters={"bits": 2},
+    )
+    sampled: ClassVar[bool] = True
+
+    bits: int = parameter(16, minimum=1, maximum=52, doc="how many bits the count has")
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the count", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("k", (), "the count"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": x["k"]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"k": if_else(x["k"] >= 2.0**self.bits - 1.0, 0.0, x["k"] + 1.0)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"k": SX(0.0)}

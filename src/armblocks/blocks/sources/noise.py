@@ -1,0 +1,154 @@
+"""Random signals: seeded, the same on every machine to the last bit, drawn at the ticks of a clock.
+
+Every element of a vector has a stream of its own; blocks with different seeds never share one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, sqrt
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.elementwise import parameters_shape
+from armblocks.blocks.random_streams import (
+    SEED_BITS,
+    draw,
+    normal_quantile,
+    stream_start,
+    stream_states,
+)
+from armblocks.blocks.switching import limits_in_order
+from armblocks.diagram import (
+    Block,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+
+_MOST = float(2**SEED_BITS - 1)
+_SEED = f"which stream of numbers, 0 to {_MOST:.0f}; its whole part counts"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomNumber(Block):
+    """Gaussian random numbers, a new one at each tick: y(k) = mean + sqrt(variance) n(k), n of N(0, 1)."""
+
+    title: ClassVar[str] = "Random Number"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A new number of the normal distribution every 0.1 s; the same seed gives the same numbers.",
+    )
+    sampled: ClassVar[bool] = True
+
+    mean: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the mean")
+    variance: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the variance")
+    seed: float = parameter(0.0, minimum=0.0, maximum=_MOST, doc=_SEED)
+    sample_time: ArrayLike = sample_time_parameter(0.1)
+
+    def check(self) -> None:
+        parameters_shape(self, "mean", "variance")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the random number"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": parameters_shape(self, "mean", "variance")}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return stream_states(self.output_shapes(inputs)["y"])
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["mean"] + sqrt(p["variance"]) * normal_quantile(draw(x)[0])}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return draw(x)[1]
+
+    def initial_states(self, p: Signals) -> Signals:
+        return stream_start(p["seed"], self.output_shapes({})["y"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class UniformRandomNumber(Block):
+    """Evenly spread random numbers, a new one at each tick: minimum < y(k) < maximum."""
+
+    title: ClassVar[str] = "Uniform Random Number"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A new number between -1 and 1 every 0.1 s; the same seed gives the same numbers.",
+    )
+    sampled: ClassVar[bool] = True
+
+    minimum: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, doc="the lower bound")
+    maximum: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the upper bound")
+    seed: float = parameter(0.0, minimum=0.0, maximum=_MOST, doc=_SEED)
+    sample_time: ArrayLike = sample_time_parameter(0.1)
+
+    def check(self) -> None:
+        limits_in_order(self, "minimum", "maximum")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the random number"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": parameters_shape(self, "minimum", "maximum")}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return stream_states(self.output_shapes(inputs)["y"])
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["minimum"] + (p["maximum"] - p["minimum"]) * draw(x)[0]}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return draw(x)[1]
+
+    def initial_states(self, p: Signals) -> Signals:
+        return stream_start(p["seed"], self.output_shapes({})["y"])
+
+
+@dataclass(frozen=True, kw_only=True)
+class BandLimitedWhiteNoise(Block):
+    """White noise for continuous systems: y(k) = sqrt(noise_power / T) n(k), n of N(0, 1), held for T.
+
+    The height of its two-sided power spectral density is ``noise_power`` well below the frequency 1 / T (Hz),
+    so that the variance of what a system makes of it does not depend on T. Choose T a hundredth of the time
+    in which the fastest part of the system changes, as Simulink's documentation of the block advises.
+    """
+
+    title: ClassVar[str] = "Band-Limited White Noise"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Noise, and what a lag of 1 s lets through of it.",
+        parameters={"noise_power": 0.05},
+        shown=("y", made("FirstOrderLag").named("lag").by(u="y")),
+    )
+    sampled: ClassVar[bool] = True
+
+    noise_power: ArrayLike = parameter(
+        0.1, kind=ParameterKind.ARRAY, minimum=0.0, doc="height of the spectral density, y squared per Hz"
+    )
+    seed: float = parameter(23341.0, minimum=0.0, maximum=_MOST, doc=_SEED)
+    sample_time: ArrayLike = sample_time_parameter(0.1)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the noise"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": shape_of(self.noise_power)}
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return stream_states(shape_of(self.noise_power))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": sqrt(p["noise_power"] / p["T"]) * normal_quantile(draw(x)[0])}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return draw(x)[1]
+
+    def initial_states(self, p: Signals) -> Signals:
+        return stream_start(p["seed"], shape_of(self.noise_power))

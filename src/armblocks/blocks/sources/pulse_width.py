@@ -1,0 +1,73 @@
+"""Pulse width modulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fmax, fmin, if_else, logic_and
+
+from armblocks.blocks.periodic import AGAIN, COUNT, FRESH, INSTANT, sample_time, sampled, sampling_guards
+from armblocks.blocks.switching import since
+from armblocks.diagram import (
+    Block,
+    Guard,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    made,
+    parameter,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PWM(Block):
+    """Pulse width modulation: y = amplitude for t_k <= t < t_k + D(t_k) T, else 0, with D held to 0 … 1.
+
+    The duty cycle D is looked at where a pulse may begin, as in Simulink's PWM; both edges are located
+    exactly. The mean of y over a period is D times the amplitude. A sampled block that ticks at an edge
+    sees y as it was just before.
+    """
+
+    title: ClassVar[str] = "PWM"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Pulses that become wider as the duty cycle rises from 0 to 1.",
+        parameters={"period": 1.0},
+        inputs={"D": made("Ramp", slope=0.1)},
+    )
+
+    period: float = parameter(0.1, above=0.0, doc="T, from pulse to pulse", unit="s")
+    offset: float = parameter(0.0, minimum=0.0, doc="when the first pulse may begin", unit="s")
+    amplitude: float = parameter(1.0, doc="the height of the pulses")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("D", "the duty cycle, 0 … 1", shape=()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the pulses", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        high = State("high", (), "1 during a pulse, else 0")
+        return (COUNT, FRESH, State("duty", (), "the duty cycle of this period"), high)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return INSTANT, AGAIN, Guard("edge", (), "t - the end of the pulse", 1)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["amplitude"] * x["high"]}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return dict.fromkeys(("count", "fresh", "duty", "high"), SX(0.0))
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        edge = since(t, sample_time(p, x["count"] - 1.0 + x["duty"]))
+        return {**sampling_guards(t, x, p), "edge": edge}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        _, looks, counted = sampled(t, x, p, e)
+        duty = if_else(looks, fmin(fmax(u["D"], 0.0), 1.0), x["duty"])
+        ends = logic_and(e["edge"] > 0.0, x["duty"] < 1.0)
+        high = if_else(looks, duty > 0.0, if_else(ends, 0.0, x["high"]))
+        return {**counted, "duty": duty, "high": high}

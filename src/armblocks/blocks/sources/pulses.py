@@ -1,0 +1,77 @@
+"""Trains of square pulses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, floor, if_else
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.switching import (
+    counted,
+    since,
+)
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    parameter,
+    shape_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PulseGenerator(Block):
+    """Square pulses: y = amplitude during the first width % of each period after the delay, 0 elsewhere."""
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Pulse Generator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="High for the first 30 % of every two seconds.",
+        parameters={"width": 30.0},
+    )
+
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the height of the pulses")
+    period: float = parameter(2.0, above=0.0, doc="from one pulse to the next", unit="s")
+    width: float = parameter(50.0, above=0.0, maximum=99.999, doc="the length of a pulse in % of the period")
+    delay: float = parameter(0.0, minimum=0.0, doc="when the first pulse begins", unit="s")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the pulses"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": shape_of(self.amplitude)}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("edges", (), "how many edges have passed"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("edge", (), "t - the next edge", 1),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": p["amplitude"] * (x["edges"] - 2.0 * floor(x["edges"] / 2.0))}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        pulses = floor(x["edges"] / 2.0)
+        high = x["edges"] - 2.0 * pulses
+        return {"edge": since(t, p["delay"] + (pulses + high * p["width"] / 100.0) * p["period"])}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # k * period / period may come out a little below k.
+        periods = (t - p["delay"]) / p["period"] * (1.0 + 1e-14)
+        pulses = floor(periods)
+        over = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)
+        passed = if_else(t < p["delay"], 0.0, 2.0 * pulses + 1.0 + over)
+        return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"edges": self.guard_values(t, x, u, p)["edge"] > 0.0}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"edges": x["edges"] + (e["edge"] > 0.0)}

@@ -1,0 +1,246 @@
+"""Sources that repeat themselves: waves and sequences. Every edge happens at an exact instant.
+
+Edges of a wave in continuous time are events at multiples of the period, worked out and never accumulated;
+sampled sequences count ticks.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from casadi import SX, dot, floor, fmax, if_else, sin, vertcat
+from numpy.typing import ArrayLike
+
+from armblocks.blocks.interpolation import cells, weights
+from armblocks.blocks.switching import counted, since
+from armblocks.blocks.table_axes import rising
+from armblocks.diagram import (
+    Block,
+    Guard,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    State,
+    WorkedExample,
+    parameter,
+    sample_time_parameter,
+    shape_of,
+)
+from armblocks.errors import InputError
+
+_ROUNDED = 1.0 + 1e-14  # k * period / period may come out a little below k
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalGenerator(Block):
+    """A wave with the phase s = f t - floor(f t): sine A sin(2 pi s), sawtooth A (1 - 2 s), or square.
+
+    The square is -A in the first half of the period and A in the second, and the sawtooth falls from A to
+    -A, as with Simulink's block. Its fourth form, random numbers, is the block Uniform Random Number here,
+    which has a sample time.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Signal Generator"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A square wave of 0.5 Hz: 1 in the first half of every period, -1 in the second.",
+        parameters={"waveform": "square", "frequency": 0.5},
+    )
+
+    waveform: str = parameter("sine", choices=("sine", "square", "sawtooth"), doc="the form of the wave")
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="A, half the way from peak to peak")
+    frequency: float = parameter(1.0, above=0.0, doc="f, in the units chosen")
+    units: str = parameter("Hz", choices=("Hz", "rad/s"), doc="units of the frequency")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the wave"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": shape_of(self.amplitude)}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return () if self.waveform == "sine" else (State("edges", (), "how many edges have passed"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return () if self.waveform == "sine" else (Guard("edge", (), "t - the next edge", 1),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.waveform == "sine":
+            to_angle = 2.0 * math.pi if self.units == "Hz" else 1.0
+            return {"y": p["amplitude"] * sin(to_angle * p["frequency"] * t)}
+        if self.waveform == "square":
+            return {"y": p["amplitude"] * (2.0 * (x["edges"] - 2.0 * floor(x["edges"] / 2.0)) - 1.0)}
+        return {"y": p["amplitude"] * (1.0 - 2.0 * (t - x["edges"] * self._spacing(p)) / self._spacing(p))}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {} if self.waveform == "sine" else {"edge": since(t, (x["edges"] + 1.0) * self._spacing(p))}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.waveform == "sine":
+            return {}
+        passed = floor(t / self._spacing(p) * _ROUNDED)
+        return {"edges": counted(passed, x["edges"], self.contradictions(t, x, u, p)["edges"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self.waveform == "sine":
+            return {}
+        return {"edges": self.guard_values(t, x, u, p)["edge"] > 0.0}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {} if self.waveform == "sine" else {"edges": x["edges"] + (e["edge"] > 0.0)}
+
+    def _spacing(self, p: Signals) -> SX:
+        """Time from one edge to the next."""
+        period = (1.0 if self.units == "Hz" else 2.0 * math.pi) / p["frequency"]
+        return period / 2.0 if self.waveform == "square" else period
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatingSequence(Block):
+    """A polygon that repeats itself: y = values at times, straight lines between, period times[-1].
+
+    Where the last value is not the first one, the signal jumps at the end of each period.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Repeating Sequence"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A course of four points that begins again every three seconds.",
+        parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0)},
+    )
+
+    times: ArrayLike = parameter(
+        (0.0, 2.0), dimensions=(1,), tunable=False, doc="instants (n,) from 0", unit="s"
+    )
+    values: ArrayLike = parameter((0.0, 2.0), dimensions=(1,), doc="values there (n,)")
+
+    def check(self) -> None:
+        _check_times(self, self.times, shape_of(self.values)[0])
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the sequence", shape=()),)
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("pieces", (), "how many straight lines have passed"),)
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("corner", (), "t - the next corner", 1),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        times = _numbers(self.times)
+        periods, here = self._piece(x["pieces"])
+        gaps = SX([right - left for left, right in pairwise(times)])
+        since = t - (periods * times[-1] + dot(here, SX(times[:-1])))
+        left, right = dot(here, p["values"][:-1]), dot(here, p["values"][1:])
+        return {"y": left + (right - left) * (since / dot(here, gaps))}
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        times = _numbers(self.times)
+        periods, here = self._piece(x["pieces"])
+        return {"corner": since(t, periods * times[-1] + dot(here, SX(times[1:])))}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        times = _numbers(self.times)
+        periods = floor(t / times[-1] * _ROUNDED)
+        into = (t - periods * times[-1]) + 1e-14 * t
+        passed = sum((into >= corner for corner in times[1:-1]), SX(0.0))
+        passed = periods * (len(times) - 1) + passed
+        return {"pieces": counted(passed, x["pieces"], self.contradictions(t, x, u, p)["pieces"])}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"pieces": self.guard_values(t, x, u, p)["corner"] > 0.0}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"pieces": x["pieces"] + (e["corner"] > 0.0)}
+
+    def _piece(self, pieces: SX) -> tuple[SX, SX]:
+        """Whole periods passed, and a vector that is 1 at the present line and 0 at the others."""
+        count = shape_of(self.times)[0] - 1
+        periods = floor(pieces / count)
+        return periods, vertcat(*cells(pieces - count * periods, [k - 0.5 for k in range(1, count)]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatingSequenceInterpolated(Block):
+    """A sampled course that repeats itself: y(k) = values at times, read at kT modulo times[-1].
+
+    ``linear`` goes straight from one value to the next, ``nearest`` takes the nearest, ``flat`` the last one.
+    """
+
+    title: ClassVar[str] = "Repeating Sequence Interpolated"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A course of four points, read every 0.1 s and held in between.",
+        parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0), "sample_time": 0.1},
+    )
+    sampled: ClassVar[bool] = True
+
+    times: ArrayLike = parameter(
+        (0.0, 0.1, 0.5, 0.6, 1.0), dimensions=(1,), tunable=False, doc="instants (n,) from 0", unit="s"
+    )
+    values: ArrayLike = parameter((3.0, 1.0, 4.0, 2.0, 1.0), dimensions=(1,), doc="values there (n,)")
+    method: str = parameter("linear", choices=("linear", "nearest", "flat"), doc="what to do in between")
+    sample_time: ArrayLike = sample_time_parameter(0.01)
+
+    def check(self) -> None:
+        _check_times(self, self.times, shape_of(self.values)[0])
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the course", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        times = _numbers(self.times)
+        periods = floor(t / times[-1] * _ROUNDED)
+        into = fmax(t - periods * times[-1], 0.0)
+        if self.method == "flat":
+            into = into + 1e-14 * t
+        return {"y": dot(vertcat(*weights(into, times, self.method)), p["values"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepeatingSequenceStair(Block):
+    """One value after the other at each tick, then again from the first: y(k) = values[k mod n]."""
+
+    title: ClassVar[str] = "Repeating Sequence Stair"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Five values, one a second, then again from the first.",
+    )
+    sampled: ClassVar[bool] = True
+
+    values: ArrayLike = parameter((3.0, 1.0, 4.0, 2.0, 1.0), dimensions=(1,), doc="the values (n,)")
+    sample_time: ArrayLike = sample_time_parameter(1.0)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the stair", shape=()),)
+
+    def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("k", (), "which value is next, from 0"),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        here = cells(x["k"], [k - 0.5 for k in range(1, p["values"].numel())])
+        return {"y": dot(vertcat(*here), p["values"])}
+
+    def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"k": if_else(x["k"] >= p["values"].numel() - 1.0, 0.0, x["k"] + 1.0)}
+
+    def initial_states(self, p: Signals) -> Signals:
+        return {"k": SX(0.0)}
+
+
+def _check_times(block: Block, times: ArrayLike, count: int) -> None:
+    first = rising(block.type_name(), "times", times, count)[0]
+    if first != 0.0:
+        raise InputError(
+            f"the first of the times is {first}",
+            where=f"{block.type_name()}.times",
+            allowed="times that begin at 0",
+            fix="subtract the first; the last one is the period",
+        )
+
+
+def _numbers(values: ArrayLike) -> list[float]:
+    return [float(value) for value in np.ravel(cast("Any", values))]

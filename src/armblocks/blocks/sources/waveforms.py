@@ -1,0 +1,195 @@
+"""Sources whose course is known beforehand: nothing, a pulse, a chirp, a table of times and values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from casadi import SX, fmax, fmin, if_else, logic_and, logic_not, mtimes, sin, vertcat
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.blocks.elementwise import parameters_shape
+from armblocks.blocks.interpolation import weights
+from armblocks.blocks.long_tables import inputs_with, interval_of, is_long, is_spline, line
+from armblocks.blocks.splines import spline_corners, with_slopes
+from armblocks.blocks.table_axes import rising
+from armblocks.diagram import (
+    Block,
+    Parameter,
+    ParameterKind,
+    Port,
+    Shapes,
+    Signals,
+    WorkedExample,
+    parameter,
+    shape_of,
+)
+from armblocks.equations import last_at_or_below, read_entry
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ground(Block):
+    """Nothing: y = 0, for inputs that are not used."""
+
+    title: ClassVar[str] = "Ground"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Nothing: zero at all times.",
+    )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "zero", shape=()),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": SX(0.0)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pulse(Block):
+    """One pulse: y = amplitude for start <= t < start + width, else 0. Steps end at both edges."""
+
+    title: ClassVar[str] = "Pulse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="One pulse from 2 s to 5 s.",
+        parameters={"start": 2.0, "width": 3.0},
+    )
+
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the value during the pulse")
+    start: float = parameter(1.0, doc="when it begins", unit="s")
+    width: float = parameter(1.0, above=0.0, doc="how long it lasts", unit="s")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the pulse"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": shape_of(self.amplitude)}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        during = logic_and(logic_not(t < p["start"]), t < p["start"] + p["width"])
+        return {"y": if_else(during, p["amplitude"], 0.0)}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        return p["start"], p["start"] + p["width"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chirp(Block):
+    """A sine whose frequency rises evenly: y = sin(2 pi (f1 t + (f2 - f1) t^2 / (2 T))).
+
+    The frequency is ``initial_frequency`` f1 at t = 0 and ``final_frequency`` f2 at ``target_time`` T; it
+    goes on rising after that.
+    """
+
+    title: ClassVar[str] = "Chirp Signal"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The frequency rises from 0.1 Hz to 1 Hz within ten seconds.",
+        parameters={"target_time": 10.0},
+    )
+
+    initial_frequency: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, doc="f1, at t = 0", unit="Hz")
+    final_frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="f2, at T", unit="Hz")
+    target_time: float = parameter(100.0, above=0.0, doc="T", unit="s")
+
+    def check(self) -> None:
+        parameters_shape(self, "initial_frequency", "final_frequency")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the chirp"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": parameters_shape(self, "initial_frequency", "final_frequency")}
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        first, last = p["initial_frequency"], p["final_frequency"]
+        return {"y": sin(2.0 * math.pi * (first * t + (last - first) * (t * t / (2.0 * p["target_time"]))))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class FromTable(Block):
+    """A course given at some instants: y = values at times, between them by the method chosen.
+
+    ``linear`` straight lines, ``flat`` the value of the last instant, ``cubic`` the spline (not-a-knot).
+    Outside the table the first and the last value are held, or the signal is ``zero``, or straight lines go
+    on (``linear``). Steps of the solver end at the instants.
+    """
+
+    title: ClassVar[str] = "From Workspace"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A smooth curve through four points; after the last one its value is held.",
+        parameters={"times": (0.0, 2.0, 5.0, 8.0), "values": (0.0, 1.0, -1.0, 0.5), "method": "cubic"},
+    )
+
+    times: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="instants (n,)", unit="s")
+    values: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2), doc="values there, (n,) or (n, m)")
+    method: str = parameter("linear", choices=("linear", "flat", "cubic"), doc="what to do in between")
+    outside: str = parameter("hold", choices=("hold", "linear", "zero"), doc="what to do before and after")
+
+    def check(self) -> None:
+        rising("FromTable", "times", self.times, shape_of(self.values)[0])
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "the course: a scalar, or a vector (m,)"),)
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": shape_of(self.values)[1:]}
+
+    def inputs_of_the_run(self) -> tuple[Parameter, ...]:
+        return inputs_with(self, self._is_long(), "values", "times")
+
+    def parameters_behind_inputs(self) -> tuple[str, ...]:
+        return ("times", "values") if is_spline(self, self._is_long()) else ()
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self._is_long():
+            return {"y": self._read(t, p)}
+        times = self._times()
+        by_time = vertcat(*weights(t, times, self.method, "linear" if self.outside == "linear" else "clip"))
+        course = mtimes(p["values"].T, by_time)
+        if self.outside == "zero":
+            course = if_else(logic_and(t >= times[0], t <= times[-1]), course, 0.0)
+        return {"y": course}
+
+    def breakpoints(self, p: Signals) -> tuple[SX, ...]:
+        if self._is_long():
+            return (p["knots" if self.method == "cubic" else "times"],)
+        return tuple(SX(time) for time in self._times())
+
+    def _is_long(self) -> bool:
+        return is_long(shape_of(self.times), self.method)
+
+    def _read(self, t: SX, p: Signals) -> SX:
+        """The course, from the two rows around t."""
+        smooth = self.method == "cubic"
+        values = p["spline" if smooth else "values"].T  # row by row, as the vector of parameters has them
+        times = p["knots" if smooth else "times"]
+        first, last = times[0], times[times.numel() - 1]
+        width = values.shape[0] if len(shape_of(self.values)) == 2 else 1
+
+        def row(k: SX) -> SX:
+            return vertcat(*(read_entry(values, width * k + float(column)) for column in range(width)))
+
+        if self.method == "flat":
+            course = row(fmax(last_at_or_below(times, t), 0.0))
+        elif smooth:
+            corners = spline_corners(t, times, None, straight=self.outside == "linear")
+            course = sum((weight * row(k) for k, weight in corners), SX(0.0))
+        else:
+            inside = t if self.outside == "linear" else fmin(fmax(t, first), last)
+            course = line(inside, times, interval_of(t, times), row)
+        return if_else(logic_and(t >= first, t <= last), course, 0.0) if self.outside == "zero" else course
+
+    @property
+    def knots(self) -> Array:
+        """Of a long cubic course its instants, s."""
+        return np.asarray(self._times())
+
+    @property
+    def spline(self) -> Array:
+        """Of a long cubic course the values and slopes, row by row."""
+        return with_slopes((tuple(self._times()),), self.values)
+
+    def _times(self) -> list[float]:
+        return [float(time) for time in np.ravel(cast("Any", self.times))]

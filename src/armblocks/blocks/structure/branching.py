@@ -1,0 +1,191 @@
+"""Blocks that choose which action subsystem works."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, fabs, floor, if_else, logic_or, vertcat
+
+from armblocks.blocks.elementwise import numbered_ports
+from armblocks.diagram import Block, Guard, Port, Shapes, Signals, State, WorkedExample, made, parameter
+from armblocks.diagram.expression_language import Formula
+from armblocks.errors import InputError
+
+JUST = 1e-300
+"""Beside a border by less than any signal can tell: it gives the border itself a side."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class If(Block):
+    """Chooses by conditions which action subsystem works: the first whose condition is true, else the last.
+
+    The conditions are formulas over the inputs (``u``, or ``u1``, ``u2``, … where there are several), written
+    as in the Expression block and separated by semicolons: ``u > 0.5; u > 0``. The output of the one that is
+    chosen is 1, and those of the others are 0.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "If"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The sine chooses the first output above one half, the second between zero and that.",
+        parameters={"expressions": "u > 0.5; u > 0"},
+    )
+
+    expressions: str = parameter("u > 0", doc="formulas, separated by semicolons")
+    inputs: int = parameter(1, minimum=1, maximum=100, doc="how many inputs")
+
+    def check(self) -> None:
+        for text in self._texts():
+            Formula(text, "If.expressions")
+
+    def _texts(self) -> list[str]:
+        return [text.strip() for text in self.expressions.split(";")]
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return numbered_ports("u", self.inputs, "input")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        chosen = [
+            Port(f"if{number}", f"1 where '{text}' is the first that is true", "", ())
+            for number, text in enumerate(self._texts(), start=1)
+        ]
+        return (*chosen, Port("else", "1 where none is true", "", ()))
+
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        u = {name: SX.sym(name, math.prod(shape)) for name, shape in inputs.items()}
+        for text in self._texts():
+            size = Formula(text, "If.expressions").trace({**u, "t": SX.sym("t")}).numel()
+            if size != 1:
+                raise InputError(
+                    f"the condition '{text}' has {size} values",
+                    allowed="one: true or false",
+                    fix="compare an element, such as u[1]",
+                )
+        return {}
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("case", (), "which output is 1, from 1"),)
+
+    def _borders(self, t: SX, u: Signals) -> SX:
+        names = {**u, "t": t}
+        return vertcat(*(part for text in self._texts() for part in Formula(text, "").borders(names)))
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        u = {name: SX.sym(name, math.prod(shape)) for name, shape in inputs.items()}
+        return (Guard("borders", (self._borders(SX.sym("t"), u).numel(),), "a comparison changes"),)
+
+    def _case(self, t: SX, u: Signals) -> SX:
+        texts = self._texts()
+        case = SX(len(texts) + 1.0)
+        for number in range(len(texts), 0, -1):
+            holds = Formula(texts[number - 1], "").trace({**u, "t": t})
+            case = if_else(holds != 0.0, float(number), case)
+        return case
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {
+            port.name: if_else(x["case"] == float(number), 1.0, 0.0)
+            for number, port in enumerate(self.output_ports(), start=1)
+        }
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"borders": self._borders(t, u)}
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"case": self._case(t, u)}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"case": self._case(t, u)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwitchCase(Block):
+    """Chooses by a whole number which action subsystem works: u without its fraction is one of the cases.
+
+    Cases are separated by semicolons, and a case may have several numbers: ``1; 2 3; 4``. The output of the
+    case that has the number is 1; where none has it, the default is.
+    """
+
+    memoryless: ClassVar[bool] = True
+    title: ClassVar[str] = "Switch Case"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="As the ramp passes 1, 2 and 3, the cases are chosen one after the other.",
+        parameters={"cases": "1; 2 3"},
+        inputs={"u": made("Ramp", slope=0.5)},
+    )
+
+    cases: str = parameter("1; 2", doc="whole numbers of each case; cases separated by semicolons")
+
+    def check(self) -> None:
+        found = [number for case in self._texts() for number in case]
+        wrong = [text for text in found if not text.removeprefix("-").isdecimal() or not text.isascii()]
+        twice = [text for text in found if found.count(text) > 1]
+        if wrong or twice or not all(self._texts()):
+            said = f"'{(wrong or twice)[0]}' stands there" if wrong or twice else "a case has no number"
+            raise InputError(
+                f"the cases are '{self.cases}': {said}",
+                where="SwitchCase.cases",
+                allowed="whole numbers, each once, such as 1; 2 3; 4",
+                fix="correct the list",
+            )
+
+    def _texts(self) -> list[list[str]]:
+        return [case.replace(",", " ").split() for case in self.cases.split(";")]
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", "the number of the case", "", ()),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        chosen = [
+            Port(f"case{number}", f"1 where u is {' or '.join(case)}", "", ())
+            for number, case in enumerate(self._texts(), start=1)
+        ]
+        return (*chosen, Port("default", "1 where no case has the number", "", ()))
+
+    def modes(self, inputs: Shapes) -> tuple[State, ...]:
+        return (State("case", (), "which output is 1, from 1"),)
+
+    def _edges(self) -> list[tuple[float, float]]:
+        """From where to where u has each number, its fraction cut off: 0 is what lies between -1 and 1."""
+        numbers = [float(number) for case in self._texts() for number in case]
+        return [(n if n > 0.0 else n - 1.0, n if n < 0.0 else n + 1.0) for n in numbers]
+
+    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
+        return (Guard("borders", (2 * len(self._edges()),), "u passes a whole number"),)
+
+    def _case(self, u: SX) -> SX:
+        whole = if_else(u < 0.0, -floor(fabs(u)), floor(u))
+        texts = self._texts()
+        case = SX(len(texts) + 1.0)
+        for number in range(len(texts), 0, -1):
+            is_one = SX(0.0)
+            for text in texts[number - 1]:
+                is_one = logic_or(is_one, whole == float(text))
+            case = if_else(is_one, float(number), case)
+        return case
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {
+            port.name: if_else(x["case"] == float(number), 1.0, 0.0)
+            for number, port in enumerate(self.output_ports(), start=1)
+        }
+
+    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        # A positive border belongs to the number above it, a negative one to the number below.
+        return {
+            "borders": vertcat(
+                *(
+                    u["u"] - edge + (JUST if edge > 0.0 else -JUST)
+                    for edges in self._edges()
+                    for edge in edges
+                )
+            )
+        }
+
+    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"case": self._case(u["u"])}
+
+    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
+        return {"case": self._case(u["u"])}

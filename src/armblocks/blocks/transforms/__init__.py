@@ -1,0 +1,1 @@
+"""Blocks that compute with poses, rotations, quaternions and twists."""

@@ -1,0 +1,338 @@
+"""Orientations told by angles, quaternions or an axis, to poses and back; a pose is one 4x4 matrix.
+
+The names are the toolbox's. What each convention means, and what happens where an orientation has more than
+one set of angles, stands in :mod:`armblocks.spatial.orientation`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from casadi import SX, dot, horzcat, sqrt, vertcat
+
+from armblocks.blocks.example_signals import HALF_ANGLE, SPINNING_POSE, ZERO, corner_of
+from armblocks.diagram import Block, Port, Signals, WorkedExample, made, parameter
+from armblocks.spatial import orientation
+
+_T = Port("T", "the pose", shape=(4, 4))
+_QUATERNION = "scalar first: s, x, y, z"
+_CONVENTIONS = tuple(orientation.RPY_CONVENTIONS)
+
+
+def pose(R: SX, p: SX | None = None) -> SX:
+    """[R p; 0 0 0 1]; without ``p`` at the origin."""
+    top = horzcat(R, SX.zeros(3) if p is None else p)
+    return vertcat(top, horzcat(SX.zeros(1, 3), 1.0))
+
+
+def _angles(*names: str) -> tuple[Port, ...]:
+    return tuple(Port(name, f"the angle {name}", "rad", ()) for name in names)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rpy2T(Block):
+    """The pose turned by roll, pitch and yaw: zyx is T = Rz(yaw) Ry(pitch) Rx(roll), release 10's default.
+
+    ``xyz`` is Rx(yaw) Ry(pitch) Rz(roll), ``yxz`` Ry(yaw) Rx(pitch) Rz(roll); ``release 9`` (and 8) is
+    Rx(roll) Ry(pitch) Rz(yaw), ``release 7`` Rz(roll) Ry(pitch) Rx(yaw).
+    """
+
+    title: ClassVar[str] = "rpy2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A pose that only yaws: the corner of its rotation holds cosines and sines of the angle.",
+        inputs={"roll": ZERO, "pitch": ZERO, "yaw": made("Ramp").named("yaw")},
+        shown=(corner_of("T"),),
+    )
+
+    convention: str = parameter("zyx", choices=_CONVENTIONS, doc="order of the axes, or toolbox release")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _angles("roll", "pitch", "yaw")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(orientation.from_rpy(u["roll"], u["pitch"], u["yaw"], self.convention))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class T2rpy(Block):
+    """Roll, pitch and yaw of a pose, the inverse of rpy2T of the same convention, with abs(pitch) <= pi/2.
+
+    At pitch = pi/2 or -pi/2 only the sum or the difference of the others is known: roll is 0 there, and the
+    angles still give the pose.
+    """
+
+    title: ClassVar[str] = "T2rpy"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The three angles of a pose that was made of them come back; yaw wraps at pi.",
+        inputs={
+            "T": made("Rpy2T").by(
+                roll=made("SineWave", amplitude=0.5).named("roll"),
+                pitch=made("SineWave", amplitude=0.8, frequency=2.0).named("pitch"),
+                yaw=made("Ramp").named("yaw"),
+            )
+        },
+        shown=("roll", "pitch", "yaw"),
+    )
+
+    convention: str = parameter("zyx", choices=_CONVENTIONS, doc="order of the axes, or toolbox release")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return _angles("roll", "pitch", "yaw")
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        angles = orientation.to_rpy(u["T"][:3, :3], self.convention)
+        return dict(zip(("roll", "pitch", "yaw"), angles))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eul2T(Block):
+    """The pose turned by Euler angles ZYZ: T = Rz(phi) Ry(theta) Rz(psi)."""
+
+    title: ClassVar[str] = "eul2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "A pose that turns about z only: the corner of its rotation holds cosines and sines of the angle."
+        ),
+        inputs={"phi": made("Ramp").named("phi"), "theta": ZERO, "psi": ZERO},
+        shown=(corner_of("T"),),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return _angles("phi", "theta", "psi")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(orientation.from_euler(u["phi"], u["theta"], u["psi"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class T2eul(Block):
+    """Euler angles ZYZ of a pose, the inverse of eul2T, with 0 <= theta <= pi.
+
+    At theta = 0 or pi only the sum or the difference of the others is known: phi is 0 there, and the angles
+    still give the pose.
+    """
+
+    title: ClassVar[str] = "T2eul"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The three angles of a pose that was made of them come back; phi wraps at pi.",
+        inputs={
+            "T": made("Eul2T").by(
+                phi=made("Ramp").named("phi"),
+                theta=made("SineWave", amplitude=0.5, bias=1.0).named("theta"),
+                psi=made("SineWave", frequency=2.0).named("psi"),
+            )
+        },
+        shown=("phi", "theta", "psi"),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return _angles("phi", "theta", "psi")
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return dict(zip(("phi", "theta", "psi"), orientation.to_euler(u["T"][:3, :3])))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quaternion2T(Block):
+    """The pose turned by a quaternion (s, x, y, z), whose length does not matter: T = T(u / |u|)."""
+
+    title: ClassVar[str] = "Quaternion to Pose"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A quaternion (cos t/2, 0, 0, sin t/2) is a turn by t about z.",
+        inputs={"u": HALF_ANGLE},
+        shown=(corner_of("T"),),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", f"the quaternion, {_QUATERNION}", shape=(4,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(orientation.from_quaternion(u["u"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class T2Quaternion(Block):
+    """The unit quaternion (s, x, y, z) of a pose with s >= 0: s = cos(angle / 2), the rest along the axis.
+
+    A pose that passes a half turn makes it jump to its opposite, which is the same orientation.
+    """
+
+    title: ClassVar[str] = "Pose to Quaternion"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The quaternion of a pose that turns about z: cosine and sine of half the angle.",
+        inputs={"T": SPINNING_POSE},
+        shown=("y",),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", f"the quaternion, {_QUATERNION}", shape=(4,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": orientation.to_quaternion(u["T"][:3, :3])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngleAxis2T(Block):
+    """The pose turned about an axis of any length: R = I + sin(angle) [k] + (1 - cos(angle)) [k]^2."""
+
+    title: ClassVar[str] = "angvec2T"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A turn about the axis z: the corner of its rotation holds cosines and sines of the angle.",
+        inputs={
+            "angle": made("Ramp").named("angle"),
+            "axis": made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
+        },
+        shown=(corner_of("T"),),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("angle", "the angle", "rad", ()), Port("axis", "the axis, not zero", shape=(3,)))
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"T": pose(orientation.from_angle_axis(u["angle"], u["axis"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class T2AngleAxis(Block):
+    """Angle and unit axis of a pose, 0 <= angle <= pi; where nothing is turned the axis is (0, 0, 0)."""
+
+    title: ClassVar[str] = "T2angvec"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="Angle and axis of a pose that turns about z: beyond pi the shorter turn is about -z.",
+        inputs={"T": SPINNING_POSE},
+        shown=("angle", "axis"),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (_T,)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("angle", "the angle", "rad", ()), Port("axis", "the unit axis", shape=(3,)))
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        angle, axis = orientation.to_angle_axis(u["T"][:3, :3])
+        return {"angle": angle, "axis": axis}
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuaternionProduct(Block):
+    """Hamilton's product, one turn after the other: y = u v, R(y) = R(u) R(v)."""
+
+    title: ClassVar[str] = "Quaternion Multiplication"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A turn about z after a quarter turn about x.",
+        inputs={
+            "u": HALF_ANGLE,
+            "v": made("Constant", value=(0.7071067811865476, 0.7071067811865476, 0.0, 0.0)).named(
+                "quarter turn"
+            ),
+        },
+        shown=("y",),
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return tuple(Port(name, f"a quaternion, {_QUATERNION}", shape=(4,)) for name in "uv")
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", f"their product, {_QUATERNION}", shape=(4,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": orientation.quaternion_product(u["u"], u["v"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuaternionInverse(Block):
+    """The opposite turn: y = (s, -x, -y, -z) / |u|^2, so that u y = 1."""
+
+    title: ClassVar[str] = "Quaternion Inverse"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="The turn back: the vector part changes its sign.",
+        inputs={"u": HALF_ANGLE},
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", f"a quaternion, {_QUATERNION}", shape=(4,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", f"its inverse, {_QUATERNION}", shape=(4,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        value = u["u"]
+        return {"y": vertcat(value[0], -value[1:]) / dot(value, value)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuaternionNormalize(Block):
+    """The quaternion of unit length with the same orientation: y = u / |u|."""
+
+    title: ClassVar[str] = "Quaternion Normalize"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows="A quaternion that grows, brought to length 1.",
+        inputs={
+            "u": made("Ramp", slope=(0.1, 0.0, 0.0, 0.3), initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion")
+        },
+    )
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (Port("u", f"a quaternion, {_QUATERNION}", shape=(4,)),)
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", f"of unit length, {_QUATERNION}", shape=(4,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"y": u["u"] / sqrt(dot(u["u"], u["u"]))}
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuaternionRate(Block):
+    """How a quaternion changes at an angular velocity: y = 1/2 u w (body axes) or 1/2 w u (world axes)."""
+
+    title: ClassVar[str] = "Quaternion Rate"
+    example: ClassVar[WorkedExample] = WorkedExample(
+        shows=(
+            "Integrated at a steady angular velocity about z: the quaternion goes around with half the angle."
+        ),
+        inputs={
+            "u": made("Integrator", initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion").by(u="y"),
+            "w": made("Constant", value=(0.0, 0.0, 1.0)).named("angular velocity"),
+        },
+        shown=("u",),
+    )
+
+    axes: str = parameter("body", choices=("body", "world"), doc="the axes of the angular velocity")
+
+    def input_ports(self) -> tuple[Port, ...]:
+        return (
+            Port("u", f"the quaternion, {_QUATERNION}", shape=(4,)),
+            Port("w", "the angular velocity", "rad/s", (3,)),
+        )
+
+    def output_ports(self) -> tuple[Port, ...]:
+        return (Port("y", "its rate", "1/s", (4,)),)
+
+    def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        w = vertcat(0.0, u["w"])
+        factors = (u["u"], w) if self.axes == "body" else (w, u["u"])
+        return {"y": 0.5 * orientation.quaternion_product(*factors)}
