@@ -10,15 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.margins import shown_margins
 from armblocks.analysis.shown_values import (
     shown_dcgain,
-    shown_margins,
     shown_matrices,
-    shown_measures,
     shown_modes,
     shown_poles,
     shown_zeros,
 )
+from armblocks.analysis.time_response import shown_measures
 from armblocks.report.motion_summary import shown_summary, summarise
 from robots_for_tests import build_puma560
 from unordered import matched

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armblocks.analysis.state_space import StateSpaceModel, SystemT
 from armblocks.errors import InputError
 
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
 
-
-def _together(first: LinearSystem, second: LinearSystem) -> float:
+def _together(first: StateSpaceModel, second: StateSpaceModel) -> float:
     if first.dt != second.dt:
         raise InputError(
             f"systems with the sample times {first.dt:g} s and {second.dt:g} s are put together",
@@ -33,14 +30,14 @@ def _refuse_sizes(what: str, found: object, wanted: object) -> InputError:
     )
 
 
-def _states(first: LinearSystem, second: LinearSystem) -> dict[str, tuple[str, ...]]:
+def _states(first: StateSpaceModel, second: StateSpaceModel) -> dict[str, tuple[str, ...]]:
     """All states' names, if no two are alike."""
     names = (*first.states, *second.states)
     units = (*first.state_units, *second.state_units)
     return {"states": names if len(set(names)) == len(names) else (), "state_units": units}
 
 
-def series(second: LinearSystem, first: LinearSystem) -> LinearSystem:
+def series(second: SystemT, first: StateSpaceModel) -> SystemT:
     """``second`` behind ``first``. Raises ``InputError`` where the widths differ."""
     dt = _together(first, second)
     if second.D.shape[1] != first.D.shape[0]:
@@ -60,7 +57,7 @@ def series(second: LinearSystem, first: LinearSystem) -> LinearSystem:
     )
 
 
-def parallel(first: LinearSystem, second: LinearSystem) -> LinearSystem:
+def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
     """The sum of the outputs for the same inputs. Raises ``InputError`` where the widths differ."""
     dt = _together(first, second)
     if first.D.shape != second.D.shape:
@@ -78,7 +75,7 @@ def parallel(first: LinearSystem, second: LinearSystem) -> LinearSystem:
     )
 
 
-def feedback(forward: LinearSystem, back: LinearSystem | float, sign: int) -> LinearSystem:
+def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> SystemT:
     """``forward`` with ``back`` (a system, or a factor for each output) from its outputs to its inputs.
 
     Raises ``InputError`` where widths differ or the loop has no solution at all (``I - sign D D`` singular).

@@ -6,18 +6,16 @@ import io
 import json
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.files import write_atomically
-
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
 
 FORMAT = "armblocks linear system 1"
 
 
-def to_control(system: LinearSystem) -> Any:
+def to_control(system: StateSpaceModel) -> Any:
     """A ``control.StateSpace`` with the same matrices and names.
 
     Raises ``InputError`` where python-control is not installed.
@@ -51,7 +49,7 @@ def to_control(system: LinearSystem) -> Any:
     )
 
 
-def save(system: LinearSystem, path: str | PathLike[str]) -> None:
+def save(system: StateSpaceModel, path: str | PathLike[str]) -> None:
     """Write a file by its suffix. Raises ``UnknownNameError`` for another suffix, ``FormatError`` where the
     file cannot be written."""
     target = Path(path)
@@ -61,7 +59,7 @@ def save(system: LinearSystem, path: str | PathLike[str]) -> None:
     write_atomically(target, writers[target.suffix](system))
 
 
-def _description(system: LinearSystem) -> dict[str, Any]:
+def _description(system: StateSpaceModel) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "name": system.name,
@@ -76,12 +74,12 @@ def _description(system: LinearSystem) -> dict[str, Any]:
     }
 
 
-def _json(system: LinearSystem) -> bytes:
+def _json(system: StateSpaceModel) -> bytes:
     document = {**_description(system), **{letter: getattr(system, letter).tolist() for letter in "ABCD"}}
     return (json.dumps(document, indent=1) + "\n").encode()
 
 
-def _npz(system: LinearSystem) -> bytes:
+def _npz(system: StateSpaceModel) -> bytes:
     import numpy as np
 
     buffer = io.BytesIO()
@@ -91,7 +89,7 @@ def _npz(system: LinearSystem) -> bytes:
     return buffer.getvalue()
 
 
-def _mat(system: LinearSystem) -> bytes:
+def _mat(system: StateSpaceModel) -> bytes:
     """As MATLAB's ``ss(A, B, C, D, Ts)`` takes them."""
     import numpy as np
     from scipy.io import savemat

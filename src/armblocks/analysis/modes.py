@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.state_space import StateSpaceModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -28,7 +26,7 @@ class Mode:
     time_constant: float
 
 
-def poles(system: LinearSystem) -> Complex:
+def poles(system: StateSpaceModel) -> Complex:
     """Eigenvalues of A, slowest first, conjugates side by side with the positive one first.
 
     They are those of the irreducible diagonal blocks of A: a state in no loop has its eigenvalue without
@@ -61,7 +59,7 @@ def in_order(roots: Complex, *, discrete: bool = False) -> Complex:
     return roots[order]
 
 
-def modes(system: LinearSystem) -> tuple[Mode, ...]:
+def modes(system: StateSpaceModel) -> tuple[Mode, ...]:
     """One for each pole, in the order of ``poles``."""
     return tuple(mode_of(complex(pole), system.dt) for pole in poles(system))
 

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.scaling import balanced
-from armblocks.errors import InputError
-
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.state_space import SystemT
 
 Array = NDArray[np.float64]
 
@@ -49,7 +45,7 @@ def reachable_dimensions(A: Array, B: Array) -> int:
     return staircase(a, b)[1]
 
 
-def minimal(system: LinearSystem) -> LinearSystem:
+def minimal(system: SystemT) -> SystemT:
     """Without the unreachable, then without the unobservable; unchanged where nothing is to be taken off."""
     a, b, c = balanced(system.A, system.B, system.C)
     basis, reached = staircase(a, b)
@@ -69,7 +65,7 @@ def minimal(system: LinearSystem) -> LinearSystem:
     )
 
 
-def on_path(system: LinearSystem) -> LinearSystem:
+def on_path(system: SystemT) -> SystemT:
     """Keep the states on a way from some input to some output, by which entries are not zero."""
     links = system.A != 0.0
 
@@ -93,20 +89,3 @@ def on_path(system: LinearSystem) -> LinearSystem:
         states=tuple(system.states[k] for k in places),
         state_units=tuple(system.state_units[k] for k in places),
     )
-
-
-def gramians(system: LinearSystem) -> tuple[Array, Array]:
-    """Solutions of the Lyapunov equations of a stable system."""
-    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
-
-    if not system.is_stable:
-        raise InputError(
-            "gramians of a system that is not stable are asked for",
-            where=system.name,
-            allowed="stable systems: elsewhere the integrals grow without end",
-            fix="ask for controllability() and observability()",
-        )
-    inputs, outputs = system.B @ system.B.T, system.C.T @ system.C
-    if system.is_discrete:
-        return solve_discrete_lyapunov(system.A, inputs), solve_discrete_lyapunov(system.A.T, outputs)
-    return solve_continuous_lyapunov(system.A, -inputs), solve_continuous_lyapunov(system.A.T, -outputs)

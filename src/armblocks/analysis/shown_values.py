@@ -17,19 +17,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.analysis.frequency import Margins, evaluate, on_the_edge
+from armblocks.analysis.frequency import dcgain
 from armblocks.analysis.modes import Mode, in_order, irreducible_parts, mode_of
+from armblocks.analysis.reduction import minimal
 from armblocks.analysis.scaling import balanced
-from armblocks.analysis.zeros import zero_pencil
-
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
-    from armblocks.analysis.time_response import StepMeasures, TimeResponse
+from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.analysis.zeros import zero_pencil, zeros
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -81,7 +78,7 @@ def _candidates(root: complex, discrete: bool) -> tuple[complex, ...]:
     return 0j, 1 + 0j, real, *on_circle
 
 
-def shown_poles(system: LinearSystem) -> Complex:
+def shown_poles(system: StateSpaceModel) -> Complex:
     """:meth:`LinearSystem.poles` (nx,), without rounding errors about 0, 1, the axes and the unit circle."""
     from scipy.linalg import eigvals
 
@@ -100,17 +97,17 @@ def shown_poles(system: LinearSystem) -> Complex:
     return in_order(np.array(shown, dtype=np.complex128), discrete=system.is_discrete)
 
 
-def shown_zeros(system: LinearSystem) -> Complex:
+def shown_zeros(system: StateSpaceModel) -> Complex:
     """:meth:`LinearSystem.zeros`; likewise."""
     found = zero_pencil(system.A, system.B, system.C, system.D)
     if found is None:
         return np.empty(0, dtype=np.complex128)
     pencil = _Pencil(*found)
-    roots = system.zeros().tolist()
+    roots = zeros(system).tolist()
     return in_order(np.array([pencil.shown(root, _candidates(root, system.is_discrete)) for root in roots]))
 
 
-def shown_modes(system: LinearSystem) -> tuple[Mode, ...]:
+def shown_modes(system: StateSpaceModel) -> tuple[Mode, ...]:
     """:meth:`LinearSystem.damp` of the poles that are shown."""
     found: list[Mode] = []
     for pole in shown_poles(system).tolist():
@@ -127,7 +124,7 @@ def on_edge(pole: complex, *, discrete: bool) -> bool:
     return abs(abs(pole) - 1.0) <= 2.0 * EPSILON if discrete else pole.real == 0.0
 
 
-def growth(system: LinearSystem) -> float:
+def growth(system: StateSpaceModel) -> float:
     """Of the poles that are shown the largest real part, or ``|z| - 1``: 0 on the edge of stability, ``-inf``
     without poles."""
     discrete = system.is_discrete
@@ -138,7 +135,12 @@ def growth(system: LinearSystem) -> float:
     return max(rates, default=-math.inf)
 
 
-def _response_errors(system: LinearSystem, place: complex) -> tuple[float, float]:
+def is_stable(system: StateSpaceModel) -> bool:
+    """Whether every free motion dies away: see :attr:`LinearSystem.is_stable`."""
+    return growth(system) < 0.0
+
+
+def response_errors(system: StateSpaceModel, place: complex) -> tuple[float, float]:
     """Of a system with one input and one output: bound of the rounding error of its response at a complex
     number, and the magnitude of the derivative of the response there."""
     n = system.order
@@ -156,75 +158,18 @@ def _response_errors(system: LinearSystem, place: complex) -> tuple[float, float
     return ROUNDOFFS * n * EPSILON * (size + direct), abs(complex(left @ right))
 
 
-def shown_dcgain(system: LinearSystem) -> Array:
+def shown_dcgain(system: StateSpaceModel) -> Array:
     """:meth:`LinearSystem.dcgain` (ny, nu); 0 where it is 0 to the accuracy of the computation."""
-    gains = system.dcgain().copy()
+    gains = dcgain(system).copy()
     place = 1.0 if system.is_discrete else 0.0
     for row, column in np.argwhere(np.isfinite(gains) & (gains != 0.0)).tolist():
-        part = system.select([system.outputs[row]], [system.inputs[column]]).minimal()
-        if abs(gains[row, column]) <= _response_errors(part, place)[0]:
+        part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
+        if abs(gains[row, column]) <= response_errors(part, place)[0]:
             gains[row, column] = 0.0
     return gains
 
 
-def shown_margins(system: LinearSystem) -> Margins:
-    """:meth:`LinearSystem.margins`; 0 dB, 0 deg, 0 s and a distance of 0 where the loop goes through -1 to
-    the accuracy of the computation."""
-    found = system.margins()
-    loop = system.minimal()
-
-    def accuracy(frequency: float) -> tuple[float, float]:
-        """Error of the response at a frequency that was sought, relative to the response; the response."""
-        if math.isinf(frequency):
-            return EPSILON, abs(float(loop.D[0, 0]))
-        place = complex(on_the_edge(loop, np.array([frequency]))[0])
-        value = abs(complex(evaluate(loop, np.array([place]))[0, 0, 0]))
-        error, derivative = _response_errors(loop, place)
-        # The frequency itself was found to this error of the response and to its own last bits.
-        return (2.0 * error + 4.0 * EPSILON * frequency * derivative) / max(value, 1e-300), value
-
-    gains = [(f, 1.0 if abs(k - 1.0) <= accuracy(f)[0] else k) for f, k in found.gain_crossings]
-    phases = [
-        (f, 0.0 if abs(angle) <= math.degrees(accuracy(f)[0]) else angle)
-        for f, angle in found.phase_crossings
-    ]
-    gain = min(gains, key=lambda pair: abs(math.log(pair[1])), default=(math.nan, math.inf))
-    phase = min(phases, key=lambda pair: abs(pair[1]), default=(math.nan, math.inf))
-    delays = [(f, math.radians(angle % 360.0) / f) for f, angle in phases]
-    delay = min(delays, key=lambda pair: pair[1], default=(math.nan, math.inf))
-    touching = found.modulus <= math.prod(accuracy(found.modulus_frequency))
-    return dataclasses.replace(
-        found,
-        gain=gain[1],
-        gain_frequency=gain[0],
-        phase=phase[1],
-        phase_frequency=phase[0],
-        delay=delay[1],
-        delay_frequency=delay[0],
-        modulus=0.0 if touching else found.modulus,
-        gain_crossings=tuple(gains),
-        phase_crossings=tuple(phases),
-    )
-
-
-def shown_measures(response: TimeResponse, output: int = 0, column: int = 0) -> StepMeasures:
-    """:meth:`TimeResponse.measures`; overshoot and undershoot are 0 where rounding alone makes them."""
-    found = response.measures(output, column)
-    system = response.system
-    if not found.final or not math.isfinite(found.final):
-        return found
-    # Every instant is a product with the same matrix, and the output a sum over the states.
-    terms = np.abs(response.states[:, :, column]) @ np.abs(system.C[output]) + abs(system.D[output, column])
-    errors = max(system.order, 1) * response.time.size * EPSILON * float(terms.max())
-    least = 100.0 * ROUNDOFFS * errors / abs(found.final)
-    return dataclasses.replace(
-        found,
-        overshoot=found.overshoot if found.overshoot > least else 0.0,
-        undershoot=found.undershoot if found.undershoot > least else 0.0,
-    )
-
-
-def shown_matrices(system: LinearSystem) -> tuple[Array, Array, Array, Array]:
+def shown_matrices(system: StateSpaceModel) -> tuple[Array, Array, Array, Array]:
     """A, B, C and D; an entry is 0 where it is a rounding error beside the others of its row and its column.
 
     States, inputs and outputs are compared in units in which all numbers are of one size: no choice of units

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from html import escape
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.shown_values import growth, shown_matrices, shown_modes, shown_poles
-
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
+from armblocks.analysis.state_space import StateSpaceModel
 
 Array = NDArray[np.float64]
 
@@ -43,7 +40,7 @@ def complex_number(value: complex, digits: int = 5) -> str:
     return f"{number(value.real, digits)} {sign} {number(abs(value.imag), digits)}j"
 
 
-def heading(system: LinearSystem) -> str:
+def heading(system: StateSpaceModel) -> str:
     """What it is, in one line."""
     kind = f"sampled every {system.dt:g} s" if system.is_discrete else "continuous"
     counts = ", ".join(
@@ -58,7 +55,7 @@ def heading(system: LinearSystem) -> str:
     return f"{system.name or 'linear system'}{when}: {kind}, {counts}, {stability(system)}"
 
 
-def stability(system: LinearSystem) -> str:
+def stability(system: StateSpaceModel) -> str:
     """In words; a pole on the edge is neither stable nor growing."""
     largest = growth(system)
     if largest < 0.0:
@@ -89,7 +86,7 @@ def _shown(count: int) -> list[int | None]:
     return [*range(half), None, *range(count - half, count)]
 
 
-def matrices(system: LinearSystem) -> list[tuple[str, Array, tuple[str, ...], tuple[str, ...]]]:
+def matrices(system: StateSpaceModel) -> list[tuple[str, Array, tuple[str, ...], tuple[str, ...]]]:
     """Letter, matrix as it is shown, names of rows and of columns; only those that have entries."""
     A, B, C, D = shown_matrices(system)
     all_four = [
@@ -101,7 +98,7 @@ def matrices(system: LinearSystem) -> list[tuple[str, Array, tuple[str, ...], tu
     return [entry for entry in all_four if entry[1].size]
 
 
-def system_text(system: LinearSystem) -> str:
+def system_text(system: StateSpaceModel) -> str:
     """Heading, matrices, poles."""
     lines = [f"<LinearSystem {heading(system)}>"]
     for letter, matrix, rows, columns in matrices(system):
@@ -114,7 +111,7 @@ def system_text(system: LinearSystem) -> str:
     return "\n".join(lines)
 
 
-def system_html(system: LinearSystem) -> str:
+def system_html(system: StateSpaceModel) -> str:
     """Heading, matrices and a table of the poles, as one self-contained piece of HTML."""
     parts = [
         f'<div class="ab-linear"><style>{STYLE}</style><h3>Linear system</h3><p>{escape(heading(system))}</p>'

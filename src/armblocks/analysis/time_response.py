@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.analysis.modes import poles
+from armblocks.analysis.reduction import minimal
+from armblocks.analysis.shown_values import EPSILON, ROUNDOFFS, is_stable, shown_dcgain
+from armblocks.analysis.state_space import StateSpaceModel, SystemT
 from armblocks.errors import InputError
 
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
-
 Array = NDArray[np.float64]
+
+SystemT_co = TypeVar("SystemT_co", bound=StateSpaceModel, covariant=True)
 
 MOST_INSTANTS = 20_000
 
@@ -38,13 +42,13 @@ class StepMeasures:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TimeResponse:
+class TimeResponse(Generic[SystemT_co]):
     """``values`` (N, ny, nu): every output for every input by itself, at ``time`` (N,) s.
 
     A forced response has one column for all inputs together. ``states`` (N, nx, nu) likewise.
     """
 
-    system: LinearSystem
+    system: SystemT_co
     kind: str
     time: Array
     values: Array
@@ -52,21 +56,19 @@ class TimeResponse:
 
     def measures(self, output: int = 0, column: int = 0) -> StepMeasures:
         """Rise, settling and overshoot of one step response."""
-        from armblocks.analysis.shown_values import shown_dcgain
-
-        final = float(shown_dcgain(self.system)[output, column]) if self.system.is_stable else math.nan
+        final = float(shown_dcgain(self.system)[output, column]) if is_stable(self.system) else math.nan
         return step_measures(self.time, self.values[:, output, column], final)
 
 
-def natural_times(system: LinearSystem) -> tuple[float, float]:
+def natural_times(system: StateSpaceModel) -> tuple[float, float]:
     """How long the slowest motion takes to die away (or to show how it grows), and the fastest time, s."""
-    small = system.minimal()
-    poles = small.poles()
+    small = minimal(system)
+    roots = poles(small)
     if small.is_discrete:
-        poles = np.log(poles[np.abs(poles) > 1e-6]) / small.dt
-    sizes = np.abs(poles)
+        roots = np.log(roots[np.abs(roots) > 1e-6]) / small.dt
+    sizes = np.abs(roots)
     largest = float(sizes.max(initial=0.0))
-    moving = poles[sizes > 1e-9 * largest] if largest > 0.0 else poles[:0]
+    moving = roots[sizes > 1e-9 * largest] if largest > 0.0 else roots[:0]
     if not moving.size:
         return (100.0 * system.dt if system.is_discrete else 1.0), 1.0
     fastest = 1.0 / largest
@@ -84,7 +86,7 @@ def natural_times(system: LinearSystem) -> tuple[float, float]:
     return span, fastest
 
 
-def _instants(system: LinearSystem, stop_time: float | None, points: int) -> Array:
+def _instants(system: StateSpaceModel, stop_time: float | None, points: int) -> Array:
     span, fastest = natural_times(system)
     end = span if stop_time is None else float(stop_time)
     if not (math.isfinite(end) and end > 0.0):
@@ -120,7 +122,7 @@ def _powers(transition: Array, start: Array, count: int) -> Array:
     return states
 
 
-def step_response(system: LinearSystem, stop_time: float | None, points: int) -> TimeResponse:
+def step_response(system: SystemT, stop_time: float | None, points: int) -> TimeResponse[SystemT]:
     """Of every output to every input; ``stop_time`` s, or long enough for the slowest motion."""
     time = _instants(system, stop_time, points)
     n, nu = system.B.shape
@@ -133,7 +135,7 @@ def step_response(system: LinearSystem, stop_time: float | None, points: int) ->
     )
 
 
-def impulse_response(system: LinearSystem, stop_time: float | None, points: int) -> TimeResponse:
+def impulse_response(system: SystemT, stop_time: float | None, points: int) -> TimeResponse[SystemT]:
     """Of every output to every input. The jump of a direct way at time 0 is not shown: it has no height."""
     time = _instants(system, stop_time, points)
     n = system.order
@@ -149,7 +151,7 @@ def impulse_response(system: LinearSystem, stop_time: float | None, points: int)
     return TimeResponse(system=system, kind="impulse", time=time, values=values, states=states)
 
 
-def _held(system: LinearSystem, step: float) -> Array:
+def _held(system: StateSpaceModel, step: float) -> Array:
     """The map of ``[x; u]`` over a step with the inputs held."""
     from scipy.linalg import expm
 
@@ -163,8 +165,8 @@ def _held(system: LinearSystem, step: float) -> Array:
 
 
 def forced_response(
-    system: LinearSystem, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None
-) -> TimeResponse:
+    system: SystemT, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None
+) -> TimeResponse[SystemT]:
     """See :meth:`LinearSystem.response`. Raises ``InputError`` for shapes and instants that do not fit."""
     from scipy.linalg import expm
 
@@ -272,3 +274,20 @@ def _settled_after(time: Array, shares: Array, band: float) -> float:
         return math.nan
     off, on = abs(shares[k] - 1.0), abs(shares[k + 1] - 1.0)
     return float(time[k] + (off - band) / (off - on) * (time[k + 1] - time[k]))
+
+
+def shown_measures(response: TimeResponse[StateSpaceModel], output: int = 0, column: int = 0) -> StepMeasures:
+    """:meth:`TimeResponse.measures`; overshoot and undershoot are 0 where rounding alone makes them."""
+    found = response.measures(output, column)
+    system = response.system
+    if not found.final or not math.isfinite(found.final):
+        return found
+    # Every instant is a product with the same matrix, and the output a sum over the states.
+    terms = np.abs(response.states[:, :, column]) @ np.abs(system.C[output]) + abs(system.D[output, column])
+    errors = max(system.order, 1) * response.time.size * EPSILON * float(terms.max())
+    least = 100.0 * ROUNDOFFS * errors / abs(found.final)
+    return dataclasses.replace(
+        found,
+        overshoot=found.overshoot if found.overshoot > least else 0.0,
+        undershoot=found.undershoot if found.undershoot > least else 0.0,
+    )

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.analysis.frequency import evaluate
+from armblocks.analysis.modes import poles
+from armblocks.analysis.reduction import minimal
+from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.analysis.zeros import zeros
 from armblocks.errors import InputError
-
-if TYPE_CHECKING:
-    from armblocks.analysis.linear_system import LinearSystem
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -52,7 +53,7 @@ class TransferFunction:
         return f"{above.center(width).rstrip()}\n{'-' * width}\n{below.center(width).rstrip()}"
 
 
-def transfer_function(system: LinearSystem) -> TransferFunction:
+def transfer_function(system: StateSpaceModel) -> TransferFunction:
     """Of a system with one input and one output; roots that stand in both are taken off."""
     if not system.is_siso:
         raise InputError(
@@ -61,18 +62,18 @@ def transfer_function(system: LinearSystem) -> TransferFunction:
             allowed="one of each",
             fix="choose with system.select(output, input)",
         )
-    small = system.minimal()
-    zeros, poles = small.zeros(), small.poles()
+    small = minimal(system)
+    found_zeros, found_poles = zeros(small), poles(small)
     # The gain from the value at a place far from all roots, where no factor is small.
-    far = 2.0 * max(1e-300, float(np.abs(np.concatenate([zeros, poles])).max(initial=0.0))) or 1.0
-    far = far if len(zeros) + len(poles) else 1.0
-    value = complex(small.at(far)[0, 0])
+    far = 2.0 * max(1e-300, float(np.abs(np.concatenate([found_zeros, found_poles])).max(initial=0.0))) or 1.0
+    far = far if len(found_zeros) + len(found_poles) else 1.0
+    value = complex(evaluate(small, np.array([far], dtype=np.complex128))[0, 0, 0])
     # Factor by factor in pairs, so that nothing overflows.
     gain = value
-    for k in range(max(len(zeros), len(poles))):
-        gain *= (far - poles[k]) if k < len(poles) else 1.0
-        gain /= (far - zeros[k]) if k < len(zeros) else 1.0
-    return TransferFunction(zeros=zeros, poles=poles, gain=float(np.real(gain)), dt=system.dt)
+    for k in range(max(len(found_zeros), len(found_poles))):
+        gain *= (far - found_poles[k]) if k < len(found_poles) else 1.0
+        gain /= (far - found_zeros[k]) if k < len(found_zeros) else 1.0
+    return TransferFunction(zeros=found_zeros, poles=found_poles, gain=float(np.real(gain)), dt=system.dt)
 
 
 def _multiplied_out(roots: Complex) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.modes import in_order
 from armblocks.analysis.scaling import balanced
+from armblocks.analysis.state_space import StateSpaceModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -24,6 +25,11 @@ def invariant_zeros(A: Array, B: Array, C: Array, D: Array) -> Complex:
 
     pencil = zero_pencil(A, B, C, D)
     return np.empty(0, dtype=np.complex128) if pencil is None else in_order(eigvals(*pencil[:2]))
+
+
+def zeros(system: StateSpaceModel) -> Complex:
+    """The invariant zeros of a system."""
+    return invariant_zeros(system.A, system.B, system.C, system.D)
 
 
 def zero_pencil(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array, float] | None:

@@ -150,7 +150,7 @@ def _print_poles(system: LinearSystem, console: Console, *, hertz: bool) -> None
 
 
 def _print_margins(system: LinearSystem, console: Console, *, hertz: bool) -> None:
-    from armblocks.analysis.shown_values import shown_margins
+    from armblocks.analysis.margins import shown_margins
 
     found = shown_margins(system)
     rows = table(("margin of 1 + L", "left"), ("", "right"), ("at", "right"))

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.frequency import (
-    Margins,
     as_continuous,
     evaluate,
     frequency_grid,
@@ -17,7 +16,7 @@ from armblocks.analysis.frequency import (
     gain_and_phase,
 )
 from armblocks.analysis.linear_system import LinearSystem
-from armblocks.analysis.shown_values import shown_margins
+from armblocks.analysis.margins import Margins, shown_margins
 from armblocks.pictures.numbers import MINUS, table_number
 from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, Tone, trace_dash, trace_tone

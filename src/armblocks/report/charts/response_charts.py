@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.linear_system import LinearSystem
-from armblocks.analysis.shown_values import shown_measures
-from armblocks.analysis.time_response import StepMeasures, TimeResponse
+from armblocks.analysis.time_response import StepMeasures, TimeResponse, shown_measures
 from armblocks.pictures.numbers import table_number
 from armblocks.pictures.picture import Disc, Mark, Picture, Polyline, Rectangle, Text
 from armblocks.pictures.style import FIGURE_WIDTH, SMALL_SIZE, Tone, trace_dash, trace_tone
@@ -63,7 +62,7 @@ def _names(system: LinearSystem) -> list[str]:
     return [name for _, _, name in channels(system)]
 
 
-def _response_picture(response: TimeResponse, what: str, width: float) -> tuple[Picture, Field]:
+def _response_picture(response: TimeResponse[LinearSystem], what: str, width: float) -> tuple[Picture, Field]:
     system = response.system
     shown = channels(system)
     values = np.concatenate([response.values[:, row, column] for row, column, _ in shown])

@@ -1,0 +1,29 @@
+"""Gramians: how strongly inputs reach the states of a stable system, and outputs show them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.shown_values import is_stable
+from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
+    """Solutions of the Lyapunov equations of a stable system."""
+    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
+
+    if not is_stable(system):
+        raise InputError(
+            "gramians of a system that is not stable are asked for",
+            where=system.name,
+            allowed="stable systems: elsewhere the integrals grow without end",
+            fix="ask for controllability() and observability()",
+        )
+    inputs, outputs = system.B @ system.B.T, system.C.T @ system.C
+    if system.is_discrete:
+        return solve_discrete_lyapunov(system.A, inputs), solve_discrete_lyapunov(system.A.T, outputs)
+    return solve_continuous_lyapunov(system.A, -inputs), solve_continuous_lyapunov(system.A.T, -outputs)

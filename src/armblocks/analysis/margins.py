@@ -1,0 +1,236 @@
+"""Margins of a loop, and the bandwidth of a system."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.analysis.connections import feedback
+from armblocks.analysis.frequency import (
+    evaluate,
+    frequency_grid,
+    frequency_range,
+    frequency_response,
+    on_the_edge,
+)
+from armblocks.analysis.reduction import minimal
+from armblocks.analysis.shown_values import EPSILON, is_stable, response_errors, shown_dcgain
+from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.errors import InputError
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_BISECTIONS = 90
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Margins:
+    """How far a loop ``1 + L`` is from the edge of stability.
+
+    ``gain`` the factor (and ``gain_decibels``) by which L may grow, or where below 1 may shrink, nearest to
+    1; ``phase`` degrees; ``delay`` s; each ``inf`` where nothing of the kind makes the loop unstable. They
+    are found at ``gain_frequency``, ``phase_frequency`` and ``delay_frequency`` rad/s (``nan`` where there
+    is none). ``modulus``: the least distance of L from -1, the inverse of the peak of ``1 / (1 + L)``.
+    ``stable``: whether the closed loop is. All crossings stand in ``gain_crossings`` (frequency, factor) and
+    ``phase_crossings`` (frequency, degrees).
+    """
+
+    gain: float
+    gain_frequency: float
+    phase: float
+    phase_frequency: float
+    delay: float
+    delay_frequency: float
+    modulus: float
+    modulus_frequency: float
+    stable: bool
+    gain_crossings: tuple[tuple[float, float], ...]
+    phase_crossings: tuple[tuple[float, float], ...]
+
+    @property
+    def gain_decibels(self) -> float:
+        """The gain margin in dB."""
+        return 20.0 * math.log10(self.gain) if math.isfinite(self.gain) else math.inf
+
+
+def _located(function: Callable[[float], float], low: float, high: float) -> float:
+    """The zero between two frequencies with values of opposite sign, to the last digits (bisection)."""
+    below = function(low)
+    for _ in range(_BISECTIONS):
+        middle = math.sqrt(low * high)
+        if not low < middle < high:
+            break
+        value = function(middle)
+        if (value < 0.0) == (below < 0.0):
+            low, below = middle, value
+        else:
+            high = middle
+    return math.sqrt(low * high)
+
+
+def _response_at(system: StateSpaceModel, frequency: float) -> complex:
+    return complex(frequency_response(system, np.array([frequency]))[0, 0, 0])
+
+
+def margins(system: StateSpaceModel) -> Margins:
+    """Margins of the loop with negative feedback around this system; see :class:`Margins`.
+
+    Crossings are sought on a grid that is closer about lightly damped modes, then located by bisection.
+    Raises ``InputError`` for more than one input or output.
+    """
+    if not system.is_siso:
+        raise InputError(
+            f"margins of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs are asked for",
+            where=system.name,
+            allowed="one of each",
+            fix="choose with system.select(output, input)",
+        )
+    loop = minimal(system)
+    low, high = frequency_range(loop)
+    top = high if loop.is_discrete else 1e3 * high
+    grid = frequency_grid(loop, 1e-3 * low, top, 2000)
+    response = frequency_response(loop, grid)[:, 0, 0]
+    phase_crossings: list[tuple[float, float]] = []
+    gain_crossings: list[tuple[float, float]] = []
+
+    def size(frequency: float) -> float:
+        return abs(_response_at(loop, frequency)) - 1.0
+
+    def side(frequency: float) -> float:
+        return _response_at(loop, frequency).imag
+
+    above = np.abs(response) > 1.0
+    for k in np.flatnonzero(above[1:] != above[:-1]).tolist():
+        frequency = _located(size, float(grid[k]), float(grid[k + 1]))
+        angle = math.degrees(math.atan2(*(lambda v: (v.imag, v.real))(-_response_at(loop, frequency))))
+        phase_crossings.append((frequency, angle))
+    upper = response.imag > 0.0
+    for k in np.flatnonzero((upper[1:] != upper[:-1]) & (response.real[1:] < 0.0)).tolist():
+        frequency = _located(side, float(grid[k]), float(grid[k + 1]))
+        value = _response_at(loop, frequency)
+        if value.real < 0.0 and abs(value.imag) <= 1e-6 * abs(value):
+            gain_crossings.append((frequency, -1.0 / value.real))
+    for frequency in (0.0, math.pi / loop.dt if loop.is_discrete else math.inf):
+        value = complex(loop.D[0, 0]) if math.isinf(frequency) else _response_at(loop, frequency)
+        if math.isfinite(value.real) and value.real < 0.0:
+            gain_crossings.append((frequency, -1.0 / value.real))
+    return _gathered(loop, grid, response, gain_crossings, phase_crossings)
+
+
+def _gathered(
+    loop: StateSpaceModel,
+    grid: Array,
+    response: Complex,
+    gains: list[tuple[float, float]],
+    phases: list[tuple[float, float]],
+) -> Margins:
+    gain = min(gains, key=lambda pair: abs(math.log(pair[1])), default=(math.nan, math.inf))
+    phase = min(phases, key=lambda pair: abs(pair[1]), default=(math.nan, math.inf))
+    delays = [(frequency, math.radians(angle % 360.0) / frequency) for frequency, angle in phases]
+    delay = min(delays, key=lambda pair: pair[1], default=(math.nan, math.inf))
+    frequency, modulus = _nearest_to_minus_one(loop, grid, response)
+    return Margins(
+        gain=gain[1],
+        gain_frequency=gain[0],
+        phase=phase[1],
+        phase_frequency=phase[0],
+        delay=delay[1],
+        delay_frequency=delay[0],
+        modulus=modulus,
+        modulus_frequency=frequency,
+        stable=is_stable(feedback(loop, 1.0, -1)) if abs(1.0 + loop.D[0, 0]) > 1e-12 else False,
+        gain_crossings=tuple(gains),
+        phase_crossings=tuple(phases),
+    )
+
+
+def _nearest_to_minus_one(loop: StateSpaceModel, grid: Array, response: Complex) -> tuple[float, float]:
+    """The least ``|1 + L|`` by golden sections between the neighbours of the nearest point of the grid."""
+    k = int(np.nanargmin(np.abs(1.0 + response)))
+    low, high = float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
+    ratio = (math.sqrt(5.0) - 1.0) / 2.0
+    for _ in range(60):
+        a, b = high - ratio * (high - low), low + ratio * (high - low)
+        if abs(1.0 + _response_at(loop, a)) < abs(1.0 + _response_at(loop, b)):
+            high = b
+        else:
+            low = a
+    frequency = (low + high) / 2.0
+    return frequency, abs(1.0 + _response_at(loop, frequency))
+
+
+def bandwidth(system: StateSpaceModel, drop: float) -> float:
+    """See :meth:`LinearSystem.bandwidth`; ``inf`` where the gain never falls so far."""
+    if not system.is_siso:
+        raise InputError(
+            f"the bandwidth of {system.D.shape[1]} inputs and {system.D.shape[0]} outputs is asked for",
+            where=system.name,
+            allowed="one of each",
+            fix="choose with system.select(output, input)",
+        )
+    rest = abs(float(shown_dcgain(system)[0, 0]))
+    if not math.isfinite(rest) or rest == 0.0:
+        raise InputError(
+            f"the gain at rest is {rest:g}",
+            where=system.name,
+            allowed="a finite gain at rest that is not 0",
+            fix="ask for the bandwidth of the closed loop",
+        )
+    level = rest * 10.0 ** (-drop / 20.0)
+    low, high = frequency_range(system)
+    grid = frequency_grid(system, 1e-3 * low, high if system.is_discrete else 1e3 * high, 2000)
+    below = np.abs(frequency_response(system, grid)[:, 0, 0]) < level
+    if not below.any():
+        return math.inf
+    k = int(np.argmax(below))
+    if k == 0:
+        return float(grid[0])
+    return _located(
+        lambda frequency: abs(_response_at(system, frequency)) - level, float(grid[k - 1]), float(grid[k])
+    )
+
+
+def shown_margins(system: StateSpaceModel) -> Margins:
+    """:meth:`LinearSystem.margins`; 0 dB, 0 deg, 0 s and a distance of 0 where the loop goes through -1 to
+    the accuracy of the computation."""
+    found = margins(system)
+    loop = minimal(system)
+
+    def accuracy(frequency: float) -> tuple[float, float]:
+        """Error of the response at a frequency that was sought, relative to the response; the response."""
+        if math.isinf(frequency):
+            return EPSILON, abs(float(loop.D[0, 0]))
+        place = complex(on_the_edge(loop, np.array([frequency]))[0])
+        value = abs(complex(evaluate(loop, np.array([place]))[0, 0, 0]))
+        error, derivative = response_errors(loop, place)
+        # The frequency itself was found to this error of the response and to its own last bits.
+        return (2.0 * error + 4.0 * EPSILON * frequency * derivative) / max(value, 1e-300), value
+
+    gains = [(f, 1.0 if abs(k - 1.0) <= accuracy(f)[0] else k) for f, k in found.gain_crossings]
+    phases = [
+        (f, 0.0 if abs(angle) <= math.degrees(accuracy(f)[0]) else angle)
+        for f, angle in found.phase_crossings
+    ]
+    gain = min(gains, key=lambda pair: abs(math.log(pair[1])), default=(math.nan, math.inf))
+    phase = min(phases, key=lambda pair: abs(pair[1]), default=(math.nan, math.inf))
+    delays = [(f, math.radians(angle % 360.0) / f) for f, angle in phases]
+    delay = min(delays, key=lambda pair: pair[1], default=(math.nan, math.inf))
+    touching = found.modulus <= math.prod(accuracy(found.modulus_frequency))
+    return dataclasses.replace(
+        found,
+        gain=gain[1],
+        gain_frequency=gain[0],
+        phase=phase[1],
+        phase_frequency=phase[0],
+        delay=delay[1],
+        delay_frequency=delay[0],
+        modulus=0.0 if touching else found.modulus,
+        gain_crossings=tuple(gains),
+        phase_crossings=tuple(phases),
+    )

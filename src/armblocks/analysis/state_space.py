@@ -1,0 +1,162 @@
+"""The matrices of a linear system with names: the data about which the functions of this package compute."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import TYPE_CHECKING, Self, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from armblocks.analysis.operating_point import OperatingPoint
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StateSpaceModel:
+    """``x' = A x + B u, y = C x + D u`` where ``dt`` is 0, else ``x[k+1] = A x[k] + B u[k]`` every ``dt`` s.
+
+    ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are small changes about the
+    operating ``point``. ``states``, ``inputs`` and ``outputs`` name the scalars, with their SI units; without
+    names they are ``x1``, ``u1``, ``y1`` … Raises ``InputError`` for matrices that do not fit together or
+    hold what is not a finite number.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    _: KW_ONLY
+    dt: float = 0.0
+    states: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    state_units: tuple[str, ...] = ()
+    input_units: tuple[str, ...] = ()
+    output_units: tuple[str, ...] = ()
+    name: str = ""
+    point: OperatingPoint | None = None
+
+    def __post_init__(self) -> None:
+        sizes = _checked_matrices(self)
+        for letter, kind, size in zip("xuy", ("state", "input", "output"), sizes):
+            given: tuple[str, ...] = tuple(getattr(self, f"{kind}s"))
+            names = given or tuple(f"{letter}{k + 1}" for k in range(size))
+            units: tuple[str, ...] = tuple(getattr(self, f"{kind}_units")) or ("",) * size
+            if len(names) != size or len(units) != size:
+                raise InputError(
+                    f"{len(names)} names and {len(units)} units are given for the {kind}s",
+                    allowed=f"one for each of the {size}",
+                    where="linear system",
+                    fix="give as many, or leave them out",
+                )
+            object.__setattr__(self, f"{kind}s", names)
+            object.__setattr__(self, f"{kind}_units", units)
+        if not (np.isfinite(self.dt) and self.dt >= 0.0):
+            raise InputError(
+                f"the sample time is {self.dt}",
+                allowed="0 (continuous) or a finite time > 0 s",
+                where="linear system",
+                fix="give dt in seconds",
+            )
+
+    @property
+    def order(self) -> int:
+        """Count of states."""
+        return self.A.shape[0]
+
+    @property
+    def is_discrete(self) -> bool:
+        """Whether the system moves in steps of ``dt``."""
+        return self.dt > 0.0
+
+    @property
+    def is_siso(self) -> bool:
+        """Whether there is one input and one output."""
+        return self.D.shape == (1, 1)
+
+    def select(
+        self, outputs: str | Sequence[str] | None = None, inputs: str | Sequence[str] | None = None
+    ) -> Self:
+        """The same system seen through some of its ends: names, or the name of a vector for all its entries.
+
+        Raises ``UnknownNameError``.
+        """
+        rows = _chosen(self.outputs, outputs, "output")
+        columns = _chosen(self.inputs, inputs, "input")
+        return dataclasses.replace(
+            self,
+            B=self.B[:, columns],
+            C=self.C[rows],
+            D=self.D[np.ix_(rows, columns)],
+            inputs=tuple(self.inputs[k] for k in columns),
+            outputs=tuple(self.outputs[k] for k in rows),
+            input_units=tuple(self.input_units[k] for k in columns),
+            output_units=tuple(self.output_units[k] for k in rows),
+        )
+
+    def transformed(self, T: ArrayLike) -> Self:
+        """The same system in other states, ``x = T x_new``."""
+        matrix = np.asarray(T, dtype=np.float64)
+        return dataclasses.replace(
+            self,
+            A=np.linalg.solve(matrix, self.A @ matrix),
+            B=np.linalg.solve(matrix, self.B),
+            C=self.C @ matrix,
+            states=(),
+            state_units=(),
+        )
+
+
+SystemT = TypeVar("SystemT", bound=StateSpaceModel)
+"""The class of a system that a function returns changed: what comes in is what goes out."""
+
+
+def _checked_matrices(system: StateSpaceModel) -> tuple[int, int, int]:
+    """Make the matrices fresh, two-dimensional and read-only; the counts of states, inputs and outputs."""
+    for letter in "ABCD":
+        matrix = np.array(getattr(system, letter), dtype=np.float64)
+        if matrix.ndim != 2:
+            raise InputError(
+                f"{letter} has {matrix.ndim} axes",
+                allowed="matrices, two axes",
+                where="linear system",
+                fix=f"give {letter} as a list of rows",
+            )
+        if not np.isfinite(matrix).all():
+            raise InputError(
+                f"{letter} is not all finite numbers",
+                allowed="finite matrices",
+                where="linear system",
+                fix=f"take NaN and infinities out of {letter}",
+            )
+        matrix.flags.writeable = False
+        object.__setattr__(system, letter, matrix)
+    (ny, nu), nx = system.D.shape, system.A.shape[0]
+    for letter, shape in (("A", (nx, nx)), ("B", (nx, nu)), ("C", (ny, nx))):
+        if getattr(system, letter).shape != shape:
+            raise InputError(
+                f"{letter} has shape {getattr(system, letter).shape}",
+                allowed=f"shape {shape}, as A has {nx} rows and D has shape {system.D.shape}",
+                where="linear system",
+                fix=f"change the rows or columns of {letter}",
+            )
+    return nx, nu, ny
+
+
+def _chosen(names: tuple[str, ...], wanted: str | Sequence[str] | None, kind: str) -> list[int]:
+    if wanted is None:
+        return list(range(len(names)))
+    chosen: list[int] = []
+    for name in (wanted,) if isinstance(wanted, str) else wanted:
+        places = [k for k, known in enumerate(names) if known == name or known.rpartition("[")[0] == name]
+        if not places:
+            raise UnknownNameError(kind, name, names)
+        chosen += places
+    return chosen
