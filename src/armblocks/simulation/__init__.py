@@ -8,7 +8,8 @@ if TYPE_CHECKING:
     from armblocks.simulation.calls import CalledFunction
     from armblocks.simulation.plan import LogRequest
     from armblocks.simulation.recording import Samples
-    from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult
+    from armblocks.simulation.result import SimulationResult
+    from armblocks.simulation.run_data import ParameterChange, RunReport
     from armblocks.simulation.run_state import RunState
     from armblocks.simulation.simulation import Simulation
     from armblocks.simulation.tableaux import TABLEAUX, find_tableau
@@ -20,8 +21,8 @@ else:
             "TABLEAUX": "armblocks.simulation.tableaux",
             "CalledFunction": "armblocks.simulation.calls",
             "LogRequest": "armblocks.simulation.plan",
-            "ParameterChange": "armblocks.simulation.result",
-            "RunReport": "armblocks.simulation.result",
+            "ParameterChange": "armblocks.simulation.run_data",
+            "RunReport": "armblocks.simulation.run_data",
             "RunState": "armblocks.simulation.run_state",
             "Samples": "armblocks.simulation.recording",
             "Simulation": "armblocks.simulation.simulation",

@@ -14,8 +14,8 @@ from armblocks.integration.guard_functions import MOST_AT_ONCE
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
-from armblocks.simulation.result import element_names
 from armblocks.simulation.rosenbrock import ROS5
+from armblocks.simulation.run_data import element_names
 from armblocks.simulation.tableaux import STIFF
 
 Array = NDArray[np.float64]

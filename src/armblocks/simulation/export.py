@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     import pandas as pd
     import pyarrow as pa
 
-    from armblocks.simulation.result import SimulationResult
+    from armblocks.simulation.run_data import RunData
 
 
 Array = NDArray[np.float64]
 
 
-def to_dataframe(result: SimulationResult) -> pd.DataFrame:
+def to_dataframe(result: RunData) -> pd.DataFrame:
     """Index ``time`` in s, one column for each scalar; ``attrs`` holds how the run went."""
     import pandas as pd
 
@@ -51,7 +51,7 @@ def to_dataframe(result: SimulationResult) -> pd.DataFrame:
     return frame
 
 
-def save(result: SimulationResult, path: str | PathLike[str]) -> None:
+def save(result: RunData, path: str | PathLike[str]) -> None:
     """Write ``path`` in the format of its suffix, all or nothing. See the module for the formats."""
     place = Path(path)
     write = _WRITERS.get(place.suffix.lower())
@@ -60,7 +60,7 @@ def save(result: SimulationResult, path: str | PathLike[str]) -> None:
     write_atomically(place, write(result))
 
 
-def description_of(result: SimulationResult) -> dict[str, Any]:
+def description_of(result: RunData) -> dict[str, Any]:
     """How the run went, in plain values."""
     parameters = {name: value.tolist() for name, value in result.parameters.items()}
     return {
@@ -71,7 +71,7 @@ def description_of(result: SimulationResult) -> dict[str, Any]:
     }
 
 
-def _csv(result: SimulationResult) -> bytes:
+def _csv(result: RunData) -> bytes:
     from pyarrow import csv as arrow_csv
 
     head = io.StringIO()
@@ -81,7 +81,7 @@ def _csv(result: SimulationResult) -> bytes:
     return head.getvalue().encode() + body.getvalue()
 
 
-def _parquet(result: SimulationResult) -> bytes:
+def _parquet(result: RunData) -> bytes:
     import pyarrow.parquet as pq
 
     buffer = io.BytesIO()
@@ -89,7 +89,7 @@ def _parquet(result: SimulationResult) -> bytes:
     return buffer.getvalue()
 
 
-def _table(result: SimulationResult) -> pa.Table:
+def _table(result: RunData) -> pa.Table:
     """Column ``time`` and one column a scalar; how the run went is in the metadata."""
     import pyarrow as pa
 
@@ -107,7 +107,7 @@ def _column(values: Array) -> pa.Array:
     return pa.Array.from_buffers(pa.float64(), len(values), [None, buffer])
 
 
-def _npz(result: SimulationResult) -> bytes:
+def _npz(result: RunData) -> bytes:
     buffer = io.BytesIO()
     arrays = {name: result[name] for name in result.names}
     description = np.array(json.dumps(description_of(result)))
@@ -115,7 +115,7 @@ def _npz(result: SimulationResult) -> bytes:
     return buffer.getvalue()
 
 
-def _mat(result: SimulationResult) -> bytes:
+def _mat(result: RunData) -> bytes:
     from scipy.io import savemat
 
     contents: dict[str, Any] = {"time": result.time}
@@ -153,7 +153,7 @@ def _identifier(name: str, taken: set[str]) -> str:
     return candidate
 
 
-_WRITERS: dict[str, Callable[[SimulationResult], bytes]] = {
+_WRITERS: dict[str, Callable[[RunData], bytes]] = {
     ".csv": _csv,
     ".parquet": _parquet,
     ".npz": _npz,

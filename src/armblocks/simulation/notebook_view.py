@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.simulation.result import element_names
+from armblocks.simulation.run_data import element_names
 
 if TYPE_CHECKING:
     from armblocks.equations import Slot
-    from armblocks.simulation.result import SimulationResult
+    from armblocks.simulation.run_data import RunData
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ STYLE = """
 """
 
 
-def result_html(result: SimulationResult) -> str:
+def result_html(result: RunData) -> str:
     """Title, how the run went, and a panel for each signal, as one self-contained piece of HTML."""
     report = result.run
     end = float(result.time[-1]) if result.time.size else 0.0

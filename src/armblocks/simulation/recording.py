@@ -15,7 +15,8 @@ from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.simulation.diagnosis import first_bad_signal
 from armblocks.simulation.plan import Instants, LogRequest
-from armblocks.simulation.result import LoggedFile, SimulationResult, signal_path
+from armblocks.simulation.result import SimulationResult
+from armblocks.simulation.run_data import LoggedFile, signal_path
 from armblocks.simulation.stretch import Consumer, Rows, Stretch
 
 if TYPE_CHECKING:

@@ -1,89 +1,20 @@
-"""What a run gives: time, every signal by its path, and how the run went."""
+"""What a run gives its user: its data, tables and files of them, and how they look."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from armblocks.equations import Signature, Slot
-from armblocks.errors import UnknownNameError
+from armblocks.simulation.export import save, to_dataframe
+from armblocks.simulation.notebook_view import result_html
+from armblocks.simulation.run_data import RunData
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from armblocks.simulation.run_state import RunState
 
-Array = NDArray[np.float64]
-
-
-def element_names(slot: Slot) -> tuple[str, ...]:
-    """A name for each scalar of a quantity."""
-    return slot.elements
-
-
-def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:
-    """The path of a signal that may be called by another name. Raises ``UnknownNameError``."""
-    if name in layout.ranges:
-        return name
-    if name in aliases:
-        return aliases[name]
-    raise UnknownNameError("signal", name, [*layout.names, *aliases], where=where)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunReport:
-    """How a run went.
-
-    ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
-    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``ticks``:
-    instants at which a clock ticked; ``events``: guards that fired. ``calls`` of Python functions at their
-    ticks, and the ``call_time`` s spent in them. ``preparation_time`` s for the native
-    code to be compiled or loaded, next to nothing when it is there; ``wall_time`` s of the run itself;
-    ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop time was reached;
-    ``message``: what a person should know (why it stopped, stiffness), else empty.
-    """
-
-    solver: str
-    reason: str
-    steps: int = 0
-    rejected: int = 0
-    evaluations: int = 0
-    ticks: int = 0
-    events: int = 0
-    calls: int = 0
-    call_time: float = 0.0
-    preparation_time: float = 0.0
-    wall_time: float = 0.0
-    real_time_factor: float = 0.0
-    complete: bool = True
-    message: str = ""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ParameterChange:
-    """Tunable parameters, ``block.parameter``, that got other ``values`` at a ``time`` (s) of the run."""
-
-    time: float
-    values: Mapping[str, Array]
-
-
-@dataclass(frozen=True, kw_only=True)
-class LoggedFile:
-    """The file that holds all ``rows`` of a run of which the result shows only some."""
-
-    path: Path
-    rows: int
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SimulationResult:
+@final
+class SimulationResult(RunData):
     """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
 
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
@@ -93,78 +24,8 @@ class SimulationResult:
     extremes of the logged signals; the rest is in ``log``.
     """
 
-    name: str
-    time: Array
-    signals_layout: Signature
-    signals: Array
-    states_layout: Signature
-    states: Array
-    parameters_layout: Signature
-    parameter_values: Array
-    aliases: Mapping[str, str]
-    run: RunReport
-    final_state: RunState | None = None
-    parameter_changes: tuple[ParameterChange, ...] = ()
-    log: LoggedFile | None = None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Paths of all signals, ``block/port``, in evaluation order."""
-        return self.signals_layout.names
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """SI unit of every signal, ``""`` where it has none."""
-        return {slot.name: slot.unit for slot in self.signals_layout}
-
-    @property
-    def parameters(self) -> Mapping[str, Array]:
-        """Every tunable parameter, ``block.parameter``, as the run used it."""
-        return self.parameters_layout.unpack(self.parameter_values)
-
-    def resolve(self, name: str) -> str:
-        """The signal's path: ``name`` itself, a block with one output, or an input port and what drives it.
-
-        Raises ``UnknownNameError`` with the nearest name.
-        """
-        return signal_path(name, self.signals_layout, self.aliases, self.name)
-
-    def __getitem__(self, name: str) -> Array:
-        path = self.resolve(name)
-        place = self.signals_layout.ranges[path]
-        return self.signals[place].T.reshape(self.time.size, *self.signals_layout[path].shape)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.signals_layout.ranges or name in self.aliases
-
-    def only(self, names: Mapping[str, str], rows: slice = slice(None)) -> SimulationResult:
-        """The result with some signals alone, ``{new name: path}``, and some of the instants.
-
-        Raises ``UnknownNameError`` for a path that does not exist.
-        """
-        slots: list[Slot] = []
-        places: list[Array] = []
-        for name, path in names.items():
-            known = self.resolve(path)
-            slots.append(dataclasses.replace(self.signals_layout[known], name=name))
-            places.append(self.signals[self.signals_layout.ranges[known]])
-        return dataclasses.replace(
-            self,
-            time=self.time[rows],
-            signals_layout=Signature(tuple(slots)),
-            signals=np.concatenate(places)[:, rows] if places else np.empty((0, self.time[rows].size)),
-            states=self.states[rows],
-            aliases={},
-        )
-
-    def columns(self) -> tuple[str, ...]:
-        """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[0]``, ``fkine/T[0,3]``."""
-        return tuple(name for slot in self.signals_layout for name in element_names(slot))
-
     def to_dataframe(self) -> pd.DataFrame:
         """A pandas table: index ``time`` in s, one column for each scalar, named as in :meth:`columns`."""
-        from armblocks.simulation.export import to_dataframe
-
         return to_dataframe(self)
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -172,8 +33,6 @@ class SimulationResult:
 
         Raises ``UnknownNameError`` for another suffix and ``FormatError`` where the file cannot be written.
         """
-        from armblocks.simulation.export import save
-
         save(self, path)
 
     def __repr__(self) -> str:
@@ -196,6 +55,4 @@ class SimulationResult:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from armblocks.simulation.notebook_view import result_html
-
         return result_html(self)

@@ -24,7 +24,8 @@ from armblocks.simulation.diagnosis import (
 from armblocks.simulation.loop_conditions import warnings_of_loops
 from armblocks.simulation.plan import LogRequest, changed_parameters, make_plan, parameter_vector
 from armblocks.simulation.recording import Recording, Samples
-from armblocks.simulation.result import ParameterChange, RunReport, SimulationResult
+from armblocks.simulation.result import SimulationResult
+from armblocks.simulation.run_data import ParameterChange, RunReport
 from armblocks.simulation.run_method import RunMethod
 from armblocks.simulation.run_state import RunState, check_state, slot_names
 from armblocks.simulation.stretch import Stretch, first_window

@@ -1,0 +1,159 @@
+"""The data of a run: time, every signal by its path, and how the run went."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.equations import Signature, Slot
+from armblocks.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from armblocks.simulation.run_state import RunState
+
+Array = NDArray[np.float64]
+
+
+def element_names(slot: Slot) -> tuple[str, ...]:
+    """A name for each scalar of a quantity."""
+    return slot.elements
+
+
+def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where: str) -> str:
+    """The path of a signal that may be called by another name. Raises ``UnknownNameError``."""
+    if name in layout.ranges:
+        return name
+    if name in aliases:
+        return aliases[name]
+    raise UnknownNameError("signal", name, [*layout.names, *aliases], where=where)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunReport:
+    """How a run went.
+
+    ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
+    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``ticks``:
+    instants at which a clock ticked; ``events``: guards that fired. ``calls`` of Python functions at their
+    ticks, and the ``call_time`` s spent in them. ``preparation_time`` s for the native
+    code to be compiled or loaded, next to nothing when it is there; ``wall_time`` s of the run itself;
+    ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop time was reached;
+    ``message``: what a person should know (why it stopped, stiffness), else empty.
+    """
+
+    solver: str
+    reason: str
+    steps: int = 0
+    rejected: int = 0
+    evaluations: int = 0
+    ticks: int = 0
+    events: int = 0
+    calls: int = 0
+    call_time: float = 0.0
+    preparation_time: float = 0.0
+    wall_time: float = 0.0
+    real_time_factor: float = 0.0
+    complete: bool = True
+    message: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParameterChange:
+    """Tunable parameters, ``block.parameter``, that got other ``values`` at a ``time`` (s) of the run."""
+
+    time: float
+    values: Mapping[str, Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoggedFile:
+    """The file that holds all ``rows`` of a run of which the result shows only some."""
+
+    path: Path
+    rows: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class RunData:
+    """Signals of one run. ``result["block/port"]`` is ``(N, *shape)``, a view.
+
+    ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
+    ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
+    its end where there were ``parameter_changes``; ``final_state`` what a run needs to go
+    on from here, ``None`` where it failed. Of a run that was logged to a file it holds the rows that show all
+    extremes of the logged signals; the rest is in ``log``.
+    """
+
+    name: str
+    time: Array
+    signals_layout: Signature
+    signals: Array
+    states_layout: Signature
+    states: Array
+    parameters_layout: Signature
+    parameter_values: Array
+    aliases: Mapping[str, str]
+    run: RunReport
+    final_state: RunState | None = None
+    parameter_changes: tuple[ParameterChange, ...] = ()
+    log: LoggedFile | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths of all signals, ``block/port``, in evaluation order."""
+        return self.signals_layout.names
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of every signal, ``""`` where it has none."""
+        return {slot.name: slot.unit for slot in self.signals_layout}
+
+    @property
+    def parameters(self) -> Mapping[str, Array]:
+        """Every tunable parameter, ``block.parameter``, as the run used it."""
+        return self.parameters_layout.unpack(self.parameter_values)
+
+    def resolve(self, name: str) -> str:
+        """The signal's path: ``name`` itself, a block with one output, or an input port and what drives it.
+
+        Raises ``UnknownNameError`` with the nearest name.
+        """
+        return signal_path(name, self.signals_layout, self.aliases, self.name)
+
+    def __getitem__(self, name: str) -> Array:
+        path = self.resolve(name)
+        place = self.signals_layout.ranges[path]
+        return self.signals[place].T.reshape(self.time.size, *self.signals_layout[path].shape)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals_layout.ranges or name in self.aliases
+
+    def only(self, names: Mapping[str, str], rows: slice = slice(None)) -> Self:
+        """The result with some signals alone, ``{new name: path}``, and some of the instants.
+
+        Raises ``UnknownNameError`` for a path that does not exist.
+        """
+        slots: list[Slot] = []
+        places: list[Array] = []
+        for name, path in names.items():
+            known = self.resolve(path)
+            slots.append(dataclasses.replace(self.signals_layout[known], name=name))
+            places.append(self.signals[self.signals_layout.ranges[known]])
+        return dataclasses.replace(
+            self,
+            time=self.time[rows],
+            signals_layout=Signature(tuple(slots)),
+            signals=np.concatenate(places)[:, rows] if places else np.empty((0, self.time[rows].size)),
+            states=self.states[rows],
+            aliases={},
+        )
+
+    def columns(self) -> tuple[str, ...]:
+        """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[0]``, ``fkine/T[0,3]``."""
+        return tuple(name for slot in self.signals_layout for name in element_names(slot))
