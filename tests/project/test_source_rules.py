@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -118,3 +118,87 @@ def test_functions_can_be_read_in_one_sitting(nodes: dict[str, list[ast.AST]]) -
 
 def test_files_are_named_for_their_subject() -> None:
     assert [name for name in NAMES if set(Path(name).with_suffix("").parts) & VAGUE_NAMES] == []
+
+
+def imported(nodes: Iterable[ast.AST], modules: Collection[str]) -> Iterator[str]:
+    """Every module among ``modules`` from which an import takes something.
+
+    Imports in functions and under ``TYPE_CHECKING`` count too: a reader of the module needs what they name.
+    """
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in modules)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                if inner in modules:
+                    yield inner
+                elif node.module in modules:
+                    yield node.module
+
+
+def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
+    """The groups of modules that reach each other (Tarjan's strongly connected components), sorted."""
+    number: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    waiting: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(module: str) -> None:
+        number[module] = lowest[module] = len(number)
+        waiting.append(module)
+        for other in graph[module]:
+            if other not in number:
+                visit(other)
+            if other in waiting:
+                lowest[module] = min(lowest[module], lowest[other])
+        if lowest[module] == number[module]:
+            group = waiting[waiting.index(module) :]
+            del waiting[-len(group) :]
+            if len(group) > 1 or module in graph[module]:
+                found.append(sorted(group))
+
+    for module in graph:
+        if module not in number:
+            visit(module)
+    return sorted(found)
+
+
+@pytest.mark.parametrize(
+    ("graph", "expected"),
+    [
+        ({"a": {"b", "c"}, "b": {"c"}, "c": set[str]()}, []),
+        ({"a": {"a"}}, [["a"]]),
+        (
+            {"a": {"b"}, "b": {"c"}, "c": {"b", "d"}, "d": {"e"}, "e": {"d"}},
+            [["b", "c"], ["d", "e"]],
+        ),
+        ({"a": {"b"}, "b": {"c", "d"}, "c": {"d"}, "d": {"a"}, "e": {"a"}}, [["a", "b", "c", "d"]]),
+    ],
+)
+def test_modules_in_a_circle_are_found(graph: dict[str, set[str]], expected: list[list[str]]) -> None:
+    assert circles(graph) == expected
+
+
+def test_every_kind_of_import_counts() -> None:
+    source = """
+from typing import TYPE_CHECKING
+import armblocks.a
+from armblocks import b
+from armblocks.c import name
+if TYPE_CHECKING:
+    from armblocks.d import Type
+def late():
+    from armblocks.e import (f, g)
+"""
+    modules = {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f", "unused")}
+    found = set(imported(ast.walk(ast.parse(source)), modules))
+    assert found == {f"armblocks.{name}" for name in ("a", "b", "c", "d", "e", "e.f")}
+
+
+def test_no_module_imports_itself_by_way_of_others(nodes: dict[str, list[ast.AST]]) -> None:
+    modules = {
+        ".".join(("armblocks", *Path(name).with_suffix("").parts)).removesuffix(".__init__"): inside
+        for name, inside in nodes.items()
+    }
+    assert circles({name: set(imported(inside, modules)) for name, inside in modules.items()}) == []
