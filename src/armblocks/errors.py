@@ -50,6 +50,15 @@ class ArmblocksError(ValueError):
         self.fix = fix
         super().__init__(compose_message(what, where, allowed, fix))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the parts: a process pool sends an error back so."""
+        return _unpickled, (type(self), self.args), self.__dict__
+
+
+def _unpickled(kind: type[ArmblocksError], args: tuple[object, ...]) -> ArmblocksError:
+    """An error with its text as it was; ``__init__``, which composes the text, takes other arguments."""
+    return kind.__new__(kind, *args)
+
 
 class InputError(ArmblocksError):
     """A call was given a wrong shape, dtype, value or option."""

@@ -19,7 +19,7 @@ GOOD = np.ones(3)
 
 def test_the_count_of_arguments(kernel: Kernel) -> None:
     with pytest.raises(
-        InputError, match=r"mixed: 1 arguments were given. Allowed: a \(3,\), b \(3,\). Fix: pass each"
+        InputError, match=r"mixed: 1 arguments were given. Allowed: a \(3,\), b \(3,\). Fix: call mixed"
     ):
         kernel(GOOD)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 import runpy
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,6 +53,12 @@ def make(kind: type[Block], **values: object) -> Block:
     """A block with its defaults, and the little robot where it needs one."""
     robots = {rule.name: ROBOT for rule in kind.parameters() if rule.kind is ParameterKind.ROBOT}
     return kind(**(robots | values))
+
+
+def test_every_block_is_pickled() -> None:
+    for kind in KINDS:
+        block = make(kind)
+        assert pickle.loads(pickle.dumps(block)) == block, kind.type_name()
 
 
 def fitting_shapes(block: Block) -> Iterator[Shapes]:

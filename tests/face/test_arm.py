@@ -1,5 +1,7 @@
 """The arm that users hold: shapes, batches, options, and the words of its errors."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,37 @@ def test_loads_are_run_time_inputs(puma: ab.Arm, states: list[np.ndarray], metho
     np.testing.assert_array_equal(loaded[3], call(q[3], qd[3], third[3], payload=payload))
     pushed = call(q[3], qd[3], third[3], wrench=[0, 0, 10, 0, 0, 0])
     assert np.abs(pushed - plain[3]).max() > 1e-3
+
+
+def test_arguments_come_by_name_too(puma: ab.Arm, states: list[np.ndarray]) -> None:
+    q, qd, third = states
+    for k in (slice(None), 3):
+        np.testing.assert_array_equal(puma.fkine(q=q[k]), puma.fkine(q[k]))
+        expected = puma.rne(q[k], qd[k], third[k])
+        np.testing.assert_array_equal(puma.rne(q[k], qdd=third[k], qd=qd[k]), expected)
+        loaded = puma.rne(q[k], qd[k], third[k], payload=ab.Payload(mass=2.0))
+        np.testing.assert_array_equal(puma.rne(qdd=third[k], qd=qd[k], q=q[k], payload=2.0), loaded)
+        np.testing.assert_array_equal(
+            puma.accel(q[k], qd[k], tau=expected), puma.accel(q[k], qd[k], expected)
+        )
+
+
+def test_wrong_calls_say_the_right_one(puma: ab.Arm) -> None:
+    q = np.zeros(6)
+    with pytest.raises(InputError, match=r"rne: 0 arguments were given.*Fix: call rne\(q, qd, qdd\)"):
+        puma.rne(payload=2.0)  # pyright: ignore[reportCallIssue]
+    with pytest.raises(InputError, match=r"rne: 'qdd' is missing.*Fix: call rne\(q, qd, qdd\)"):
+        puma.rne(q, qd=q)  # pyright: ignore[reportCallIssue]
+    with pytest.raises(InputError, match=r"fkine: 'q' is given twice"):
+        puma.fkine(q, q=q)  # pyright: ignore[reportCallIssue]
+    with pytest.raises(UnknownNameError, match=r"rne: there is no argument named 'payloud'.*'payload'"):
+        puma.rne(q, q, q, payloud=2.0)  # pyright: ignore[reportCallIssue]
+
+
+@pytest.mark.parametrize("method", [*METHODS_OF_Q, "friction"])
+def test_a_method_is_pickled_by_its_arm(puma: ab.Arm, states: list[np.ndarray], method: str) -> None:
+    again = pickle.loads(pickle.dumps(getattr(puma, method)))
+    np.testing.assert_array_equal(again(states[0]), getattr(puma, method)(states[0]))
 
 
 def test_integers_lists_and_strides_are_taken(puma: ab.Arm) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Self, TypeVar
 
 import numpy as np
@@ -65,6 +66,11 @@ class StateSpaceModel:
                 where="linear system",
                 fix="give dt in seconds",
             )
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # By the constructor, because pickled arrays forget that they are read-only.
+        fields = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self)}
+        return partial(type(self), **fields), ()
 
     @property
     def order(self) -> int:

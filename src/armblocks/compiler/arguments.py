@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler.result_memory import new_result
 from armblocks.equations import Shape, Signature, Slot
-from armblocks.errors import InputError
+from armblocks.errors import InputError, UnknownNameError
 
 Array = NDArray[np.float64]
 
@@ -23,8 +23,36 @@ def check_count(name: str, signature: Signature, values: Sequence[object]) -> No
             f"{len(values)} arguments were given",
             where=name,
             allowed=_listing(signature),
-            fix="pass each once",
+            fix=f"call {name}({', '.join(signature.names)})",
         )
+
+
+def in_order(
+    name: str,
+    signature: Signature,
+    values: Sequence[ArrayLike],
+    named: Mapping[str, ArrayLike],
+    options: Sequence[str] = ("out", "threads"),
+) -> tuple[ArrayLike, ...]:
+    """All inputs in the order of the slots: the first ones are ``values``, the others ``named``.
+
+    Raises :class:`UnknownNameError` for a name that is neither an input nor one of the ``options`` of the
+    call, :class:`InputError` for an input that is missing or given twice.
+    """
+    rest = signature.names[len(values) :]
+    if set(named) == set(rest):
+        return (*values, *[named[wanted] for wanted in rest])
+    for given in named:
+        if given not in signature.names:
+            raise UnknownNameError("argument", given, [*signature.names, *options], where=name)
+    twice = [given for given in named if given not in rest]
+    missing = [wanted for wanted in rest if wanted not in named]
+    raise InputError(
+        f"'{twice[0]}' is given twice" if twice else f"'{missing[0]}' is missing",
+        where=name,
+        allowed=_listing(signature),
+        fix=f"call {name}({', '.join(signature.names)}), each in its place or by its name",
+    )
 
 
 def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:

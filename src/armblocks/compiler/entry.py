@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from armblocks.compiler.native import NativeCode
+from armblocks.errors import InputError
 
 ENTRY = "armblocks_entry"
 """Symbol of the builtin's C function."""
@@ -91,17 +92,34 @@ class _MethodDefinition(ctypes.Structure):
 _DEFINITIONS: list[_MethodDefinition] = []
 
 
+Maker = tuple[Callable[..., object], tuple[object, ...]]
+"""A function with its arguments: what gives, in another process too, an object that has the builtin as an
+attribute of its name. Pickle asks for it."""
+
+
 class _Owner:
     """The builtin's ``self``: what it falls back to, and what must live as long as it does.
 
     The C function reads ``call`` by its offset.
     """
 
-    __slots__ = ("call", "kept")
+    __slots__ = ("call", "kept", "maker")
 
-    def __init__(self, call: Callback, kept: object) -> None:
+    def __init__(self, call: Callback, kept: object, maker: Maker | None = None) -> None:
         self.call = call
         self.kept = kept
+        self.maker = maker
+
+    def __reduce__(self) -> Maker:
+        """Python pickles a builtin as an attribute of its ``self``: that of the maker's object, here."""
+        if self.maker is None:
+            raise InputError(
+                "native code cannot be pickled",
+                allowed="methods of an Arm, such as arm.fkine",
+                fix="pickle what the code was compiled from",
+                where="kernel",
+            )
+        return self.maker
 
 
 def offer_batch(code: NativeCode, batched: Sequence[bool], address: int) -> None:
@@ -115,13 +133,20 @@ def offer_batch(code: NativeCode, batched: Sequence[bool], address: int) -> None
 
 
 def make_entry(
-    *, name: str, doc: str, address: int, table: int, fallback: Callback, kept: object
+    *,
+    name: str,
+    doc: str,
+    address: int,
+    table: int,
+    fallback: Callback,
+    kept: object,
+    maker: Maker | None = None,
 ) -> Callback:
     """The builtin for the C function at ``address``.
 
     ``table`` is the address of the module's :data:`TABLE`. Calls that the C function does not serve go to
-    ``fallback``. ``kept`` (the machine code) lives as long as the builtin. Where the binary interface of
-    Python or NumPy is not the expected one, ``fallback`` itself is given back.
+    ``fallback``. ``kept`` (the machine code) lives as long as the builtin, which is pickled by its ``maker``.
+    Where the binary interface of Python or NumPy is not the expected one, ``fallback`` itself is given back.
     """
     addresses = _addresses()
     if addresses is None:
@@ -132,7 +157,7 @@ def make_entry(
     new = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)(
         ("PyCFunction_NewEx", ctypes.pythonapi)
     )
-    return new(ctypes.addressof(definition), _Owner(fallback, kept), None)
+    return new(ctypes.addressof(definition), _Owner(fallback, kept, maker), None)
 
 
 @dataclass(frozen=True)

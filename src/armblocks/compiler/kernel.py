@@ -15,11 +15,12 @@ from armblocks.compiler.arguments import (
     check_count,
     check_threads,
     count_samples,
+    in_order,
     new_outputs,
     read_input,
 )
 from armblocks.compiler.batch_threads import Shares, evaluate_in_threads, worth_while
-from armblocks.compiler.entry import ENTRY, TABLE, make_entry, offer_batch
+from armblocks.compiler.entry import ENTRY, TABLE, Maker, make_entry, offer_batch
 from armblocks.compiler.layout import BatchLayout, Layout
 from armblocks.compiler.native import NativeCode, load_code
 from armblocks.compiler.tape import OperationCount, Tape
@@ -79,12 +80,13 @@ class Kernel:
         """A builtin that takes the same arguments as the kernel; by far the fastest way in."""
         return self.entry_before(self.__call__)
 
-    def entry_before(self, fallback: Callable[..., Any]) -> Callable[..., Any]:
+    def entry_before(self, fallback: Callable[..., Any], maker: Maker | None = None) -> Callable[..., Any]:
         """A builtin like :attr:`entry` that leaves what it does not serve to ``fallback``.
 
-        It serves plain arrays, ``out=`` and ``threads=1``. ``fallback`` gets all else, unchanged.
+        It serves plain arrays, ``out=`` and ``threads=1``. ``fallback`` gets all else, unchanged, inputs by
+        name among it. ``maker`` makes the object of which the builtin is an attribute, where it is pickled.
         """
-        options = "/, *, out=None, threads=1"
+        options = "*, out=None, threads=1"
         names = ", ".join(self.inputs.names)
         shapes = ", ".join(f"{slot.name} {slot.shape}" for slot in self.inputs)
         results = ", ".join(f"{slot.name} {slot.shape}" for slot in self.outputs)
@@ -100,19 +102,23 @@ class Kernel:
                 table=code.address(TABLE),
                 fallback=fallback,
                 kept=(self, code),
+                maker=maker,
             )
 
-    def __call__(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
+    def __call__(self, *arrays: ArrayLike, out: object = None, threads: int = 1, **named: ArrayLike) -> Any:
         """Evaluate one sample or a batch.
 
-        Each input has its slot's shape, or ``(N, *shape)``; an input without the samples' axis serves all
-        samples. Any float or integer dtype and any strides are taken; C-contiguous float64 is read in
-        place. ``out`` takes the result: an array as the call would give, or a tuple of them where there are
-        several outputs; it may be one of the inputs. ``threads`` spreads a batch over that many threads.
+        Inputs come in order or by name. Each has its slot's shape, or ``(N, *shape)``; an input without the
+        samples' axis serves all samples. Any float or integer dtype and any strides are taken; C-contiguous
+        float64 is read in place. ``out`` takes the result: an array as the call would give, or a tuple of
+        them where there are several outputs; it may be one of the inputs. ``threads`` spreads a batch over
+        that many threads.
 
         Gives one array per output, of the slot's shape or ``(N, *shape)``; a ``numpy.float64`` for one
         scalar. Raises :class:`~armblocks.errors.InputError` for wrong counts, shapes, dtypes and options.
         """
+        if named:
+            return self.entry(*in_order(self.name, self.inputs, arrays, named), out=out, threads=threads)
         return self._run(arrays, out, threads, columns=False)
 
     def columns(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:

@@ -58,6 +58,9 @@ class Note:
 ROTATIONS = (0, 90, 180, 270)
 """Degrees by which a block may be turned."""
 
+_READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values")
+"""The fields of a diagram that are mappings nobody can write to."""
+
 Gate = Mapping[str, PortRef]
 """What feeds the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
 
@@ -125,11 +128,22 @@ class Diagram:
         if self.bends:  # those of wires that are gone are gone with them
             kept = {wire: self.bends[wire] for wire in self.connections if self.bends.get(wire)}
             object.__setattr__(self, "bends", kept)
-        for name in ("blocks", "layout", "bends", "notes", "extras", "mask_values"):
+        for name in _READ_ONLY:
             ordered = dict(sorted(getattr(self, name).items()))
             object.__setattr__(self, name, MappingProxyType(ordered))
         object.__setattr__(self, "connections", tuple(sorted(self.connections)))
         object.__setattr__(self, "logged", tuple(sorted(self.logged)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle or a copy holds: the fields, and nothing that was worked out from them."""
+        state = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self) if entry.init}
+        return state | {name: dict(state[name]) for name in _READ_ONLY}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        read_only: dict[str, Any] = {name: MappingProxyType(state[name]) for name in _READ_ONLY}
+        for name, value in (state | read_only).items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "_kept", {})
 
     def with_mask_values(self, values: Mapping[str, object]) -> Diagram:
         """A copy in which some parameters of the mask have other values, and what follows from them.

@@ -49,6 +49,9 @@ class TimeTable:
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.array(self.rows, dtype=dtype)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return TimeTable, (np.asarray(self.rows), self.names, self.source)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TimeTable):
             return NotImplemented

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import FunctionType
 
+from armblocks.diagram.function_files import load_function
 from armblocks.errors import InputError
 
 
@@ -61,9 +63,44 @@ class UserFunction:
     def __hash__(self) -> int:
         return hash(self._code or self.function)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the function by its name in a module, or in a file; code itself does not travel.
+
+        Raises ``InputError`` for a function that has neither.
+        """
+        function = self.function
+        if not isinstance(function, FunctionType) or _is_importable(function):
+            return UserFunction, (function,)
+        if self.source and function.__qualname__.isidentifier():
+            return _from_file, (self.source,)
+        raise InputError(
+            f"the function {self.name} cannot be pickled: no other process would find it by its name",
+            allowed="functions at the top of a module or of a .py file; no lambdas or inner functions",
+            fix="write it with def at the top of a .py file, and import it from there",
+            where=f"function {self.name}",
+        )
+
+    def __deepcopy__(self, copied: object) -> UserFunction:
+        return self
+
+    def __copy__(self) -> UserFunction:
+        return self
+
     @property
     def _code(self) -> tuple[object, ...] | None:
         function = self.function
         if not isinstance(function, FunctionType) or function.__closure__ or not self.source:
             return None
         return (function.__code__, repr(function.__defaults__), repr(function.__kwdefaults__))
+
+
+def _is_importable(function: FunctionType) -> bool:
+    """Whether the function is what its module has under its name."""
+    found: object = sys.modules.get(function.__module__)
+    for name in function.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return found is function
+
+
+def _from_file(source: str) -> UserFunction:
+    return UserFunction(load_function(source, None))

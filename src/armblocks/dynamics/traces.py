@@ -115,7 +115,7 @@ def trace_rne_loaded(robot: Robot) -> TracedFunction:
         return _sum(rigid, rotor_torques(robot, accelerations), joint_friction(robot, rates))
 
     inputs = ("q", "qd", "qdd", "wrench", "payload")
-    return _trace("rne_loaded", robot, inputs, ("tau", (robot.n,), "N m"), equations)
+    return _trace("rne", robot, inputs, ("tau", (robot.n,), "N m"), equations)
 
 
 def trace_gravload(robot: Robot) -> TracedFunction:
@@ -202,7 +202,7 @@ def trace_accel_loaded(robot: Robot) -> TracedFunction:
         return _sum(forward_dynamics(loaded, q, rates, left_over, at_tip(tree, wrench)))
 
     inputs = ("q", "qd", "tau", "wrench", "payload")
-    return _trace("accel_loaded", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
+    return _trace("accel", robot, inputs, ("qdd", (robot.n,), "rad/s2"), equations)
 
 
 def trace_kinetic_energy(robot: Robot) -> TracedFunction:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.compiler import Kernel, OperationCount, recall
-from armblocks.errors import UnknownNameError
-from armblocks.face.payload import Payload
+from armblocks.compiler.arguments import check_count, in_order
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.face.payload import Payload, payload_numbers
 from armblocks.face.robot_html import robot_html
 from armblocks.robot import FrictionModel, Robot
 
@@ -26,32 +27,31 @@ Array = NDArray[np.float64]
 class OfConfiguration(Protocol):
     """``f(q)``: ``q`` (n,) or (N, n); one result, or N of them stacked. ``out`` receives the result."""
 
-    def __call__(self, q: ArrayLike, /, *, out: Array | None = None, threads: int = 1) -> Array: ...
+    def __call__(self, q: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 
 
 class OfSpeed(Protocol):
     """``f(qd)``: ``qd`` (n,) or (N, n)."""
 
-    def __call__(self, qd: ArrayLike, /, *, out: Array | None = None, threads: int = 1) -> Array: ...
+    def __call__(self, qd: ArrayLike, *, out: Array | None = None, threads: int = 1) -> Array: ...
 
 
 class OfState(Protocol):
     """``f(q, qd)``: each (n,) or (N, n)."""
 
     def __call__(
-        self, q: ArrayLike, qd: ArrayLike, /, *, out: Array | None = None, threads: int = 1
+        self, q: ArrayLike, qd: ArrayLike, *, out: Array | None = None, threads: int = 1
     ) -> Array: ...
 
 
 class OfMotion(Protocol):
-    """``f(q, qd, qdd or tau)``, with an optional wrench (6,) or (N, 6) and payload."""
+    """``f(q, qd, qdd)``, with an optional wrench (6,) or (N, 6) and payload."""
 
     def __call__(
         self,
         q: ArrayLike,
         qd: ArrayLike,
-        third: ArrayLike,
-        /,
+        qdd: ArrayLike,
         *,
         wrench: ArrayLike | None = None,
         payload: Payload | ArrayLike | None = None,
@@ -60,23 +60,32 @@ class OfMotion(Protocol):
     ) -> Array: ...
 
 
-class OfLoadedMotion(Protocol):
-    """``f(q, qd, qdd or tau, wrench, payload)``: the kernel behind :class:`OfMotion` under a load."""
+class OfDrivenState(Protocol):
+    """``f(q, qd, tau)``, with an optional wrench (6,) or (N, 6) and payload."""
 
-    def __call__(self, *arrays: ArrayLike, out: Array | None = None, threads: int = 1) -> Array: ...
+    def __call__(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrench: ArrayLike | None = None,
+        payload: Payload | ArrayLike | None = None,
+        out: Array | None = None,
+        threads: int = 1,
+    ) -> Array: ...
 
 
-def _zeros(count: int) -> Array:
-    zeros = np.zeros(count)
-    zeros.flags.writeable = False
-    return zeros
-
-
-_NO_WRENCH, _NO_PAYLOAD = _zeros(6), _zeros(10)
+_NO_WRENCH = np.zeros(6)
+_NO_WRENCH.flags.writeable = False
+_OPTIONS = ("wrench", "payload", "out", "threads")
 
 
 class Arm:
     """A robot ready to compute.
+
+    Arguments come in order or by name, ``rne(q, qd, qdd)`` or ``rne(q=q, qd=qd, qdd=qdd)``; in order is
+    faster for one sample.
 
     Every method takes one sample, joint vectors of shape ``(n,)``, or a batch, ``(N, n)``; any float or
     integer dtype, any strides (C-contiguous float64 is fastest). ``out=`` takes a float64 C-contiguous array
@@ -89,6 +98,10 @@ class Arm:
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self._kernels: dict[str, Kernel] = {}
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle and copy the robot alone; code is made, or loaded from the cache, anew."""
+        return Arm, (self.robot,)
 
     # ---- description -------------------------------------------------------------------------------------
     @property
@@ -121,76 +134,77 @@ class Arm:
     @cached_property
     def fkine(self) -> OfConfiguration:
         """``fkine(q)`` → T (4, 4): pose of the tool in the world."""
-        return self._kernel("fkine").entry
+        return self._entry("fkine")
 
     @cached_property
     def link_poses(self) -> OfConfiguration:
         """``link_poses(q)`` → (L + 2, 4, 4): poses in the world of the base, each link and the tool."""
-        return self._kernel("link_poses").entry
+        return self._entry("link_poses")
 
     @cached_property
     def jacob0(self) -> OfConfiguration:
         """``jacob0(q)`` → J (6, n): tool velocity in world axes per joint speed; linear rows first."""
-        return self._kernel("jacob0").entry
+        return self._entry("jacob0")
 
     @cached_property
     def jacobe(self) -> OfConfiguration:
         """``jacobe(q)`` → J (6, n): as ``jacob0`` but in tool axes."""
-        return self._kernel("jacobe").entry
+        return self._entry("jacobe")
 
     @cached_property
     def manipulability(self) -> OfConfiguration:
         """``manipulability(q)`` → Yoshikawa's sqrt(det(J J'))."""
-        return self._kernel("manipulability").entry
+        return self._entry("manipulability")
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
     def rne(self) -> OfMotion:
         """``rne(q, qd, qdd)`` → tau (n,): joint torques of a motion, motor inertia and friction included.
 
-        ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool.
+        ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
+        or the mass (kg) of a point there.
         """
         return self._loadable("rne")
 
     @cached_property
-    def accel(self) -> OfMotion:
+    def accel(self) -> OfDrivenState:
         """``accel(q, qd, tau)`` → qdd (n,): joint accelerations under torques, friction acting."""
         return self._loadable("accel")
 
     @cached_property
     def gravload(self) -> OfConfiguration:
         """``gravload(q)`` → (n,): torques that hold the arm at rest."""
-        return self._kernel("gravload").entry
+        return self._entry("gravload")
 
     @cached_property
     def inertia(self) -> OfConfiguration:
         """``inertia(q)`` → M (n, n): joint-space mass matrix, motor inertia included."""
-        return self._kernel("inertia").entry
+        return self._entry("inertia")
 
     @cached_property
     def coriolis(self) -> OfState:
         """``coriolis(q, qd)`` → C (n, n): ``C qd`` are the velocity torques; dM/dt - 2 C is skew."""
-        return self._kernel("coriolis").entry
+        return self._entry("coriolis")
 
     @cached_property
     def friction(self) -> OfSpeed:
         """``friction(qd)`` → (n,): joint torques that friction takes, a part of ``rne``, signed as ``qd``."""
-        return self._kernel("friction").entry
+        return self._entry("friction")
 
     @cached_property
     def kinetic_energy(self) -> OfState:
         """``kinetic_energy(q, qd)`` → J, motor inertia included."""
-        return self._kernel("kinetic_energy").entry
+        return self._entry("kinetic_energy")
 
     @cached_property
     def potential_energy(self) -> OfConfiguration:
         """``potential_energy(q)`` → J, zero where the centre of mass is level with the world's origin."""
-        return self._kernel("potential_energy").entry
+        return self._entry("potential_energy")
 
     @cached_property
     def centre_of_mass(self) -> OfConfiguration:
         """``centre_of_mass(q)`` → (3,) m: of all links, in the world."""
-        return self._kernel("centre_of_mass").entry
+        return self._entry("centre_of_mass")
 
     # ---- how it was made ---------------------------------------------------------------------------------
     def operation_count(self, method: str) -> OperationCount:
@@ -212,12 +226,17 @@ class Arm:
             kernel = self._kernels[method] = recall(key, lambda: _traces()[method](self.robot))
         return kernel
 
-    def _loadable(self, method: str) -> OfMotion:
+    def _entry(self, method: str) -> Callable[..., Array]:
+        """The builtin of a method; another process finds it by the robot and the method's name."""
+        kernel = self._kernel(method)
+        return kernel.entry_before(kernel.__call__, maker=(Arm, (self.robot,)))
+
+    def _loadable(self, method: str) -> Callable[..., Array]:
         """The plain kernel, and the one with wrench and payload as soon as a call names either."""
         plain = self._kernel(method)
 
         @cache
-        def loaded() -> OfLoadedMotion:
+        def loaded() -> Callable[..., Array]:
             return self._kernel(f"{method}_loaded").entry
 
         def general(
@@ -226,20 +245,21 @@ class Arm:
             payload: Payload | ArrayLike | None = None,
             out: Array | None = None,
             threads: int = 1,
+            **named: ArrayLike,
         ) -> Array:
+            if named:
+                arguments = in_order(method, plain.inputs, arguments, named, _OPTIONS)
             if wrench is None and payload is None:
-                return plain(*arguments, out=out, threads=threads)
+                return (plain.entry if named else plain)(*arguments, out=out, threads=threads)
             force = _NO_WRENCH if wrench is None else wrench
-            carried = (
-                payload.numbers
-                if isinstance(payload, Payload)
-                else _NO_PAYLOAD
-                if payload is None
-                else payload
-            )
-            return loaded()(*arguments, force, carried, out=out, threads=threads)
+            carried = payload.numbers if isinstance(payload, Payload) else payload_numbers(payload)
+            try:
+                return loaded()(*arguments, force, carried, out=out, threads=threads)
+            except InputError:
+                check_count(method, plain.inputs, arguments)  # a message without what is given by name
+                raise
 
-        return plain.entry_before(general)
+        return plain.entry_before(general, maker=(Arm, (self.robot,)))
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {self.n} joints {self.robot.joint_letters}>"

@@ -33,6 +33,14 @@ class DiagramRun:
         self.diagram = diagram
         self.simulation = simulation
 
+    def __reduce__(self) -> tuple[object, ...]:
+        raise InputError(
+            "a run in progress cannot be copied or pickled",
+            allowed="its diagram, run.state() and run.result()",
+            fix="go on elsewhere with simulate(run.diagram, initial_state=run.state())",
+            where=self.diagram.name,
+        )
+
     @property
     def time(self) -> float:
         """Time that is reached, s."""

@@ -34,6 +34,10 @@ class CompiledDiagram:
         self.diagram = diagram
         self._watch: LimitWatch | None = None
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle and copy the diagram alone; equations and code are made, or loaded from the cache, anew."""
+        return CompiledDiagram, (self.diagram,)
+
     @cached_property
     def system(self) -> HybridSystem:
         """The diagram as equations."""

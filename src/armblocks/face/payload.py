@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from armblocks.errors import InputError
 
@@ -40,6 +40,9 @@ class Payload:
                 fix="give the mass in kg",
             )
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return partial(Payload, mass=self.mass, centre=self.centre, inertia=self.inertia), ()
+
     @cached_property
     def numbers(self) -> NDArray[np.float64]:
         """The ten numbers in the order that the compiled dynamics take, read-only."""
@@ -50,3 +53,13 @@ class Payload:
     def vector(self) -> NDArray[np.float64]:
         """A copy of :attr:`numbers`."""
         return self.numbers.copy()
+
+
+def payload_numbers(payload: ArrayLike | None) -> ArrayLike:
+    """The ten numbers of what a tool carries: a mass (kg), nothing, or the numbers themselves."""
+    if payload is None:
+        return _NOTHING
+    return Payload(mass=float(payload)).numbers if isinstance(payload, float | int) else payload
+
+
+_NOTHING = Payload(mass=0.0).numbers

@@ -26,9 +26,9 @@ from pathlib import Path
 import numpy as np
 
 from armblocks.diagram import TimeTable, UserFunction
+from armblocks.diagram.function_files import load_function
 from armblocks.errors import ArmblocksError, FormatError, UnknownNameError
 from armblocks.formats.json_document import Node, closed_members
-from armblocks.formats.python_functions import load_function
 from armblocks.formats.robot_files import is_path, shipped_robot
 from armblocks.formats.robot_json import robot_from, robot_to
 from armblocks.formats.shipped import list_robots
@@ -88,7 +88,7 @@ class RobotReader:
                 fix="read the code, then use load_diagram(..., trust=True) or --trust",
             )
         try:
-            return load_function(reference, self._folder)
+            return UserFunction(load_function(reference, self._folder))
         except ArmblocksError as error:
             raise node.error(error.what, allowed=error.allowed, fix=error.fix) from error
 

@@ -1,15 +1,15 @@
-"""Python functions that trusted diagrams name: the only place where a file's code is run."""
+"""Python functions of files, such as trusted diagrams name: the only place where a file's code is run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-from armblocks.diagram import UserFunction
 from armblocks.errors import FormatError
 
 
-def load_function(reference: str, folder: Path | None) -> UserFunction:
+def load_function(reference: str, folder: Path | None) -> Callable[..., object]:
     """The function that ``file.py:name`` means. **Runs the file.**
 
     The path is relative to ``folder``. Raises ``FormatError`` where there is no such file or function, or the
@@ -44,4 +44,4 @@ def load_function(reference: str, folder: Path | None) -> UserFunction:
             where=str(file),
             allowed="a function that the file defines at its top",
         )
-    return UserFunction(found)
+    return found

@@ -1,0 +1,240 @@
+"""Public values are pickled, copied and sent to other processes: by their description, with the same bits."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import multiprocessing
+import pickle
+import traceback
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import armblocks as ab
+from armblocks import errors, formats
+from armblocks.blocks import BLOCKS, FromFile, Gain, Integrator, PythonFunction, Scope, SineWave
+from armblocks.diagram import UserFunction, content_key
+from armblocks.simulation import Samples
+
+WAYS: dict[str, Callable[[Any], Any]] = {
+    "pickle": lambda value: pickle.loads(pickle.dumps(value)),
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+}
+
+
+def half(u: float) -> float:
+    return 0.5 * u
+
+
+def diagram_with(function: Callable[..., object]) -> ab.Diagram:
+    builder = ab.DiagramBuilder("own function")
+    sine = builder.add("sine", SineWave())
+    builder.add("scope", Scope(), builder.add("half", PythonFunction(function=function), sine))
+    return builder.build()
+
+
+def small_builder() -> ab.DiagramBuilder:
+    builder = ab.DiagramBuilder("small")
+    builder.parameter("k", 2.0)
+    sine = builder.add("sine", SineWave())
+    gain = builder.add("gain", Gain(gain=ab.formula("2*k")), sine)
+    builder.add("scope", Scope(), builder.add("integrator", Integrator(), gain))
+    return builder
+
+
+@cache
+def examples() -> Mapping[str, Any]:
+    """One value or more of every public type, by a name that begins with the type's."""
+    arm, diagram = ab.load_robot("twolink"), small_builder().build()
+    robot, compiled = arm.robot, ab.CompiledDiagram(diagram)
+    result = ab.simulate(compiled, stop_time=1.0)
+    system = ab.linearize(diagram, "gain.gain", "integrator", at=0.5)
+    values = [
+        *(arm, robot, robot.links[0], ab.Motor(inertia=1.0), ab.Revolute(), ab.Prismatic(), ab.Fixed()),
+        *(ab.FrictionModel.RELEASE_6, ab.JointLimits(speed=1.0), ab.standard_dh("one", a=1.0).dh),
+        *(ab.Payload(mass=2.0), ab.Transform(), ab.jtraj([0, 0], [1, 1], 5)),
+        *(diagram, small_builder(), compiled, ab.SimulationOptions(step=0.1), ab.formula("2*k")),
+        *(result, result.final_state, system, system.point, system.margins(), system.transfer_function()),
+        ab.diagram_difference(diagram, ab.load_diagram("kr180model")),
+        ab.sensitivity(diagram, "gain.gain", "integrator", stop_time=1.0),
+        ab.trim("van_der_pol_pid"),
+        FromFile(data=[[0.0, 1.0], [1.0, 2.0]]),
+        FromFile(data=[[0.0, 1.0], [1.0, 2.0]]).data,
+        UserFunction(half),
+    ]
+    return {type(value).__name__: value for value in values}
+
+
+def content(value: Any) -> object:
+    """All that a value holds, arrays with their bits."""
+    if isinstance(value, np.ndarray):
+        return str(value.dtype), value.shape, value.tobytes()
+    if isinstance(value, Mapping):
+        return {key: content(entry) for key, entry in value.items()}
+    if isinstance(value, tuple | list | set | frozenset):
+        return [type(value), *map(content, value)]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = [entry.name for entry in dataclasses.fields(value) if not entry.name.startswith("_")]
+        return type(value), {name: content(getattr(value, name)) for name in fields}
+    if isinstance(value, ab.Arm):
+        return ab.Arm, content(value.robot)
+    if isinstance(value, ab.CompiledDiagram):
+        return ab.CompiledDiagram, content(value.diagram)
+    if isinstance(value, ab.DiagramBuilder):
+        return ab.DiagramBuilder, content(value.build())
+    if isinstance(value, errors.ArmblocksError):
+        return type(value), str(value), content(vars(value))
+    return repr(value) if isinstance(value, float) and math.isnan(value) else value
+
+
+def test_every_public_type_is_among_the_examples() -> None:
+    types = {name for name in ab.__all__ if isinstance(getattr(ab, name), type)}
+    assert types - {"DiagramRun"} <= examples().keys()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_copy_holds_what_its_original_holds(way: str) -> None:
+    for name, value in examples().items():
+        assert content(WAYS[way](value)) == content(value), name
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_constant_arrays_stay_read_only(way: str) -> None:
+    payload, system, table = (examples()[name] for name in ("Payload", "LinearSystem", "TimeTable"))
+    assert payload.numbers.sum() == 2.0  # worked out before it is copied
+    copies = [WAYS[way](value) for value in (payload, system, table)]
+    assert not any(array.flags.writeable for array in (copies[0].numbers, copies[1].A, copies[2].rows))
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_copy_computes_the_same_bits(way: str) -> None:
+    arm, diagram = ab.load_robot("puma560"), ab.load_diagram("kr180model")
+    q = np.linspace(-1, 1, 6)
+    assert WAYS[way](arm).rne(q, q, q).tobytes() == arm.rne(q, q, q).tobytes()
+    for model in (diagram, ab.compile_diagram(diagram)):
+        again = ab.simulate(WAYS[way](model), stop_time=0.5)
+        assert again.signals.tobytes() == ab.simulate(diagram, stop_time=0.5).signals.tobytes()
+
+
+@pytest.mark.filterwarnings("ignore::armblocks.errors.ArmblocksWarning")
+def test_shipped_robots_and_examples_are_pickled() -> None:
+    for name in ab.list_robots():
+        arm = ab.load_robot(name)
+        assert content(pickle.loads(pickle.dumps(arm))) == content(arm)
+    for name in ab.list_examples():
+        diagram = formats.load_diagram(name, BLOCKS, draft=True)
+        again = pickle.loads(pickle.dumps(diagram))
+        assert again == diagram and content(again) == content(diagram)
+        # the copy finds the code of the original in the cache
+        assert content_key(again) == content_key(diagram)
+
+
+def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
+    if kind is errors.UnknownNameError:
+        return errors.UnknownNameError("block", "gian", ["gain"], where="here")
+    if kind is errors.AlgebraicLoopError:
+        return errors.AlgebraicLoopError(["a/y", "b/y"], where="here")
+    if kind is errors.SimulationError:
+        return errors.SimulationError("it ends", partial=examples()["SimulationResult"])
+    return kind("this is wrong", where="here", allowed="that", fix="do that")
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_errors_keep_their_parts(way: str) -> None:
+    kinds = [kind for kind in vars(errors).values() if isinstance(kind, type)]
+    for kind in kinds:
+        if issubclass(kind, errors.ArmblocksError):
+            assert content(WAYS[way](raised(kind))) == content(raised(kind))
+
+
+def test_a_python_function_is_pickled_by_its_name(tmp_path: Path) -> None:
+    diagram = diagram_with(half)
+    again = pickle.loads(pickle.dumps(diagram))
+    assert again == diagram
+    assert b"co_code" not in pickle.dumps(diagram)
+    file = tmp_path / "laws.py"
+    file.write_text("def twice(u):\n    return 2.0 * u\n", encoding="utf-8")
+    ab.save_diagram(diagram_with(half), tmp_path / "model.json")
+    text = (tmp_path / "model.json").read_text(encoding="utf-8")
+    reference = next(part for part in text.split('"') if part.endswith(":half"))
+    (tmp_path / "model.json").write_text(text.replace(reference, "laws.py:twice"), encoding="utf-8")
+    trusted = ab.load_diagram(tmp_path / "model.json", trust=True)
+    assert pickle.loads(pickle.dumps(trusted)) == trusted
+    file.unlink()
+    with pytest.raises(errors.FormatError, match=r"laws\.py:twice' names no function of a file"):
+        pickle.loads(pickle.dumps(trusted))
+
+
+def test_what_cannot_be_found_by_a_name_is_refused() -> None:
+    factor = 2.0
+
+    def scaled(u: float) -> float:
+        return factor * u
+
+    for function in (scaled, lambda u: 2.0 * u):
+        diagram = diagram_with(function)
+        with pytest.raises(errors.InputError, match=r"cannot be pickled.*Fix: write it with def at the top"):
+            pickle.dumps(diagram)
+        assert copy.deepcopy(diagram) == diagram  # within one process the function itself is there
+
+
+def test_a_run_in_progress_is_refused() -> None:
+    run = ab.begin("van_der_pol_pid")
+    for way in WAYS.values():
+        with pytest.raises(errors.InputError, match=r"a run in progress cannot be copied.*initial_state"):
+            way(run)
+    with pytest.raises(errors.InputError, match=r"native code cannot be pickled"):
+        pickle.dumps(ab.load_robot("twolink")._kernel("fkine").entry)
+    assert isinstance(pickle.loads(pickle.dumps(run.samples())), Samples)
+
+
+def in_another_process(sent: Mapping[str, Any], answer: Any) -> None:
+    """Compute with what was sent; send the bits back, or the error."""
+    try:
+        q = np.linspace(-1, 1, 6)
+        bits = {
+            "fkine": sent["fkine"](q).tobytes(),
+            "rne": sent["rne"](q, q, q, payload=2.0).tobytes(),
+            "arm": sent["arm"].inertia(q=q).tobytes(),
+            "compiled": sent["compiled"].simulate().signals.tobytes(),
+            "function": ab.simulate(sent["function"], stop_time=1.0).signals.tobytes(),
+        }
+        answer.send((bits, None))
+        ab.simulate(sent["compiled"], solver="rk54")
+    except errors.ArmblocksError as error:
+        answer.send((None, error))
+    except BaseException:
+        answer.send((traceback.format_exc(), None))
+        raise
+
+
+def test_values_travel_to_a_process_of_its_own() -> None:
+    arm = ab.load_robot("puma560")
+    compiled = ab.compile_diagram(ab.load_diagram("van_der_pol_pid"))
+    function = diagram_with(half)
+    sent = {"arm": arm, "fkine": arm.fkine, "rne": arm.rne, "compiled": compiled, "function": function}
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=in_another_process, args=(sent, there))
+    process.start()
+    there.close()
+    bits, _ = here.recv()
+    _, error = here.recv()
+    process.join()
+    q = np.linspace(-1, 1, 6)
+    assert bits == {
+        "fkine": arm.fkine(q).tobytes(),
+        "rne": arm.rne(q, q, q, payload=ab.Payload(mass=2.0)).tobytes(),
+        "arm": arm.inertia(q).tobytes(),
+        "compiled": compiled.simulate().signals.tobytes(),
+        "function": ab.simulate(function, stop_time=1.0).signals.tobytes(),
+    }
+    assert isinstance(error, errors.UnknownNameError)
+    assert error.name == "rk54"
