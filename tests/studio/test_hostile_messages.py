@@ -16,8 +16,8 @@ from armblocks.diagram import Diagram
 from armblocks.formats import diagram_to_bytes, load_robot, write_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
-from armblocks.studio.server.page import Page
 
 NESTED = "…nested…"
 """Stands in a request for a list in a list in a list …"""

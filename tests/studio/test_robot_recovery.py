@@ -14,7 +14,7 @@ from armblocks.formats import load_robot, write_robot
 from armblocks.studio.documents import open_files
 from armblocks.studio.protocol import messages as say
 from armblocks.studio.protocol import robot_messages as say_robot
-from armblocks.studio.robots.edits import SetCell
+from armblocks.studio.protocol.robot_edit_messages import SetCell
 from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
 
 

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.server import outbox as outbox_module
+from armblocks.studio.protocol import outbox as outbox_module
+from armblocks.studio.protocol.outbox import Outbox
+from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
-from armblocks.studio.server.outbox import Outbox
-from armblocks.studio.server.page import Page
 
 PATIENCE_SECONDS = 180.0
 

@@ -18,13 +18,13 @@ import pytest
 
 from armblocks.errors import SimulationError
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.page import Page
 from armblocks.studio.runs import process as run_process
 from armblocks.studio.runs import report as run_report
 from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.runs import workers
 from armblocks.studio.runs.history import RunHistory
 from armblocks.studio.server.hub import Hub
-from armblocks.studio.server.page import Page
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
 PATIENCE_SECONDS = 60.0

@@ -1,1 +1,1 @@
-"""What front end and server say to each other: messages, frames of samples, and the schema of both."""
+"""What front end and server say to each other (messages, frames of samples), and the connected pages."""

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from armblocks.studio.protocol.alteration import Alteration
 from armblocks.studio.protocol.message import Message
-from armblocks.studio.robots.edits import RobotEdit
+from armblocks.studio.protocol.robot_edit_messages import RobotEdit
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Joints = Annotated[list[Number], Field(max_length=1000)]

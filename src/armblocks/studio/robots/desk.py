@@ -24,7 +24,7 @@ from armblocks.studio.robots.scene import link_frames_of, scene_of
 from armblocks.studio.robots.tables import robot_tables
 
 if TYPE_CHECKING:
-    from armblocks.studio.server.page import Page
+    from armblocks.studio.protocol.page import Page
 
 Result = TypeVar("Result")
 _PICTURE_SIZE = (760.0, 560.0)

@@ -1,4 +1,4 @@
-"""What a person does to a robot, as data: each edit is a pure function from one robot to the next.
+"""Each edit of a robot is a pure function from one robot to the next.
 
 Texts of cells are read as those of block parameters are (:mod:`armblocks.studio.sheet.parameter_values`):
 numbers and formulas of numbers, by the interpreter of MATLAB scripts. A robot is always whole: an edit that
@@ -11,14 +11,20 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from armblocks.errors import InputError, RobotError
 from armblocks.robot import DhConvention, DhRow, Link, Robot, link_from_dh, serial_chain
 from armblocks.robot.dh_conversion import converted, reread
-from armblocks.studio.protocol.message import Message
+from armblocks.studio.protocol.robot_edit_messages import (
+    AddJoint,
+    MoveJoint,
+    RemoveJoint,
+    RenameLink,
+    RobotEdit,
+    SetCell,
+    SetConvention,
+)
 from armblocks.studio.robots.columns import ROBOT_COLUMNS, Column, Owner, Quantity, Value
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
 from armblocks.studio.sheet.parameter_values import number_value
@@ -26,60 +32,6 @@ from armblocks.studio.sheet.parameter_values import number_value
 _OWN_UNIT = re.compile(r"\b(pi|deg|rad)\b|°")
 _UNIT_BEHIND = re.compile(r"(?<=[0-9.)])\s*(deg|rad)\b")
 _DEGREES = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(?:\*?\s*deg|°)\s*")
-
-
-class SetCell(Message):
-    """Type into one cell: of a link, or of the robot where ``link`` is empty."""
-
-    kind: Literal["cell"] = "cell"
-    link: str
-    column: str
-    text: str = Field(max_length=1000)
-    angles: Literal["deg", "rad"]
-    """What a plain number means in a column of angles; a text that says pi, deg or rad says it itself."""
-
-
-class RenameLink(Message):
-    """Give a link another name."""
-
-    kind: Literal["rename"] = "rename"
-    link: str
-    name: str = Field(max_length=200)
-
-
-class AddJoint(Message):
-    """Put a new link behind another one, or at the base where ``after`` is empty."""
-
-    kind: Literal["add"] = "add"
-    after: str
-
-
-class RemoveJoint(Message):
-    """Take a link out; what hangs on it hangs on its parent then."""
-
-    kind: Literal["remove"] = "remove"
-    link: str
-
-
-class MoveJoint(Message):
-    """Let a link of a chain change places with its neighbour."""
-
-    kind: Literal["move"] = "move"
-    link: str
-    by: Literal[-1, 1]
-
-
-class SetConvention(Message):
-    """Read the rows by the other convention, or write the same arm in it (``keep_arm``)."""
-
-    kind: Literal["convention"] = "convention"
-    convention: Literal["standard", "modified"]
-    keep_arm: bool
-
-
-RobotEdit = Annotated[
-    SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention, Field(discriminator="kind")
-]
 
 
 def robot_summary(edit: RobotEdit) -> str:

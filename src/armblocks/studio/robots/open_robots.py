@@ -7,12 +7,12 @@ import dataclasses
 
 from armblocks.face.arm import Arm
 from armblocks.robot import Robot
-from armblocks.studio.documents.file_kind import RobotKind
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.protocol import robot_messages as say
 from armblocks.studio.robots.document import RobotDocument
+from armblocks.studio.robots.robot_kind import RobotKind
 from armblocks.studio.robots.tables import robot_shown
 
 

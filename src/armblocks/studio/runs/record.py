@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import tempfile
 
-Said = str | bytes
-"""A message as JSON, or a frame of samples."""
+from armblocks.studio.protocol.outbox import Said
 
 
 class RunRecord:

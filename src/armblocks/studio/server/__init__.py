@@ -1,1 +1,1 @@
-"""The web server: connections, keys, requests, the life of the program."""
+"""The web server: keys, requests, the life of the program."""

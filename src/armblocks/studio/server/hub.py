@@ -23,10 +23,10 @@ from armblocks.diagram.parameter import Value
 from armblocks.drawing.diagram_file import drawing_bytes
 from armblocks.errors import ArmblocksError, FormatError, InertiaWarning, InputError, UnknownNameError
 from armblocks.robot import Robot
-from armblocks.studio.documents.file_kind import Performed
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.page import NoRequestError, Page
 from armblocks.studio.robots.desk import RobotDesk
 from armblocks.studio.robots.scene import link_frames_of, scene_of
 from armblocks.studio.runs.process import RunProcess
@@ -34,9 +34,9 @@ from armblocks.studio.runs.record import RunRecord
 from armblocks.studio.runs.report import report_of
 from armblocks.studio.runs.settings import setting_rules, solver_choices
 from armblocks.studio.runs.workers import Workers
-from armblocks.studio.server.page import NoRequestError, Page
 from armblocks.studio.sheet.check import check
 from armblocks.studio.sheet.clipping import clipped
+from armblocks.studio.sheet.diagram_kind import Performed
 from armblocks.studio.sheet.mask_edits import mask_of
 from armblocks.studio.sheet.nesting import inside, linked_part, with_robot
 from armblocks.studio.sheet.open_documents import OpenDocument, OpenDocuments

@@ -25,9 +25,9 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.outbox import Outbox
+from armblocks.studio.protocol.page import NoRequestError, Page
 from armblocks.studio.server.guard import Guard, Keys
-from armblocks.studio.server.outbox import Outbox
-from armblocks.studio.server.page import NoRequestError, Page
 
 if TYPE_CHECKING:
     from armblocks.studio.server.hub import Hub

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from starlette.websockets import WebSocketDisconnect
 
-from armblocks.studio.runs.record import Said
-from armblocks.studio.server.outbox import Outbox
+from armblocks.studio.protocol.outbox import Outbox, Said
 
 if TYPE_CHECKING:
     from armblocks.studio.protocol.message import Message

@@ -6,8 +6,8 @@ import asyncio
 from collections import deque
 from collections.abc import Awaitable, Callable
 
-from armblocks.studio.runs.record import Said
-
+Said = str | bytes
+"""A message as JSON, or a frame of samples."""
 BEHIND_BYTES = 4 * 2**20
 """A page that has so much to come is told of a run no faster than it listens."""
 MOST_BYTES = 64 * 2**20

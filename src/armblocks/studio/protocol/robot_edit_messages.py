@@ -1,0 +1,63 @@
+"""What a person does to a robot, as data; :mod:`armblocks.studio.robots.edits` carries it out."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from armblocks.studio.protocol.message import Message
+
+
+class SetCell(Message):
+    """Type into one cell: of a link, or of the robot where ``link`` is empty."""
+
+    kind: Literal["cell"] = "cell"
+    link: str
+    column: str
+    text: str = Field(max_length=1000)
+    angles: Literal["deg", "rad"]
+    """What a plain number means in a column of angles; a text that says pi, deg or rad says it itself."""
+
+
+class RenameLink(Message):
+    """Give a link another name."""
+
+    kind: Literal["rename"] = "rename"
+    link: str
+    name: str = Field(max_length=200)
+
+
+class AddJoint(Message):
+    """Put a new link behind another one, or at the base where ``after`` is empty."""
+
+    kind: Literal["add"] = "add"
+    after: str
+
+
+class RemoveJoint(Message):
+    """Take a link out; what hangs on it hangs on its parent then."""
+
+    kind: Literal["remove"] = "remove"
+    link: str
+
+
+class MoveJoint(Message):
+    """Let a link of a chain change places with its neighbour."""
+
+    kind: Literal["move"] = "move"
+    link: str
+    by: Literal[-1, 1]
+
+
+class SetConvention(Message):
+    """Read the rows by the other convention, or write the same arm in it (``keep_arm``)."""
+
+    kind: Literal["convention"] = "convention"
+    convention: Literal["standard", "modified"]
+    keep_arm: bool
+
+
+RobotEdit = Annotated[
+    SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention, Field(discriminator="kind")
+]

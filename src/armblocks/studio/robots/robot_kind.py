@@ -1,0 +1,77 @@
+"""How the studio begins, reads and writes the files of robots."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from armblocks import formats
+from armblocks.errors import ArmblocksWarning
+from armblocks.robot import Robot, standard_dh
+from armblocks.studio.documents.file_kind import FileKind
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.robots.document import RobotDocument
+
+RobotPerformed = say.RobotChange | say.RobotUndo | say.RobotRedo
+_PERFORMED: TypeAdapter[RobotPerformed] = TypeAdapter(RobotPerformed)
+
+
+class RobotKind(FileKind[Robot, RobotDocument]):
+    """Robots as the editor's tables show them."""
+
+    name = "robot"
+
+    def __init__(self, folder: ProjectFolder) -> None:
+        self._folder = folder
+
+    def new(self) -> Robot:
+        """Two links of half a metre."""
+        first = standard_dh("link1", a=0.5, mass=1.0, centre_of_mass=(-0.25, 0.0, 0.0))
+        second = standard_dh("link2", parent="link1", a=0.5, mass=1.0, centre_of_mass=(-0.25, 0.0, 0.0))
+        return Robot(name="new robot", links=(first, second))
+
+    def shipped(self, name: str) -> Robot:
+        """A shipped robot, or a robot file of the project."""
+        return formats.load_robot(self._folder.robot_path(name, formats.list_robots()))
+
+    def edited(self, value: Robot, version: int = 0) -> RobotDocument:
+        """A robot in the editor."""
+        return RobotDocument(value, version=version)
+
+    def from_file(self, data: bytes, place: Path) -> Robot:
+        """The robot of a file of ours, which knows its file."""
+        (robot,) = formats.read_robots(data, place.name).values()
+        return replace(robot, source=str(place))
+
+    def to_file(self, value: Robot, place: Path) -> bytes:
+        """Its canonical document."""
+        return formats.write_robot(value)
+
+    def renamed(self, value: Robot, place: Path) -> Robot:
+        """A robot keeps its own name, whatever its file is called."""
+        return value
+
+    def from_text(self, text: str, where: str) -> Robot:
+        """A robot of the journal."""
+        with warnings.catch_warnings():  # what it warns of stands among the findings
+            warnings.simplefilter("ignore", ArmblocksWarning)
+            (robot,) = formats.read_robots(text.encode(), "journal.json").values()
+        return robot
+
+    def to_text(self, value: Robot) -> str:
+        """The canonical document."""
+        return formats.write_robot(value).decode()
+
+    def request(self, said: Mapping[str, Any]) -> RobotPerformed:
+        """What a page asked of the robot."""
+        return _PERFORMED.validate_python({**said, "robot": ""})
+
+    def parts(self, value: Robot) -> int:
+        """Links."""
+        return len(value.links)

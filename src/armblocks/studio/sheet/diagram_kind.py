@@ -1,0 +1,98 @@
+"""How the studio begins, reads and writes the files of diagrams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from armblocks import formats
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram
+from armblocks.errors import UnknownNameError
+from armblocks.studio.documents.file_kind import FileKind
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol import messages as say
+from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.parameter_values import ResolveRobot
+from armblocks.studio.sheet.placing import placed
+
+Performed = say.Change | say.Undo | say.Redo | say.ArrangeBlocks
+_PERFORMED: TypeAdapter[Performed] = TypeAdapter(Performed)
+
+
+class DiagramKind(FileKind[Diagram, Document]):
+    """Diagrams, complete or not."""
+
+    name = "diagram"
+
+    def __init__(self, folder: ProjectFolder, resolve_robot: ResolveRobot) -> None:
+        self._folder = folder
+        self._resolve_robot = resolve_robot
+
+    def new(self) -> Diagram:
+        """An empty sheet."""
+        return Diagram(name="untitled", blocks={})
+
+    def shipped(self, name: str) -> Diagram:
+        """A shipped example."""
+        known = formats.list_examples()
+        if name not in known:
+            raise UnknownNameError("example", name, known)
+        return placed(formats.load_diagram(name, BLOCKS))
+
+    def edited(self, value: Diagram, version: int = 0) -> Document:
+        """A drawing."""
+        return Document(value, self._resolve_robot, version=version, read_diagram=self.from_text)
+
+    def from_file(self, data: bytes, place: Path) -> Diagram:
+        """The diagram, every block with a place; it may link to libraries of the project."""
+        read = formats.diagram_from_bytes(
+            data,
+            place.name,
+            BLOCKS,
+            self._resolve_robot,
+            folder=place.parent,
+            draft=True,
+            read_library=self._folder.read_library,
+        )
+        return placed(read)
+
+    def to_file(self, value: Diagram, place: Path) -> bytes:
+        """Its canonical document; robots of the project are named from there."""
+        return formats.diagram_to_bytes(value, self._resolve_robot, folder=place.parent)
+
+    def renamed(self, value: Diagram, place: Path) -> Diagram:
+        """A diagram is called as its file."""
+        return replace(value, name=place.stem)
+
+    def from_text(self, text: str, where: str) -> Diagram:
+        """A drawing of the journal, or what was copied of one.
+
+        The sheets of library blocks do not stand in the text: they are placed as where the file was opened.
+        """
+        read = formats.diagram_from_bytes(
+            text.encode(),
+            where,
+            BLOCKS,
+            self._resolve_robot,
+            folder=self._folder.root,
+            draft=True,
+            read_library=self._folder.read_library,
+        )
+        return placed(read)
+
+    def to_text(self, value: Diagram) -> str:
+        """The canonical document."""
+        return formats.diagram_to_bytes(value, self._resolve_robot, folder=self._folder.root).decode()
+
+    def request(self, said: Mapping[str, Any]) -> Performed:
+        """What a page asked of the drawing."""
+        return _PERFORMED.validate_python({**said, "document": ""})
+
+    def parts(self, value: Diagram) -> int:
+        """Blocks of the top sheet."""
+        return len(value.blocks)
