@@ -117,6 +117,12 @@ def test_a_table_without_numbers_in_a_header(tmp_path: Path) -> None:
     assert np.asarray(ab.load_table(path)).tolist() == [[0.0, 1.0, 2.0], [1.0, 3.0, 4.0]]
 
 
+def test_names_with_commas_in_a_header(tmp_path: Path) -> None:
+    path = tmp_path / "matrix.csv"
+    path.write_text('time, "M[0,0]", "M[0,1]"\n0,1,2\n1,3,4\n')
+    assert ab.load_table(path).names == ("M[0,0]", "M[0,1]")
+
+
 def test_tables_that_are_none_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"the table has shape \(2,\).*instants \(s\) into the first column"):
         FromFile(data=(0.0, 1.0))

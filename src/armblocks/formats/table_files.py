@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from collections.abc import Callable, Mapping
 from os import PathLike, fspath
@@ -57,10 +58,10 @@ def load_table(path: str | PathLike[str]) -> TimeTable:
 
 def _read_csv(data: bytes) -> Columns:
     text = data.decode("utf-8-sig")
-    head = text.partition("\n")[0].strip().split(",")
+    head = next(csv.reader([text.partition("\n")[0].strip()], skipinitialspace=True), [""])
     named = any(not _is_number(entry) for entry in head)
     numbers = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=1 if named else 0, ndmin=2)
-    names = [entry.strip().strip('"') for entry in head] if named else [f"c{k}" for k in range(len(head))]
+    names = [entry.strip() for entry in head] if named else [f"c{k}" for k in range(len(head))]
     return dict(zip(names, numbers.T, strict=True))
 
 
