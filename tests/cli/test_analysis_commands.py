@@ -1,6 +1,7 @@
 """What ``armblocks linearize`` and ``armblocks trim`` say and leave behind."""
 
 import json
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,6 +43,28 @@ def test_a_point_is_found_and_saved_and_runs_from_there(invoke: Invoke, tmp_path
     assert (tmp_path / "rest.npz").is_file()
     again = invoke("run", "falling_pendulum", "--from-state", "rest.npz", "--stop-time", "1", "--no-figures")
     assert again.exit_code == 0, again.output
+
+
+def test_a_bare_trim_that_finds_no_rest_lists_what_can_be_given(invoke: Invoke) -> None:
+    result = invoke("trim", "falling_pendulum")
+    assert result.exit_code == 2
+    assert "no operating point was found" in result.stderr
+    for words in ("states, for --fix", "pendulum/qd", "parameters, for --free", "signals, for --output"):
+        assert words in result.stdout
+    lines = [line.strip() for line in result.stdout.splitlines() if line.startswith("  armblocks trim")]
+    assert len(lines) == 2
+    for line in lines:  # what is proposed works
+        assert "at rest" in invoke(*shlex.split(line)[1:]).stdout
+    listed = invoke("trim", "falling_pendulum", "--names")
+    assert listed.exit_code == 0
+    assert listed.stdout == result.stdout
+
+
+def test_a_bare_trim_of_a_diagram_without_states_says_so(invoke: Invoke) -> None:
+    result = invoke("trim", "kr180model")
+    assert result.exit_code == 0
+    assert "There are no states" in result.stdout
+    assert "--free jtraj.q0 --output rne/tau=0.5" in result.stdout
 
 
 def test_what_cannot_be_read_is_refused(refused: Callable[..., str]) -> None:

@@ -1,6 +1,9 @@
 """What each command says and leaves behind."""
 
+import json
+import os
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +12,7 @@ import pytest
 from typer.testing import Result
 
 import armblocks as ab
+from armblocks.simulation.tableaux import TABLEAUX
 
 Invoke = Callable[..., Result]
 Spawn = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -57,12 +61,59 @@ def test_show_names_the_links_whose_inertia_no_body_has(invoke: Invoke) -> None:
     assert [name for name in names if any(f"'{name}'" in line for line in warned)] == [names[0], names[2]]
 
 
-@pytest.mark.parametrize("kind", ["robots", "blocks", "examples"])
+NAMES = {
+    "robots": ab.list_robots,
+    "blocks": ab.list_blocks,
+    "examples": ab.list_examples,
+    "libraries": lambda: (*ab.list_libraries(), "JointServo"),
+    "solvers": lambda: [tableau.name for tableau in TABLEAUX],
+}
+
+
+@pytest.mark.parametrize("kind", NAMES)
 def test_list_names_all_of_a_kind(kind: str, invoke: Invoke) -> None:
-    names = {"robots": ab.list_robots, "blocks": ab.list_blocks, "examples": ab.list_examples}[kind]()
     result = invoke("list", kind)
     assert result.exit_code == 0
-    assert set(names) <= set(result.stdout.split())
+    assert set(NAMES[kind]()) <= set(result.stdout.split())
+
+
+COMPLETED = {
+    "run kr180mo": ["kr180model"],
+    "show joint_": ["joint_servos"],
+    "bench --robot twol": ["twolink"],
+    "trim mo": ["models/", "motor.json"],
+    "diff falling_pendulum models/a": ["models/arm.json"],
+    "studio nowhere/a": [],
+    "lin": ["linearize"],
+}
+COMPLETE = """
+import contextlib, io, json, os, sys
+from armblocks.cli.main import app
+
+found = {}
+for typed in json.loads(sys.argv[1]):
+    os.environ |= {"COMP_WORDS": f"armblocks {typed}", "COMP_CWORD": str(len(typed.split()))}
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text), contextlib.suppress(SystemExit):
+        app(prog_name="armblocks")
+    found[typed] = text.getvalue().split()
+print(json.dumps([found, sorted({"numpy", "casadi"} & set(sys.modules))]))
+"""
+
+
+def test_the_shell_completes_names_and_files_without_a_heavy_import(tmp_path: Path) -> None:
+    (tmp_path / "models").mkdir()
+    for name in ("motor.json", "model.txt", "models/arm.json"):
+        (tmp_path / name).touch()
+    done = subprocess.run(
+        [sys.executable, "-c", COMPLETE, json.dumps(list(COMPLETED))],
+        env={**os.environ, "_ARMBLOCKS_COMPLETE": "complete_bash"},
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert json.loads(done.stdout or "0") == [COMPLETED, []], done.stderr
 
 
 def test_bench_tells_a_time_for_every_method(invoke: Invoke) -> None:

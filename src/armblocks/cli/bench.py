@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armblocks.cli.completion import complete_robots
 from armblocks.cli.terminal import STRONG, results_console, table
 
 if TYPE_CHECKING:
@@ -30,7 +31,9 @@ _REPEATS = 5
 
 
 def bench(
-    robot: Annotated[str, typer.Option(help="A shipped robot's name, or a robot file.")] = "puma560",
+    robot: Annotated[
+        str, typer.Option(help="A shipped robot's name, or a robot file.", autocompletion=complete_robots)
+    ] = "puma560",
     samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Size of the batch.")] = 100_000,
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads of the last column.")] = 2,
 ) -> None:

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from armblocks.cli.completion import ModelName
 from armblocks.cli.terminal import results_console
 
 
 def diagram(
-    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    model: ModelName,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="A .svg, .png or .pdf file.", show_default="MODEL.svg"),

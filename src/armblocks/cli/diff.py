@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from armblocks.cli.completion import ModelName, complete_models
 from armblocks.cli.terminal import ACCENT, ERROR, GOOD, STRONG, results_console
 
 if TYPE_CHECKING:
@@ -27,8 +28,10 @@ _LONGEST = 160
 
 
 def diff(
-    before: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
-    after: Annotated[str, typer.Argument(help="The diagram to compare it with.")],
+    before: ModelName,
+    after: Annotated[
+        str, typer.Argument(help="The diagram to compare it with.", autocompletion=complete_models)
+    ],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of lines.")] = False,
     trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagrams name.")] = False,
 ) -> None:

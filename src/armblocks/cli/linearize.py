@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from armblocks.cli.assignments import parse_assignments
+from armblocks.cli.completion import ModelName
 from armblocks.cli.terminal import STRONG, results_console, table
 from armblocks.errors import InputError
 
@@ -21,7 +22,7 @@ SECTION = 12
 
 
 def linearize(
-    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    model: ModelName,
     inputs: Annotated[
         list[str] | None,
         typer.Option(

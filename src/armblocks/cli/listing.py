@@ -20,13 +20,20 @@ class Kind(StrEnum):
     ROBOTS = "robots"
     BLOCKS = "blocks"
     EXAMPLES = "examples"
+    LIBRARIES = "libraries"
+    SOLVERS = "solvers"
 
 
 def list_names(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> None:
-    """List the shipped robots, the blocks, or the shipped example diagrams."""
-    console = results_console()
-    rows = {Kind.ROBOTS: _robots, Kind.BLOCKS: _blocks, Kind.EXAMPLES: _examples}[kind]()
-    console.print(rows)
+    """List the shipped robots, example diagrams and libraries of subsystems, the blocks, or the solvers."""
+    rows = {
+        Kind.ROBOTS: _robots,
+        Kind.BLOCKS: _blocks,
+        Kind.EXAMPLES: _examples,
+        Kind.LIBRARIES: _libraries,
+        Kind.SOLVERS: _solvers,
+    }[kind]()
+    results_console().print(rows)
 
 
 def _robots() -> Table:
@@ -59,4 +66,29 @@ def _examples() -> Table:
             diagram = ab.load_diagram(name)
             stop = f"{diagram.settings.stop_time:g} s"
             rows.add_row(name, str(len(diagram.blocks)), stop, diagram.description)
+    return rows
+
+
+def _libraries() -> Table:
+    import armblocks as ab
+
+    rows = table(("library", "left"), ("subsystem", "left"), ("parameters", "left"), ("what it is", "left"))
+    for library in ab.list_libraries():
+        for name, subsystem in ab.load_library(library).items():
+            inside = subsystem.diagram
+            rows.add_row(
+                library, name, ", ".join(parameter.name for parameter in inside.mask), inside.description
+            )
+    return rows
+
+
+def _solvers() -> Table:
+    from armblocks.simulation.tableaux import TABLEAUX
+
+    rows = table(
+        ("solver", "left"), ("also", "left"), ("order", "right"), ("step", "left"), ("method", "left")
+    )
+    for tableau in TABLEAUX:
+        step = "adaptive" if tableau.adaptive else "fixed"
+        rows.add_row(tableau.name, ", ".join(tableau.aliases), str(tableau.order), step, tableau.title)
     return rows

@@ -44,7 +44,6 @@ app = typer.Typer(
     name="armblocks",
     cls=Commands,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Industrial arms and block diagrams, traced once and compiled to native code.",

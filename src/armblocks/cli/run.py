@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armblocks.cli.assignments import parse_assignments
+from armblocks.cli.completion import ModelName
 from armblocks.cli.progress import RunProgress
 from armblocks.cli.terminal import messages_console, results_console
 from armblocks.errors import FormatError, LimitWarning, SimulationError
@@ -29,7 +30,7 @@ class DataFormat(StrEnum):
 
 
 def run(
-    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    model: ModelName,
     stop_time: Annotated[
         float | None, typer.Option(help="Simulated time, s.", show_default="the model's")
     ] = None,

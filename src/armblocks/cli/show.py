@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from armblocks.cli.completion import complete_anything
 from armblocks.cli.terminal import STRONG, results_console, table
 
 if TYPE_CHECKING:
@@ -20,7 +21,11 @@ _DEGREE = math.pi / 180.0
 
 def show(
     model: Annotated[
-        str, typer.Argument(help="The name of something shipped, or a file: a robot, a diagram, a library.")
+        str,
+        typer.Argument(
+            help="The name of something shipped, or a file: a robot, a diagram, a library.",
+            autocompletion=complete_anything,
+        ),
     ],
     name: Annotated[str | None, typer.Option(help="Which robot of a script that makes several.")] = None,
     flat: Annotated[bool, typer.Option("--flat", help="All blocks of a diagram, without hierarchy.")] = False,

@@ -7,13 +7,19 @@ from typing import Annotated
 
 import typer
 
+from armblocks.cli.completion import complete_models
 from armblocks.cli.terminal import messages_console
 from armblocks.errors import FormatError, InputError
 
 
 def studio(
     model: Annotated[
-        str, typer.Argument(help="A shipped example's name, or a diagram file.", show_default="an example")
+        str,
+        typer.Argument(
+            help="A shipped example's name, or a diagram file.",
+            show_default="an example",
+            autocompletion=complete_models,
+        ),
     ] = "",
     folder: Annotated[
         Path | None,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,15 +10,17 @@ import typer
 from rich.console import Console
 
 from armblocks.cli.assignments import parse_assignments, parse_value
+from armblocks.cli.completion import ModelName
 from armblocks.cli.terminal import STRONG, results_console, table
-from armblocks.errors import InputError
+from armblocks.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
+    from armblocks import Diagram
     from armblocks.analysis.trim import TrimResult
 
 
 def trim(
-    model: Annotated[str, typer.Argument(help="A shipped example's name, or the path of a diagram file.")],
+    model: ModelName,
     fixed: Annotated[
         list[str] | None,
         typer.Option("--fix", metavar="STATE=VALUE", help="A state with a given value; may be repeated."),
@@ -51,30 +53,58 @@ def trim(
     save: Annotated[
         Path | None, typer.Option(help="Save the point, for armblocks run --from-state, as .npz.")
     ] = None,
+    names: Annotated[
+        bool, typer.Option("--names", help="Only list the states, parameters and signals to choose from.")
+    ] = False,
 ) -> None:
-    """Find the operating point at which a diagram rests, and print it."""
+    """Find the operating point at which a diagram rests, and print it.
+
+    With MODEL alone all states are sought. Where they find no rest, the names to choose from are listed.
+    """
     import armblocks as ab
 
     diagram = ab.load_diagram(model)
     parameters = parse_assignments(assignments or [])
-    found = ab.trim(
-        diagram,
-        states=_pairs(fixed, "--fix"),
-        free=free or (),
-        outputs=_pairs(outputs, "--output"),
-        moving=moving or (),
-        guess=_pairs(guess, "--guess"),
-        bounds={name: _ends(name, value) for name, value in _pairs(bounds, "--bound").items()},
-        at=at,
-        parameters=parameters,
-    )
     console = results_console()
+
+    bare = not any((fixed, free, outputs, moving, guess, bounds, save))
+    if names or (bare and not ab.compile_diagram(diagram).system.states.size):
+        _list_names(diagram, model, at, parameters, console)
+        return
+    try:
+        found = ab.trim(
+            diagram,
+            states=_pairs(fixed, "--fix"),
+            free=free or (),
+            outputs=_pairs(outputs, "--output"),
+            moving=moving or (),
+            guess=_pairs(guess, "--guess"),
+            bounds={name: _ends(name, value) for name, value in _pairs(bounds, "--bound").items()},
+            at=at,
+            parameters=parameters,
+        )
+    except SimulationError:
+        if bare:
+            _list_names(diagram, model, at, parameters, console)
+        raise
     print_trim(found, console)
     if save is not None:
         from armblocks.face.model import state_at
 
         state_at(diagram, found.point).save(save)
         console.print(f"saved: {save}", soft_wrap=True)
+
+
+def _list_names(
+    diagram: Diagram, model: str, at: float, parameters: Mapping[str, object], console: Console
+) -> None:
+    import armblocks as ab
+    from armblocks.cli.trimmable import print_trimmable
+    from armblocks.face.linearizing import described_diagram, operating_point_at
+
+    described = described_diagram(diagram, parameters)
+    start = operating_point_at(described, at)
+    print_trimmable(ab.compile_diagram(described).system, start, model, console)
 
 
 def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
