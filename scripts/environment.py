@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -48,8 +49,8 @@ def prepare(*extras: str) -> None:
         return
     together = sorted(set(extras) | (present or set()))
     target = f".[{','.join(together)}]" if together else "."
-    say(f"== install armblocks {target} (some minutes the first time)")
-    code = run(PYTHON, "-m", "pip", "install", "--quiet", "--no-input", "--editable", target)
+    say(f"== install armblocks {target} (a minute or more the first time)")
+    code = _pip_install("--editable", target)
     if code != 0:
         sys.exit(f"pip could not install armblocks (exit code {code}); its own message stands above")
     STAMP.write_text(json.dumps({"digest": wanted_by_pyproject, "extras": together}), encoding="utf-8")
@@ -89,6 +90,44 @@ def _create() -> None:
             f"Python could not make a virtual environment in {VENV}. "
             "On Debian and Ubuntu its module is a package of its own: apt-get install python3-venv"
         )
+
+
+PIPS_STEPS = ("Collecting", "Downloading", "Building", "Installing", "Successfully")
+"""How the lines of pip begin that tell how far it is."""
+
+
+def _pip_install(*what: str) -> int:
+    """Run pip, and show each of its steps with the time at which it begins; returns the exit code."""
+    # Bytecode is made for what is imported, when it is: making it for all takes longer than all else.
+    command = [
+        str(PYTHON),
+        "-m",
+        "pip",
+        "install",
+        "--no-input",
+        "--no-compile",
+        "--progress-bar",
+        "off",
+        *what,
+    ]
+    start = time.monotonic()
+    with subprocess.Popen(
+        command,
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+    ) as pip:
+        assert pip.stdout is not None
+        for line in pip.stdout:
+            step = line.strip()
+            if step.startswith(PIPS_STEPS):
+                say(
+                    f"   {time.monotonic() - start:4.0f} s  {step if len(step) <= 100 else step[:97] + '...'}"
+                )
+    return pip.returncode
 
 
 def _digest() -> str:

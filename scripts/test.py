@@ -23,10 +23,10 @@ from threading import Event
 
 from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
 
-SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py")
+SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend/build_page.py")
 
 STEPS: dict[str, tuple[str | object, ...]] = {
-    "page": (PYTHON, "hatch_build.py"),
+    "page": (PYTHON, "frontend/build_page.py"),
     "web types": (PYTHON, "scripts/studio_types.py", "--check"),
     "lint": (BINARIES / "ruff", "check", *SOURCES),
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),

@@ -9,6 +9,7 @@
     ├── DiagramError          a diagram that cannot be built
     │   └── AlgebraicLoopError
     ├── FormatError           a file that cannot be read or written (file:line)
+    ├── MissingLibraryError   a library that an extra of the package brings is not installed
     ├── CompileError          equations that the compiler cannot translate
     └── SimulationError       a run that could not go on (partial results are kept)
 
@@ -141,6 +142,20 @@ class AlgebraicLoopError(DiagramError):
 
 class FormatError(ArmblocksError):
     """A file that cannot be read or written; ``where`` is file:line."""
+
+
+class MissingLibraryError(ArmblocksError):
+    """A library that an extra of the package brings is not installed."""
+
+    def __init__(self, library: str, extra: str, use: str, *, where: str = "") -> None:
+        self.library = library
+        self.extra = extra
+        super().__init__(
+            f"the library '{library}' is not installed; it is needed for {use}",
+            where=where,
+            allowed="everything else works without it",
+            fix=f'pip install "armblocks[{extra}]"',
+        )
 
 
 class CompileError(ArmblocksError):

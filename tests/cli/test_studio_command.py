@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from armblocks.errors import FormatError
+from armblocks.studio.built_page import build_in_checkout, built_page
+
 Refused = Callable[..., str]
 
 
@@ -53,11 +56,30 @@ def test_a_model_that_is_not_there(refused: Refused) -> None:
 
 def test_an_installation_without_the_page(refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
     def missing() -> Path:
-        from armblocks.studio.server import web_app as server
-
-        return server.built_page(Path("nowhere"))
+        return built_page(Path("nowhere"), Path("nowhere/build_page.py"))
 
     monkeypatch.setattr("armblocks.studio.server.launch.built_page", missing)
     text = said(refused("studio", "--no-browser"))
     assert "this installation has no studio page" in text
-    assert "install Node.js" in text
+    assert "install a wheel that has the page" in text
+
+
+def test_a_checkout_builds_the_page_once_and_says_why_it_cannot(tmp_path: Path) -> None:
+    web, script = tmp_path / "web", tmp_path / "build_page.py"
+    lines: list[str] = []
+    build_in_checkout(lines.append, web, script)  # not a checkout: nothing to build from
+    assert lines == []
+    script.write_text("raise SystemExit(3)")
+    with pytest.raises(FormatError, match=r"page of the studio could not be built.*install Node\.js"):
+        build_in_checkout(lines.append, web, script)
+    with pytest.raises(FormatError, match=r"run 'python .*build_page\.py'"):
+        built_page(web, script)
+    script.write_text(
+        f"import pathlib; p = pathlib.Path({str(web)!r}); p.mkdir(); (p / 'index.html').touch()"
+    )
+    build_in_checkout(lines.append, web, script)
+    assert len(lines) == 2
+    assert "has no studio page yet: it is built now" in lines[0]
+    script.write_text("raise SystemExit(3)")
+    build_in_checkout(lines.append, web, script)  # it is there
+    assert built_page(web) == web

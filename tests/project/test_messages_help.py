@@ -18,6 +18,7 @@ TREE = {
 }
 OWN = {
     "UnknownNameError": {"where", "fix"},  # says the nearest name; its kind says of what it is a name
+    "MissingLibraryError": {"where", "fix"},  # says what it is needed for, and how to install it
     "AlgebraicLoopError": {"where", "fix"},  # the loop itself is the place
 }
 """What an error says by itself."""

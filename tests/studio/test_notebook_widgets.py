@@ -14,7 +14,7 @@ from PIL import Image
 from playwright.sync_api import Browser, ConsoleMessage, FrameLocator, Page, Route, expect
 
 import armblocks as ab
-from armblocks.errors import InputError
+from armblocks.errors import InputError, MissingLibraryError
 from conftest import NOT_DRAWN, PATIENCE_MS
 
 ORIGIN = "http://notebook.test/"
@@ -153,6 +153,6 @@ def test_what_cannot_be_shown_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setitem(sys.modules, "anywidget", None)
     notebook._widget_class.cache_clear()
-    with pytest.raises(InputError, match=r"widgets need the package 'anywidget'.*armblocks\[notebook\]"):
+    with pytest.raises(MissingLibraryError, match=r"'anywidget' is not installed.*armblocks\[notebook\]"):
         ab.robot_widget(ab.load_robot("puma560"))
     notebook._widget_class.cache_clear()

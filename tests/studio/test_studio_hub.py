@@ -13,11 +13,11 @@ import pytest
 from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_diagram
+from armblocks.studio.built_page import built_page
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.server.hub import Hub, Page
 from armblocks.studio.server.launch import serve
-from armblocks.studio.server.web_app import built_page
 
 Told = list[dict[str, Any]]
 PATIENCE_SECONDS = 180

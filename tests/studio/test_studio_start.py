@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from armblocks.errors import FormatError
+from armblocks.studio import built_page as page_files
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.server import launch
-from armblocks.studio.server import web_app as studio_server
 from armblocks.studio.server.guard import Keys
 from armblocks.studio.server.hub import Hub
 from armblocks.studio.server.web_app import FOREVER, HubToCome, studio_app
@@ -94,6 +94,6 @@ def test_a_server_whose_hub_cannot_be_made_ends_with_the_reason(
         raise FormatError("the shipped robots are missing", where=str(folder.root))
 
     monkeypatch.setattr("armblocks.studio.server.hub.Hub", broken)
-    monkeypatch.setattr(launch, "built_page", lambda: studio_server.built_page(web))
+    monkeypatch.setattr(launch, "built_page", lambda: page_files.built_page(web))
     with pytest.raises(FormatError, match="the shipped robots are missing"):
         launch.serve(tmp_path, "", port=0, open_browser=False, announce=lambda _: None)

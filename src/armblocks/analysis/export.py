@@ -10,6 +10,7 @@ from typing import Any
 
 from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.extras import from_extra
 from armblocks.files import write_atomically
 
 FORMAT = "armblocks linear system 1"
@@ -92,7 +93,9 @@ def _npz(system: StateSpaceModel) -> bytes:
 def _mat(system: StateSpaceModel) -> bytes:
     """As MATLAB's ``ss(A, B, C, D, Ts)`` takes them."""
     import numpy as np
-    from scipy.io import savemat
+
+    with from_extra("analysis", "MAT files"):
+        from scipy.io import savemat
 
     buffer = io.BytesIO()
     content: dict[str, Any] = {letter: getattr(system, letter) for letter in "ABCD"}

@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 from armblocks.analysis.shown_values import is_stable
 from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.errors import InputError
+from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
 
 
 def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
     """Solutions of the Lyapunov equations of a stable system."""
-    from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
+    with from_extra("analysis", "Gramians"):
+        from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
     if not is_stable(system):
         raise InputError(

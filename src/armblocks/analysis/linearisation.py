@@ -28,6 +28,7 @@ from armblocks.equations import HybridSystem, Signature
 from armblocks.equations.clock_ratios import common_period, exact_clocks
 from armblocks.equations.evaluation import EvaluatedSystem, Point, Slopes
 from armblocks.errors import InputError, SimulationError, UnknownNameError
+from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -257,7 +258,8 @@ def _over_a_period(
     moved: NDArray[np.intp],
 ) -> tuple[tuple[Array, Array, Array, Array], float]:
     """The map of ``[x; z]`` over one period, and the output right after its first tick."""
-    from scipy.linalg import expm
+    with from_extra("analysis", "linear systems with clocks"):
+        from scipy.linalg import expm
 
     n, m, k = flow.x.shape[1], moved.size, flow.p.shape[1]
     period, instants = ticks_of_a_period(system)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -32,7 +33,8 @@ def poles(system: StateSpaceModel) -> Complex:
     They are those of the irreducible diagonal blocks of A: a state in no loop has its eigenvalue without
     rounding, and a fast part of a system costs a slow one no digits.
     """
-    from scipy.linalg import eigvals
+    with from_extra("analysis", "poles of a linear system"):
+        from scipy.linalg import eigvals
 
     if not system.order:
         return np.empty(0, dtype=np.complex128)
@@ -42,7 +44,8 @@ def poles(system: StateSpaceModel) -> Complex:
 
 def irreducible_parts(A: Array) -> list[list[int]]:
     """The states that act on each other, directly or through others: A is block triangular in these parts."""
-    from scipy.sparse.csgraph import connected_components
+    with from_extra("analysis", "poles of a linear system"):
+        from scipy.sparse.csgraph import connected_components
 
     count, labels = connected_components(A != 0.0, directed=True, connection="strong")
     return [np.flatnonzero(labels == label).tolist() for label in range(count)]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import InputError
+from armblocks.extras import from_extra
 
 if TYPE_CHECKING:
     from armblocks.analysis.linear_system import LinearSystem
@@ -63,7 +64,8 @@ def extent(loop: LinearSystem, zeros: Complex) -> float:
 
 
 def _roots(loop: LinearSystem, gain: float) -> Complex:
-    from scipy.linalg import eigvals
+    with from_extra("analysis", "root loci"):
+        from scipy.linalg import eigvals
 
     direct = 1.0 + gain * float(loop.D[0, 0])
     if direct == 0.0:  # at this gain alone a root is infinite
@@ -96,7 +98,8 @@ def _adapted(loop: LinearSystem, zeros: Complex) -> tuple[Array, list[Complex]]:
 
 
 def _pairs(before: Complex, after: Complex) -> NDArray[np.intp]:
-    from scipy.optimize import linear_sum_assignment
+    with from_extra("analysis", "root loci"):
+        from scipy.optimize import linear_sum_assignment
 
     return linear_sum_assignment(np.abs(before[:, None] - after[None, :]))[1]
 

@@ -27,6 +27,7 @@ from armblocks.analysis.reduction import minimal
 from armblocks.analysis.scaling import balanced
 from armblocks.analysis.state_space import StateSpaceModel
 from armblocks.analysis.zeros import zero_pencil, zeros
+from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -44,7 +45,8 @@ class _Pencil:
     """The roots of ``det(M - s N)`` and how sure they are."""
 
     def __init__(self, M: Array, N: Array, tolerance: float) -> None:
-        from scipy.linalg import eig
+        with from_extra("analysis", "poles and zeros"):
+            from scipy.linalg import eig
 
         self.M, self.N, self.tolerance = M, N, tolerance
         self.known, left, right = eig(M, N, left=True, right=True)
@@ -80,7 +82,8 @@ def _candidates(root: complex, discrete: bool) -> tuple[complex, ...]:
 
 def shown_poles(system: StateSpaceModel) -> Complex:
     """:meth:`LinearSystem.poles` (nx,), without rounding errors about 0, 1, the axes and the unit circle."""
-    from scipy.linalg import eigvals
+    with from_extra("analysis", "poles of a linear system"):
+        from scipy.linalg import eigvals
 
     shown: list[complex] = []
     for part in irreducible_parts(system.A):

@@ -15,6 +15,7 @@ from armblocks.analysis.reduction import minimal
 from armblocks.analysis.shown_values import EPSILON, ROUNDOFFS, is_stable, shown_dcgain
 from armblocks.analysis.state_space import StateSpaceModel, SystemT
 from armblocks.errors import InputError
+from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
 
@@ -153,7 +154,8 @@ def impulse_response(system: SystemT, stop_time: float | None, points: int) -> T
 
 def _held(system: StateSpaceModel, step: float) -> Array:
     """The map of ``[x; u]`` over a step with the inputs held."""
-    from scipy.linalg import expm
+    with from_extra("analysis", "responses of a linear system"):
+        from scipy.linalg import expm
 
     n, nu = system.B.shape
     whole = np.zeros((n + nu, n + nu))
@@ -168,7 +170,8 @@ def forced_response(
     system: SystemT, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None
 ) -> TimeResponse[SystemT]:
     """See :meth:`LinearSystem.response`. Raises ``InputError`` for shapes and instants that do not fit."""
-    from scipy.linalg import expm
+    with from_extra("analysis", "responses of a linear system"):
+        from scipy.linalg import expm
 
     instants = np.asarray(time, dtype=np.float64)
     given = np.asarray(inputs, dtype=np.float64)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from armblocks.analysis.modes import in_order
 from armblocks.analysis.scaling import balanced
 from armblocks.analysis.state_space import StateSpaceModel
+from armblocks.extras import from_extra
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,7 +22,8 @@ Complex = NDArray[np.complex128]
 
 def invariant_zeros(A: Array, B: Array, C: Array, D: Array) -> Complex:
     """The finite numbers at which ``[[A - s I, B], [C, D]]`` has less than its usual rank."""
-    from scipy.linalg import eigvals
+    with from_extra("analysis", "zeros of a linear system"):
+        from scipy.linalg import eigvals
 
     pencil = zero_pencil(A, B, C, D)
     return np.empty(0, dtype=np.complex128) if pencil is None else in_order(eigvals(*pencil[:2]))

@@ -78,14 +78,13 @@ def run(
     """Simulate a diagram and write a report: figures, numbers, data."""
     import armblocks as ab
     from armblocks.cli.summary import print_displays, print_files, print_motions, print_run
-    from armblocks.report.sink_files import REPORT_DATA, sink_files
 
     parameters = parse_assignments(assignments or [])
     diagram = ab.load_diagram(model, trust=trust)
     settings = _stated(
         stop_time=stop_time, solver=solver, step=step, sample_time=sample_time, rtol=rtol, atol=atol
     )
-    sink_files(diagram, REPORT_DATA)  # refused before the run rather than after it
+    _check_files(diagram, formats or [])
     folder = out or Path(f"{diagram.name}-report")
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     _check_writable(folder)
@@ -133,6 +132,7 @@ def _report(
     folder: Path, diagram: Diagram, result: SimulationResult, figures: bool, formats: list[DataFormat]
 ) -> ReportFiles:
     import armblocks as ab
+    from armblocks.report.writing import usable_data_formats
 
     with warnings.catch_warnings():
         # The summary says every limit that is broken; once is enough.
@@ -141,9 +141,19 @@ def _report(
             folder,
             diagram,
             result,
-            formats=("svg", "png") if figures else (),
-            data=("csv", "parquet", *(extra.value for extra in formats)),
+            formats=None if figures else (),
+            data=(*usable_data_formats(), *(extra.value for extra in formats)),
         )
+
+
+def _check_files(diagram: Diagram, formats: list[DataFormat]) -> None:
+    """What cannot be written is refused before the run rather than after it."""
+    from armblocks.report.sink_files import REPORT_DATA, sink_files
+    from armblocks.simulation.export import check_format
+
+    sink_files(diagram, REPORT_DATA)
+    for extra in formats:
+        check_format(Path(f"data.{extra.value}"))
 
 
 def _check_writable(folder: Path) -> None:

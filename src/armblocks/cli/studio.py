@@ -10,6 +10,7 @@ import typer
 from armblocks.cli.completion import complete_models
 from armblocks.cli.terminal import messages_console
 from armblocks.errors import FormatError, InputError
+from armblocks.extras import require
 
 
 def studio(
@@ -35,7 +36,9 @@ def studio(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
 ) -> None:
     """Open the studio in the browser: build a diagram, run it, watch scopes and arm. Ctrl-C ends it."""
+    require("studio", "the studio")
     from armblocks.formats import list_examples
+    from armblocks.studio.built_page import build_in_checkout
     from armblocks.studio.server.launch import serve
 
     root = folder or Path.cwd()
@@ -58,6 +61,7 @@ def studio(
             )
         model = path.resolve().relative_to(root.resolve()).as_posix()
     console = messages_console()
+    build_in_checkout(lambda text: console.print(text, soft_wrap=True))
 
     def announce(link: str) -> None:
         console.print(f"The studio is at {link}", soft_wrap=True, highlight=False)

@@ -14,6 +14,7 @@ from rich.text import Text
 from armblocks.cli.progress import factor_text
 from armblocks.cli.terminal import ERROR, STRONG, WARNING, table
 from armblocks.diagram import ViewKind, diagram_views
+from armblocks.extras import installed
 from armblocks.pictures.numbers import wall_time
 from armblocks.report.motion import motions
 from armblocks.report.motion_summary import JointSummary, LimitKind, people_unit, shown_summary, summarise
@@ -139,3 +140,11 @@ def print_files(files: ReportFiles, console: Console) -> None:
     console.print()
     console.print(Text.assemble(("report: ", STRONG), str(files.page)), soft_wrap=True)
     console.print(f"beside it: {', '.join(names)}", soft_wrap=True)
+    absent = [
+        (kind, extra)
+        for kind, library, extra in (("PNG figures", "matplotlib", "figures"), ("Parquet", "pyarrow", "data"))
+        if not installed(library)
+    ]
+    if absent:
+        kinds, extras = " and ".join(kind for kind, _ in absent), ",".join(extra for _, extra in absent)
+        console.print(f'for {kinds}, too: pip install "armblocks[{extras}]"', soft_wrap=True)

@@ -19,14 +19,16 @@ def write_report(
     diagram: Diagram,
     result: SimulationResult,
     *,
-    formats: Sequence[str] = ("svg", "png"),
-    data: Sequence[str] = ("csv", "parquet"),
+    formats: Sequence[str] | None = None,
+    data: Sequence[str] | None = None,
 ) -> ReportFiles:
     """Write ``report.html``, the diagram, figures and data of a run into a folder, made if absent.
 
-    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. The files that To File blocks ask
-    for lie there too. Returns the paths. Raises UnknownNameError for another format, DiagramError where two
-    blocks ask for one file, FormatError where the folder cannot be written.
+    ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. By default svg and csv, with png
+    where matplotlib is installed and parquet where pyarrow is. The files of To File blocks lie there
+    too. Returns the paths. Raises UnknownNameError for another format, MissingLibraryError for one whose
+    library is not installed, DiagramError where two blocks ask for one file, FormatError where the folder
+    cannot be written.
     """
     from armblocks import report
 

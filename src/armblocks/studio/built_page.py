@@ -1,0 +1,47 @@
+"""The built page of the studio: where it lies, and how a checkout gets it when it is first asked for.
+
+Wheels bring the page. A checkout does not keep it; ``frontend/build_page.py`` builds it there.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from armblocks.errors import FormatError
+
+WEB = Path(__file__).parent / "web"
+BUILD = Path(__file__).parents[3] / "frontend" / "build_page.py"
+"""The script that builds the page; only a checkout has it."""
+
+
+def built_page(folder: Path = WEB, script: Path = BUILD) -> Path:
+    """The folder of the built page; raises ``FormatError`` with what to do if it is not there."""
+    if not (folder / "index.html").is_file():
+        raise FormatError(
+            "this installation has no studio page: it was installed without Node.js",
+            where=str(folder),
+            allowed="everything but the studio and the widgets works",
+            fix=f"run 'python {script}'" if script.is_file() else "install a wheel that has the page",
+        )
+    return folder
+
+
+def build_in_checkout(notify: Callable[[str], None], folder: Path = WEB, script: Path = BUILD) -> None:
+    """Build the page where it is missing and its sources are there; ``notify`` gets a line beforehand.
+
+    The build writes its progress to standard error. Raises ``FormatError`` where it fails.
+    """
+    if (folder / "index.html").is_file() or not script.is_file():
+        return
+    notify("This checkout has no studio page yet: it is built now, once (about a minute).")
+    done = subprocess.run([sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno())
+    if done.returncode != 0:
+        raise FormatError(
+            "the page of the studio could not be built; the reason stands above",
+            where=str(script),
+            allowed="Node.js 20.19 or newer, or pip to fetch it; and a connection to the npm registry",
+            fix="install Node.js, or install armblocks from a wheel, which has the page",
+        )

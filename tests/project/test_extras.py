@@ -1,0 +1,164 @@
+"""The core works without the libraries of the extras, and whatever needs one says which and how to get it."""
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyarrow import csv as arrow_csv
+from pyarrow import table
+
+from armblocks.extras import LIBRARIES, from_extra
+from armblocks.simulation.csv_rows import csv_rows
+
+ROOT = Path(__file__).resolve().parents[2]
+TYPERS_OWN = "pydantic"
+"""The core has it too: typer needs it."""
+COME_ALONG = {"anywidget": {"traitlets"}}
+"""Libraries that another one brings."""
+
+WITHOUT_EXTRAS = """
+import importlib, json, pkgutil, sys, warnings
+from pathlib import Path
+
+absent = set(json.loads(sys.argv[1]))
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in absent:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Absent())
+import armblocks as ab
+from armblocks.cli.main import app
+
+for module in pkgutil.walk_packages(ab.__path__, "armblocks."):
+    if not module.name.startswith(("armblocks.studio", "armblocks.__main__")):
+        importlib.import_module(module.name)
+import armblocks.studio.notebook
+
+warnings.simplefilter("ignore")
+app(["run", "kr180model", "--stop-time", "0.1", "--out", "report"], standalone_mode=False)
+app(["trim", "puma560_computed_torque"], standalone_mode=False)
+model = ab.load_diagram("puma560_computed_torque")
+ab.draw_diagram(model, "model.svg")
+result = ab.simulate(model, stop_time=0.1)
+for name in ("signals.csv", "signals.npz"):
+    result.save(name)
+    ab.load_table(name)
+for name in ("a.mat", "a.parquet"):
+    Path(name).write_bytes(b"")
+linear = ab.linearize(model)
+
+said = {}
+for name, call in {
+    "data frame": result.to_dataframe,
+    "save parquet": lambda: result.save("x.parquet"),
+    "save mat": lambda: result.save("x.mat"),
+    "load parquet": lambda: ab.load_table("a.parquet"),
+    "load mat": lambda: ab.load_table("a.mat"),
+    "log": lambda: ab.simulate(model, stop_time=0.1, log="x.parquet"),
+    "report data": lambda: ab.write_report("other", model, result, data=("mat",)),
+    "report figures": lambda: ab.write_report("other", model, result, formats=("png",)),
+    "png": lambda: ab.draw_diagram(model, "x.png"),
+    "pdf": lambda: ab.draw_diagram(model, "x.pdf"),
+    "poles": linear.poles,
+    "widget": lambda: ab.robot_widget(ab.load_robot("puma560")),
+}.items():
+    try:
+        said[name] = repr(call())
+    except ab.errors.MissingLibraryError as error:
+        said[name] = str(error)
+    except BaseException as error:
+        said[name] = repr(error)
+Path("said.json").write_text(json.dumps(said))
+sys.exit(app(["studio", "--no-browser"], standalone_mode=False))
+"""
+
+
+def test_the_core_runs_without_the_extras_and_names_what_is_missing(tmp_path: Path) -> None:
+    absent = sorted({name for names in LIBRARIES.values() for name in names} - {TYPERS_OWN} | {"PIL"})
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_EXTRAS, json.dumps(absent)],
+        cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+    )
+    assert done.returncode == 2, done.stderr
+    assert "the library 'starlette' is not installed; it is needed for the studio" in done.stderr
+    assert 'pip install "armblocks[studio]"' in done.stderr
+    assert 'for PNG figures and Parquet, too: pip install "armblocks[figures,data]"' in done.stdout
+    written = {path.name for path in (tmp_path / "report").iterdir()}
+    assert written == {"report.html", "diagram.svg", "data.csv", "figures"}
+    assert {path.suffix for path in (tmp_path / "report" / "figures").iterdir()} == {".svg"}
+    assert not (tmp_path / "other").exists()
+    said = json.loads((tmp_path / "said.json").read_text(encoding="utf-8"))
+    wanted = {
+        "data frame": ("pandas", "data", "data frames"),
+        "save parquet": ("pyarrow", "data", "Parquet files"),
+        "save mat": ("scipy", "data", "MAT files"),
+        "load parquet": ("pandas", "data", "Parquet files"),
+        "load mat": ("scipy", "data", "MAT files"),
+        "log": ("pyarrow", "data", "Parquet files"),
+        "report data": ("scipy", "data", "MAT files"),
+        "report figures": ("matplotlib", "figures", "PNG figures"),
+        "png": ("matplotlib", "figures", "PNG figures"),
+        "pdf": ("matplotlib", "figures", "PDF drawings"),
+        "poles": ("scipy", "analysis", "poles of a linear system"),
+        "widget": ("anywidget", "notebook", "widgets in notebooks"),
+    }
+    assert said.keys() == wanted.keys()
+    for name, (library, extra, use) in wanted.items():
+        assert f"the library '{library}' is not installed; it is needed for {use}" in said[name]
+        assert said[name].endswith(
+            f'Allowed: everything else works without it. Fix: pip install "armblocks[{extra}]".'
+        )
+
+
+def test_messages_and_pyproject_agree_on_what_an_extra_brings() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    named = {name: {entry.partition(">")[0] for entry in extras[name]} for name in LIBRARIES}
+    for name, libraries in LIBRARIES.items():
+        brought = named[name] - {"armblocks[figures]"}
+        brought |= {other for library in brought for other in COME_ALONG.get(library, set())}
+        assert brought == set(libraries), name
+    assert extras["all"] == [f"armblocks[{','.join(sorted(LIBRARIES))}]"]
+    assert "armblocks[all]" in extras["test"]
+
+
+def test_a_library_that_is_broken_is_not_called_missing() -> None:
+    with pytest.raises(ModuleNotFoundError, match="another"), from_extra("data", "data frames"):
+        raise ModuleNotFoundError("No module named 'another'", name="another.part")
+
+
+@given(st.lists(st.lists(st.floats(width=64), min_size=3, max_size=3), min_size=1, max_size=5))
+def test_csv_rows_have_the_bytes_that_pyarrow_writes(rows: list[list[float]]) -> None:
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    check_rows(columns)
+
+
+def test_csv_rows_at_the_borders_between_the_two_spellings() -> None:
+    powers = np.array(
+        [sign * digits * 10.0**k for k in range(-9, 19) for digits in (1.0, 1.5, 1 / 3) for sign in (1, -1)]
+    )
+    near = np.concatenate([powers, np.nextafter(powers, 0.0), np.nextafter(powers, np.inf)])
+    check_rows([near, near[::-1].copy()])
+    assert csv_rows([np.empty(0), np.empty(0)]) == ""
+
+
+def check_rows(columns: list[np.ndarray]) -> None:
+    """The same text from both."""
+    import io
+
+    written = io.BytesIO()
+    named = {str(number): column for number, column in enumerate(columns)}
+    arrow_csv.write_csv(table(named), written, arrow_csv.WriteOptions(include_header=False))
+    assert csv_rows(columns).encode() == written.getvalue()
