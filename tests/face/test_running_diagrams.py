@@ -1,12 +1,16 @@
 """Running diagrams from Python."""
 
+import inspect
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 
 import armblocks as ab
+from armblocks.equations import SimulationOptions
 from armblocks.errors import DiagramError, InputError, LimitWarning, UnknownNameError
+from armblocks.face.settings import RunSettings
 
 POSITIONS = {  # paper/specification.md: an independent plain-NumPy computation
     0.0: (1.95, -1.25, -1.85),
@@ -47,8 +51,22 @@ def test_tunable_parameters_reuse_the_compiled_system(paper: ab.Diagram) -> None
     np.testing.assert_array_equal(ab.simulate(paper)["jtraj/q"][-1], [3.14, 0, 1.57, 0])
 
 
+def test_signatures_list_the_settings_of_a_run() -> None:
+    fields = get_type_hints(SimulationOptions)
+    assert get_type_hints(RunSettings) == fields
+    calls = (ab.simulate, ab.begin, ab.linearize, ab.frequency_response, ab.trim, ab.sensitivity)
+    for call in (*calls, ab.CompiledDiagram.simulate, ab.CompiledDiagram.begin):
+        parameters = inspect.signature(call).parameters
+        assert list(parameters)[-len(fields) :] == list(fields), call
+        assert {repr(parameters[name].default) for name in fields} == {"<the diagram's>"}
+        given = {"diagram": "kr180model"} if "diagram" in parameters else {"self": None}
+        required = [n for n, p in parameters.items() if p.default is p.empty and n not in given]
+        with pytest.raises(UnknownNameError, match=r"no argument named 'stop_tme'.*did you mean 'stop_time'"):
+            call(**given, **dict.fromkeys(required, ""), stop_tme=1.0)
+
+
 def test_unknown_settings_and_parameters_say_the_nearest(paper: ab.Diagram) -> None:
-    with pytest.raises(UnknownNameError, match=r"no setting named 'stoptime'.*did you mean 'stop_time'"):
+    with pytest.raises(UnknownNameError, match=r"no argument named 'stoptime'.*did you mean 'stop_time'"):
         ab.simulate(paper, stoptime=3)
     with pytest.raises(UnknownNameError, match=r"no block named 'jtrai'.*did you mean 'jtraj'"):
         ab.simulate(paper, parameters={"jtrai.tmax": 3})
@@ -118,5 +136,5 @@ def test_a_run_begins_from_a_saved_state(tmp_path: Path) -> None:
     second = ab.begin("van_der_pol_pid", stop_time=20.0, initial_state=tmp_path / "state.npz")
     second.advance()
     np.testing.assert_array_equal(first.result()["x1"][-100:], second.result()["x1"][-100:])
-    with pytest.raises(UnknownNameError, match="no setting named 'stop'"):
+    with pytest.raises(UnknownNameError, match="no argument named 'stop'"):
         ab.begin("van_der_pol_pid", stop=3.0)

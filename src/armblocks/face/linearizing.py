@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, overload
+from typing import Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ from armblocks.equations.evaluation import EvaluatedSystem, Point
 from armblocks.errors import InputError
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram, simulate
+from armblocks.face.settings import RunSettings, check_settings, takes_settings
 from armblocks.simulation import RunState
 
 Where = float | RunState | OperatingPoint
@@ -38,7 +39,7 @@ def linearize(
     open: str | Sequence[str] = (),
     delay_order: int | None = None,
     parameters: Mapping[str, object] | None = None,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> LinearSystem: ...
 
 
@@ -52,10 +53,11 @@ def linearize(
     open: str | Sequence[str] = (),
     delay_order: int | None = None,
     parameters: Mapping[str, object] | None = None,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> tuple[LinearSystem, ...]: ...
 
 
+@takes_settings
 def linearize(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     inputs: str | Sequence[str] = (),
@@ -65,7 +67,7 @@ def linearize(
     open: str | Sequence[str] = (),
     delay_order: int | None = None,
     parameters: Mapping[str, object] | None = None,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> LinearSystem | tuple[LinearSystem, ...]:
     """The exact linear system of a diagram about an operating point, by differentiating its equations.
 
@@ -89,6 +91,7 @@ def linearize(
     Raises ``UnknownNameError`` and ``InputError`` for names, ``SimulationError`` where the run, or a slope,
     has no finite value.
     """
+    check_settings(settings, linearize)
     described = described_diagram(diagram, parameters)
     wanted, seen, opened = _names(inputs), _names(outputs), _names(open)
     if isinstance(at, float | int | RunState | OperatingPoint):
@@ -126,6 +129,7 @@ def _linearized(
     return _Prepared(diagram, inputs, outputs, opened).at(point, delay_order)
 
 
+@takes_settings
 def frequency_response(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     inputs: str | Sequence[str],
@@ -135,13 +139,14 @@ def frequency_response(
     at: Where = 0.0,
     open: str | Sequence[str] = (),
     parameters: Mapping[str, object] | None = None,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> NDArray[np.complex128]:
     """The response (N, ny, nu) of a diagram's linear system at angular frequencies (N,) in rad/s.
 
     Dead time is exact: it is ``exp(-j w T)``, however it lies in loops. Arguments and errors are those of
     :func:`linearize`; dead time beside sampled blocks raises ``InputError``.
     """
+    check_settings(settings, frequency_response)
     described = described_diagram(diagram, parameters)
     prepared = _Prepared(described, _names(inputs), _names(outputs), _names(open))
     along = np.asarray(frequencies, dtype=np.float64).reshape(-1)
@@ -202,7 +207,7 @@ def _units(system: HybridSystem, path: str) -> tuple[str, ...]:
     return (system.signals_layout[signal].unit if added else slot.unit,) * slot.size
 
 
-def operating_point_at(diagram: Diagram, at: Where, **settings: Any) -> OperatingPoint:
+def operating_point_at(diagram: Diagram, at: Where, **settings: Unpack[RunSettings]) -> OperatingPoint:
     """The operating point of a diagram at a time of a run, or where a run ended."""
     if isinstance(at, OperatingPoint):
         return at
@@ -212,7 +217,9 @@ def operating_point_at(diagram: Diagram, at: Where, **settings: Any) -> Operatin
     return _of_state(evaluated, at)
 
 
-def operating_points_at(diagram: Diagram, times: Sequence[float], **settings: Any) -> list[OperatingPoint]:
+def operating_points_at(
+    diagram: Diagram, times: Sequence[float], **settings: Unpack[RunSettings]
+) -> list[OperatingPoint]:
     """Operating points at times of one run, in the order given. Raises ``InputError`` for a negative time."""
     if not all(np.isfinite(time) and time >= 0.0 for time in times):
         raise InputError(
@@ -230,7 +237,7 @@ def operating_points_at(diagram: Diagram, times: Sequence[float], **settings: An
             point = initial_point(evaluated, compiled.system.parameter_values)
             found[time] = operating_point(evaluated, point)
             continue
-        run: dict[str, Any] = {**settings, "stop_time": time}
+        run: RunSettings = {**settings, "stop_time": time}
         result = simulate(compiled, initial_state=state, **run)
         state = result.final_state
         assert state is not None  # a run that fails raises

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
 from armblocks.equations import HybridSystem, SimulationOptions
-from armblocks.errors import InputError, UnknownNameError
+from armblocks.errors import InputError
 from armblocks.face.called import called_functions
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
 from armblocks.face.diagrams import load_diagram
 from armblocks.face.limit_watch import LimitWatch
+from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
 from armblocks.integration.system import CompiledSystem, compile_system, recall_system
 from armblocks.simulation import LogRequest, RunState, Simulation, SimulationResult
 from armblocks.simulation.plan import changed_parameters
@@ -49,6 +50,7 @@ class CompiledDiagram:
         key = content_key(self.diagram)
         return compile_system(self.system) if key is None else recall_system(key, lambda: self.system)
 
+    @takes_settings
     def simulate(
         self,
         options: SimulationOptions | None = None,
@@ -57,10 +59,12 @@ class CompiledDiagram:
         progress: Progress | None = None,
         initial_state: RunState | None = None,
         log: LogRequest | None = None,
+        **settings: Unpack[RunSettings],
     ) -> SimulationResult:
-        """Run once; see :func:`simulate`."""
+        """Run once; see :func:`simulate`. The ``options`` are the diagram's own where none are given."""
+        check_settings(settings, CompiledDiagram.simulate)
         tuned, values = self._tuned(parameters)
-        options = options or tuned.diagram.settings
+        options = with_settings(options or tuned.diagram.settings, settings)
         calls = called_functions(tuned.diagram, tuned.compiled)
         run = Simulation(tuned.compiled, options, values, initial_state, log, calls)
         result = run_to_the_end(run, progress)
@@ -69,6 +73,7 @@ class CompiledDiagram:
         tuned._watch.warn(result)
         return result
 
+    @takes_settings
     def begin(
         self,
         options: SimulationOptions | None = None,
@@ -76,11 +81,13 @@ class CompiledDiagram:
         parameters: Mapping[str, object] | None = None,
         initial_state: RunState | None = None,
         log: LogRequest | None = None,
+        **settings: Unpack[RunSettings],
     ) -> DiagramRun:
         """Begin a run; see :func:`begin`."""
+        check_settings(settings, CompiledDiagram.begin)
         tuned, values = self._tuned(parameters)
         diagram = with_parameters(self.diagram, parameters) if parameters else self.diagram
-        options = options or diagram.settings
+        options = with_settings(options or diagram.settings, settings)
         calls = called_functions(tuned.diagram, tuned.compiled)
         return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state, log, calls))
 
@@ -132,6 +139,7 @@ def state_at(diagram: Diagram | CompiledDiagram, point: OperatingPoint) -> RunSt
     )
 
 
+@takes_settings
 def simulate(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     *,
@@ -140,7 +148,7 @@ def simulate(
     initial_state: Start | None = None,
     log: str | PathLike[str] | None = None,
     log_signals: Sequence[str] = (),
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> SimulationResult:
     """Run a diagram and return its recorded signals.
 
@@ -155,20 +163,21 @@ def simulate(
     or the ``log_signals``, are written while the run goes on; memory stays flat however long it is, and the
     result holds the rows that show all extremes.
 
-    Raises InputError for a setting out of range, UnknownNameError for an unknown one, SimulationError (with
-    the ``partial`` result) where the run cannot go on.
+    Raises InputError for a setting out of range, UnknownNameError for an unknown argument, SimulationError
+    (with the ``partial`` result) where the run cannot go on.
     """
+    check_settings(settings, simulate)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
-    options = _options(model, settings, "simulate")
     return model.simulate(
-        options,
         parameters=parameters,
         progress=progress,
         initial_state=_starting_state(model, initial_state),
         log=_log_request(log, log_signals),
+        **settings,
     )
 
 
+@takes_settings
 def begin(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     *,
@@ -176,19 +185,19 @@ def begin(
     initial_state: Start | None = None,
     log: str | PathLike[str] | None = None,
     log_signals: Sequence[str] = (),
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> DiagramRun:
     """Begin a run of a diagram that can be paused, looked at and tuned: nothing happens before ``advance``.
 
     Arguments are those of :func:`simulate`, and so are the errors.
     """
+    check_settings(settings, begin)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
-    options = _options(model, settings, "begin")
     return model.begin(
-        options,
         parameters=parameters,
         initial_state=_starting_state(model, initial_state),
         log=_log_request(log, log_signals),
+        **settings,
     )
 
 
@@ -210,14 +219,3 @@ def _starting_state(model: CompiledDiagram, start: object) -> RunState | None:
 
 def _log_request(log: str | PathLike[str] | None, signals: Sequence[str]) -> LogRequest | None:
     return None if log is None else LogRequest(path=Path(log), signals=tuple(signals))
-
-
-def _options(model: CompiledDiagram, settings: Mapping[str, Any], where: str) -> SimulationOptions:
-    """The diagram's settings, some of them changed. Raises ``UnknownNameError``."""
-    if not settings:
-        return model.diagram.settings
-    known = [field.name for field in dataclasses.fields(SimulationOptions)]
-    for name in settings:
-        if name not in known:
-            raise UnknownNameError("setting", name, known, where=where)
-    return dataclasses.replace(model.diagram.settings, **settings)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from armblocks.equations.sensitivity import MIXED, sensitivity_name, sensitivity
 from armblocks.errors import InputError, SimulationError, UnknownNameError
 from armblocks.face.linearizing import described_diagram
 from armblocks.face.model import CompiledDiagram, compile_diagram
+from armblocks.face.settings import RunSettings, check_settings, takes_settings, with_settings
 from armblocks.integration.system import CompiledSystem, compile_system
 from armblocks.simulation import SimulationResult
 from armblocks.simulation import simulate as run_system
@@ -65,13 +65,14 @@ class SensitivityResult:
         return "\n".join([head, *lines])
 
 
+@takes_settings
 def sensitivity(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     parameters: str | Sequence[str],
     outputs: str | Sequence[str],
     *,
     values: Mapping[str, object] | None = None,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> SensitivityResult:
     """Run a diagram together with the exact derivatives of ``outputs`` by tunable ``parameters``.
 
@@ -87,6 +88,7 @@ def sensitivity(
     come together with delays or with a parameter that says when a signal jumps; ``SimulationError`` as a run
     does, and where events coincide that a change of a parameter would part: there is no derivative then.
     """
+    check_settings(settings, sensitivity)
     described = described_diagram(diagram, values)
     names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
     system = with_mask_parameters(compile_diagram(described).system, described, names)
@@ -108,7 +110,7 @@ def sensitivity(
             known = [*system.signals_layout.names, *system.aliases]
             raise UnknownNameError("signal", path, known, where=system.name)
     augmented = sensitivity_system(system, names, paths)
-    options = dataclasses.replace(described.settings, **settings)
+    options = with_settings(described.settings, settings)
     compiled = compile_system(augmented)
     run = run_system(compiled, options)
     _check_instants(compiled, run)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +17,13 @@ from armblocks.equations.sensitivity import parameters_read_by_index
 from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.linearizing import Where, described_diagram, operating_point_at
 from armblocks.face.model import CompiledDiagram, compile_diagram
+from armblocks.face.settings import RunSettings, check_settings, takes_settings
 
 Array = NDArray[np.float64]
 Values = Mapping[str, ArrayLike]
 
 
+@takes_settings
 def trim(
     diagram: Diagram | CompiledDiagram | str | PathLike[str],
     *,
@@ -34,7 +36,7 @@ def trim(
     at: Where = 0.0,
     parameters: Mapping[str, object] | None = None,
     tolerance: float = 1e-9,
-    **settings: Any,
+    **settings: Unpack[RunSettings],
 ) -> TrimResult:
     """Find an operating point at which a diagram rests.
 
@@ -51,6 +53,7 @@ def trim(
     Raises ``SimulationError``, naming what does not rest and why, with the best point found as ``partial``;
     ``UnknownNameError`` and ``InputError`` for names and values that do not fit.
     """
+    check_settings(settings, trim)
     described = described_diagram(diagram, parameters)
     system = compile_diagram(described).system
     known = operating_point_at(described, at, **settings)

@@ -1,0 +1,62 @@
+"""Settings of a run as keyword arguments of the functions that run a diagram."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, TypedDict, TypeVar, cast, get_type_hints
+
+from armblocks.equations import SimulationOptions
+from armblocks.errors import UnknownNameError
+
+Call = TypeVar("Call", bound=Callable[..., Any])
+
+
+class RunSettings(TypedDict, total=False):
+    """The fields of :class:`SimulationOptions`; what a call leaves out is as the diagram says."""
+
+    stop_time: float
+    solver: str
+    step: float | None
+    sample_time: float | None
+    max_step: float | None
+    rtol: float
+    atol: float
+
+
+class _OfTheDiagram:
+    """Default of a setting in signatures: the diagram's own value."""
+
+    def __repr__(self) -> str:
+        return "<the diagram's>"
+
+
+def takes_settings(call: Call) -> Call:
+    """Mark a function whose ``**settings`` are :class:`RunSettings`: its signature lists them one by one.
+
+    Type checkers know them by the annotation; ``help``, notebooks and the documentation by the signature.
+    """
+    signature = inspect.signature(call)
+    hints, default = get_type_hints(RunSettings), _OfTheDiagram()
+    plain = [entry for entry in signature.parameters.values() if entry.kind is not entry.VAR_KEYWORD]
+    settings = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+        for name, hint in hints.items()
+    ]
+    changed = signature.replace(parameters=[*plain, *settings])
+    cast("Any", call).__signature__ = changed
+    return call
+
+
+def check_settings(settings: Mapping[str, object], call: Callable[..., object]) -> None:
+    """Raise ``UnknownNameError`` for a keyword argument that ``call`` does not have."""
+    for name in settings:
+        if name not in RunSettings.__annotations__:
+            known = [entry for entry in inspect.signature(call).parameters if entry != name]
+            raise UnknownNameError("argument", name, known, where=call.__name__)
+
+
+def with_settings(options: SimulationOptions, settings: RunSettings) -> SimulationOptions:
+    """The options of a diagram, with the settings that a call states."""
+    return dataclasses.replace(options, **settings) if settings else options
