@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import inspect
 import math
 import multiprocessing
 import pickle
@@ -137,13 +138,13 @@ def test_shipped_robots_and_examples_are_pickled() -> None:
 
 
 def raised(kind: type[errors.ArmblocksError]) -> errors.ArmblocksError:
-    if kind is errors.UnknownNameError:
-        return errors.UnknownNameError("block", "gian", ["gain"], where="here")
-    if kind is errors.AlgebraicLoopError:
-        return errors.AlgebraicLoopError(["a/y", "b/y"], where="here")
-    if kind is errors.SimulationError:
-        return errors.SimulationError("it ends", partial=examples()["SimulationResult"])
-    return kind("this is wrong", where="here", allowed="that", fix="do that")
+    """An error of each kind: its lists are lists, everything else that it has to be given is text."""
+    lists = {"known": ["gain"], "loop": ["a/y", "b/y"]}
+    required = [name for name, p in inspect.signature(kind).parameters.items() if p.default is p.empty]
+    error = kind(*(lists.get(name, f"the {name}") for name in required), where="here")
+    if isinstance(error, errors.SimulationError):
+        error.partial = examples()["SimulationResult"]
+    return error
 
 
 @pytest.mark.parametrize("way", WAYS)
