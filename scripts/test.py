@@ -24,10 +24,12 @@ from threading import Event
 from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend/build_page.py")
+FRONTEND = ROOT / "frontend"
 
 STEPS: dict[str, tuple[str | object, ...]] = {
     "page": (PYTHON, "frontend/build_page.py"),
     "web types": (PYTHON, "scripts/studio_types.py", "--check"),
+    "web lint": (FRONTEND / "node_modules" / ".bin" / "oxlint", "src"),
     "lint": (BINARIES / "ruff", "check", *SOURCES),
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),
     "types": (BINARIES / "pyright", "--warnings"),
@@ -35,9 +37,11 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "docs": (PYTHON, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"),
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
+FOLDERS = {"web lint": FRONTEND}
+"""Where a step runs, if not in the folder of the project."""
 BEFORE_ALL = ("page",)
 """Steps whose result the others need."""
-STAGES = ((("types",), ("web types", "lint", "format", "layers", "docs")), (("tests",),))
+STAGES = ((("types",), ("web types", "web lint", "lint", "format", "layers", "docs")), (("tests",),))
 """Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.
 The tests have the machine for themselves: journeys in a browser need it."""
 GLANCE_SECONDS = 0.1
@@ -65,7 +69,7 @@ class Step:
             with self._output.open("wb") as output:
                 self._process = subprocess.Popen(
                     self.command,
-                    cwd=ROOT,
+                    cwd=FOLDERS.get(self.name, ROOT),
                     env=ENVIRONMENT,
                     stdin=subprocess.DEVNULL,
                     stdout=output,

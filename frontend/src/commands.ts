@@ -1,9 +1,9 @@
 import { align, distribute, flip, group, rotate, chosenBlocks } from './canvas/arranging'
 import { copy, cut, duplicate, paste } from './canvas/clipboard'
-import { addNote, sheetView } from './canvas/sheet_keys'
+import { addNote, sheetView } from './canvas/sheet_actions'
 import { openConfiguration, openMask, openTour, save, show } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
-import { startOrResume } from './run/top_bar'
+import { startOrResume } from './run/start'
 import { alter, ask, look, useStudio } from './store'
 
 /** Something that can be done: in the command palette, in the list of keys, and by its key. */

@@ -1,9 +1,5 @@
-import type { Envelope, ServerMessage } from './protocol'
+import type { Request, ServerEvent } from './messages'
 import { keepUnsent, unsent } from './unsent'
-
-export type Request = Envelope['request']
-export type ServerEvent = ServerMessage['event']
-export type EventOf<K extends ServerEvent['kind']> = Extract<ServerEvent, { kind: K }>
 
 /** Why the server refused a request. */
 export class Refusal extends Error {
@@ -47,9 +43,9 @@ export class Connection {
   /** Whether requests may go out: not before the server knows again what this page shows. */
   private flowing = false
   private asked = 0
+  private onEvent: (event: ServerEvent) => void = () => {}
 
   constructor(
-    private readonly onEvent: (event: ServerEvent) => void,
     private readonly onFrame: (frame: ArrayBuffer) => void,
     private readonly onLine: (line: Line) => void,
     onRefused: (reason: Refusal) => void,
@@ -58,7 +54,13 @@ export class Connection {
     setInterval(() => this.listen(), PING_MS)
   }
 
-  open(): void {
+  /** Make the line; `onEvent` hears what the server tells. */
+  open(onEvent: (event: ServerEvent) => void): void {
+    this.onEvent = onEvent
+    this.connect()
+  }
+
+  private connect(): void {
     const url = new URL('ws', location.href)
     url.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:'
     const socket = new WebSocket(url)
@@ -81,7 +83,7 @@ export class Connection {
       this.forget('attach')
       this.forget('robot_attach')
       void strange().then((stranger) => this.onLine(stranger ? 'stranger' : 'down'))
-      setTimeout(() => this.open(), this.delay)
+      setTimeout(() => this.connect(), this.delay)
       this.delay = Math.min(2 * this.delay, LONGEST_DELAY_MS)
     }
   }

@@ -10,10 +10,11 @@ import { MantineProvider } from '@mantine/core'
 import { StrictMode } from 'react'
 import { createRoot } from 'react-dom/client'
 import { App } from './app'
+import { receive } from './events'
 import { line } from './store'
 import { theme } from './theme'
 
-line.open()
+line.open(receive)
 createRoot(document.getElementById('root')!).render(
   <StrictMode>
     <MantineProvider theme={theme} defaultColorScheme="auto">

@@ -1,4 +1,4 @@
-import type { Request } from './connection'
+import type { Request } from './messages'
 
 const PLACE = 'armblocks-unsent'
 

@@ -14,7 +14,7 @@ import {
 } from '@xyflow/react'
 import { useCallback, useEffect, useMemo, useRef, useState } from 'react'
 import { show } from '../dialogs'
-import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
+import type { SheetBlock, Wire } from '../protocol'
 import { WireValues } from '../run/wire_values'
 import { ask, change, look, useStudio } from '../store'
 import { ArrangeBar } from './arrange_bar'
@@ -24,6 +24,7 @@ import { NoteNode } from './note_node'
 import { Overview } from './overview'
 import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from './rewiring'
 import { SheetGraph, type SheetNode } from './sheet_graph'
+import { move, openBlock } from './sheet_actions'
 import { useSheetKeys } from './sheet_keys'
 import { FIT, SheetRoutes, wireKey, type Places } from './sheet_layout'
 import { useSteady } from './steady'
@@ -296,30 +297,8 @@ function selectFocused({ target }: React.FocusEvent): void {
   if (name) useStudio.getState().select([name])
 }
 
-/** A double click: into a subsystem that has no mask, else the parameters of a block. */
-export function openBlock(block: SheetBlock): void {
-  const { document, edit } = useStudio.getState()
-  if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
-  else edit(block.name)
-}
-
 const keyOf = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
 
 const present = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] => names.map((name) => blocks[name]).filter((block) => block !== undefined)
 
 const middleOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({ x: at.x + width / 2, y: at.y + height / 2 })
-
-/** Put blocks and notes where they are now, as one step; some wires may give way to others by it. */
-export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[] }): Promise<void> {
-  const { document } = useStudio.getState()
-  const places: Record<string, Place> = {}
-  const notes: Record<string, SheetNote> = {}
-  for (const [id, at] of Object.entries(to)) {
-    const { x, y } = at
-    const place = document?.blocks[id]?.place
-    const note = document?.notes[id]
-    if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, ...at }
-    if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
-  }
-  if (Object.keys(places).length || Object.keys(notes).length) await change({ kind: 'move', places, notes, ...wiring })
-}

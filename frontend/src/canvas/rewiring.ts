@@ -23,7 +23,7 @@ export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   const within = ({ source, target }: Wire) => names.has(blockOf(source)) === names.has(blockOf(target))
   const left = wires.filter(within)
   const [block] = blocks
-  if (blocks.length !== 1 || !block || block.inputs.length !== 1 || block.outputs.length !== 1) return left
+  if (blocks.length !== 1 || block?.inputs.length !== 1 || block.outputs.length !== 1) return left
   const cut = wires.filter((wire) => !within(wire))
   const driver = cut.find(({ target }) => names.has(blockOf(target)))
   if (!driver) return left
@@ -77,7 +77,7 @@ export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wire
  */
 export function levelled(block: SheetBlock, at: { x: number; y: number }, { y, left, right, flipped }: Piece): Places[string] {
   const input = block.inputs[0]
-  if (!input || input.dy !== 0) return at
+  if (input?.dy !== 0) return at
   const narrow = right - left < block.width + ROOM
   return { x: narrow ? (left + right - block.width) / 2 : at.x, y: y - input.y, flipped }
 }

@@ -20,7 +20,7 @@ class Kept<T> {
 
   get(name: string, from: readonly unknown[], make: () => T): T {
     const old = this.known.get(name)
-    const entry = old && old.from.every((value, k) => Object.is(value, from[k])) ? old : { from, made: make() }
+    const entry = old?.from.every((value, k) => Object.is(value, from[k])) ? old : { from, made: make() }
     this.seen.set(name, entry)
     return entry.made
   }

@@ -4,22 +4,13 @@ import { commandOf } from '../commands'
 import { show, useDialogs } from '../dialogs'
 import { change, look, useStudio } from '../store'
 import { chosenBlocks } from './arranging'
-import { move, openBlock } from './canvas'
-import { editNote, writeNote } from './note_node'
+import { editNote } from './note_node'
+import { addNote, move, openBlock, sheetView } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
 import { FIT, wireKey, type Places } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
 const NUDGE = 5
-
-/** What commands do with the sheet on the screen; `null` while there is none. */
-export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = { fit: null, middle: null }
-
-/** Begin a note in the middle of what is seen. */
-export function addNote(): void {
-  const at = sheetView.middle?.()
-  if (at) writeNote(at.x, at.y)
-}
 
 /** What the list of blocks has heard: who types fast does so before it has the focus. */
 function typedSoFar(): string {

@@ -1,7 +1,7 @@
 import { Badge, Modal, NavLink, Stack, Text, TextInput } from '@mantine/core'
 import { IconFile, IconHistory, IconPencil } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
-import type { Request } from '../connection'
+import type { Request } from '../messages'
 import { ask, useStudio } from '../store'
 import { projectFiles, show, useDialogs } from '../dialogs'
 

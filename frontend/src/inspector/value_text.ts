@@ -9,5 +9,6 @@ export function valueText(value: unknown): string {
     const { source, ...named } = value as { source: string } & Record<string, string>
     return source || Object.values(named).join()
   }
-  return value === null || value === undefined ? '' : String(value)
+  if (typeof value === 'string') return value
+  return value === null || value === undefined ? '' : JSON.stringify(value)
 }

@@ -62,7 +62,7 @@ function poseSignal(path: string, rows: number): Float64Array[] | undefined {
   const { run } = useStudio.getState()
   const view = run?.views.find((one) => one.kind === 'robot' && one.block === path)
   const found = view && samples.signal(`${path}/${view.signals[0]}`)
-  return found && found.columns.length === 16 * rows ? found.columns : undefined
+  return found?.columns.length === 16 * rows ? found.columns : undefined
 }
 
 function posesAt(path: string, rows: number, index: number): Poses | undefined {

@@ -48,5 +48,5 @@ export function ToolPath({ way, dark, background }: { way: () => Way | undefined
     line.current.geometry.setPositions(points)
     line.current.geometry.setColors(colours)
   })
-  return <Line ref={line as React.Ref<never>} points={start} vertexColors={white} lineWidth={2.4} frustumCulled={false} toneMapped={false} />
+  return <Line ref={line} points={start} vertexColors={white} lineWidth={2.4} frustumCulled={false} toneMapped={false} />
 }

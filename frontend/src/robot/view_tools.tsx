@@ -102,7 +102,7 @@ interface ButtonProps extends React.ComponentPropsWithRef<'button'> {
 export function Button({ label, icon: Icon, ...rest }: ButtonProps) {
   return (
     <Tooltip label={label} openDelay={400} disabled={rest['aria-expanded'] === true}>
-      <ActionIcon variant="subtle" color="gray" aria-label={label} {...(rest as object)}>
+      <ActionIcon variant="subtle" color="gray" aria-label={label} {...rest}>
         <Icon size={16} />
       </ActionIcon>
     </Tooltip>

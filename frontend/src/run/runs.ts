@@ -1,6 +1,6 @@
 import { create } from 'zustand'
-import type { EventOf } from '../connection'
 import { changed } from '../frames'
+import type { EventOf } from '../messages'
 import type { ViewOf } from '../protocol'
 import { RunSamples, samples, showSamples } from '../samples'
 

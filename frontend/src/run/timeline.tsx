@@ -19,7 +19,8 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
     if (event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey) return
     const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key]
     if (by) stepCursor(event.shiftKey ? LONG_STEP * by : by)
-    else if (event.key === ' ' && run) playing ? hold() : play()
+    else if (event.key === ' ' && run && playing) hold()
+    else if (event.key === ' ' && run) play()
     else return
     event.preventDefault()
     event.stopPropagation()

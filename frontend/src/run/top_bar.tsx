@@ -20,26 +20,12 @@ import { DocumentTitle } from '../documents/title'
 import { alter, ask, change, useStudio } from '../store'
 import { stepCursor, useCursor } from './cursor'
 import { useRuns } from './runs'
+import { startOrResume } from './start'
 
 const SPEEDS = [
   { value: '', label: 'as fast as possible' },
   ...['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} × real time` })),
 ]
-
-async function run(): Promise<void> {
-  const { document } = useStudio.getState()
-  if (!document) return
-  useCursor.setState({ time: null, playing: false })
-  const { tried, speed } = useRuns.getState()
-  await ask({ kind: 'run', document: document.state.document, speed, tuned: tried })
-}
-
-/** Start the model, or let a paused run go on. */
-export function startOrResume(): void {
-  const { run: shown } = useStudio.getState()
-  if (shown?.state === 'paused') void ask({ kind: 'control', run: shown.run, action: 'resume' })
-  else if (shown?.state !== 'running') void run()
-}
 
 export function TopBar() {
   const known = useStudio((s) => s.document !== null)

@@ -67,7 +67,7 @@ export function aired(min: number, max: number): [number, number] {
 function draw(figure: Figure, pen: Pen): void {
   const { width, height, x, y } = figure
   const legend = figure.lines.length > 1 || figure.title
-  let box: Box = { left: 58, top: legend ? 30 : 10, width: width - 58 - 12, height: height - (legend ? 30 : 10) - 40 }
+  const box: Box = { left: 58, top: legend ? 30 : 10, width: width - 58 - 12, height: height - (legend ? 30 : 10) - 40 }
   let [x0, x1, y0, y1] = [x.min, x.max, y.min, y.max]
   if (figure.equal) {
     const scale = Math.max((x1 - x0) / box.width, (y1 - y0) / box.height)

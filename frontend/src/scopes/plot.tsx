@@ -173,7 +173,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       lines = marks
       unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
       plot.batch(() => {
-        plot.setData(scaled(drawn, factor) as unknown as uPlot.AlignedData, false)
+        plot.setData(scaled(drawn, factor), false)
         plot.setScale('x', { min: from, max: to })
         plot.setScale('y', { min: range[0], max: range[1] })
       })

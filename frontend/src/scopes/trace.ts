@@ -69,12 +69,12 @@ export interface Extremes {
  */
 export function extremes(traces: { time: Float64Array; values: Float64Array }[], from: number, to: number, width: number, before?: Extremes): Extremes {
   const span = (to - from) / width
-  const known = before && before.from === from && before.to === to && before.width === width && before.rows.length === traces.length ? before : undefined
+  const known = before?.from === from && before.to === to && before.width === width && before.rows.length === traces.length ? before : undefined
   const time = known ? known.drawn[0] : new Float64Array(2 * width).map((_, k) => from + (Math.floor(k / 2) + (k % 2 ? 0.75 : 0.25)) * span)
   const rows: number[] = []
   const ends: number[] = []
   const columns = traces.map(({ time: at, values }, trace) => {
-    const column = known ? (known.drawn[trace + 1] as (number | undefined)[]) : new Array<number | undefined>(2 * width).fill(undefined)
+    const column = known ? (known.drawn[trace + 1] as (number | undefined)[]) : Array.from({ length: 2 * width }, (): number | undefined => undefined)
     // One sample beyond each side, so that a line leaves the window where it should.
     let row = known ? known.rows[trace]! : Math.max(firstAfter(at, from) - 1, 0)
     let begin = row

@@ -1,6 +1,7 @@
 import { create } from 'zustand'
-import { Refusal, type EventOf } from '../../connection'
+import { Refusal } from '../../connection'
 import { newKey } from '../../keys'
+import type { EventOf } from '../../messages'
 import type { CellColumn, Opening, Readings, RobotTables } from '../../protocol'
 import { ask, author, line } from '../../store'
 

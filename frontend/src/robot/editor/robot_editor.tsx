@@ -5,7 +5,7 @@ import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps 
 import { lazy, Suspense, useEffect } from 'react'
 import { show } from '../../dialogs'
 import { ask, useStudio } from '../../store'
-import { alter, edit, leaveEditor, showRobot, useDesk, type Angles, type RobotShown } from './desk'
+import { alter, edit, leaveEditor, showRobot, useDesk, type RobotShown } from './desk'
 import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
 import { RobotFields } from './robot_fields'
@@ -163,7 +163,7 @@ function Bar({ shown }: { shown: RobotShown }) {
           { value: 'rad', label: 'rad' },
         ]}
         value={angles}
-        onChange={(value) => useDesk.setState({ angles: value as Angles })}
+        onChange={(value) => useDesk.setState({ angles: value })}
       />
     </header>
   )

@@ -74,7 +74,7 @@ function grouped(columns: CellColumn[]): { name: string; span: number }[] {
   const groups: { name: string; span: number }[] = []
   for (const { group } of columns) {
     const last = groups.at(-1)
-    if (last && last.name === group) last.span++
+    if (last?.name === group) last.span++
     else groups.push({ name: group, span: 1 })
   }
   return groups
@@ -104,7 +104,7 @@ function walk(event: React.KeyboardEvent): void {
   if (!step || !(field instanceof HTMLInputElement)) return
   const row = field.closest('tr')
   const next = (step > 0 ? row?.nextElementSibling : row?.previousElementSibling) as HTMLTableRowElement | null | undefined
-  const at = (field.closest('td, th') as HTMLTableCellElement | null)?.cellIndex
+  const at = field.closest<HTMLTableCellElement>('td, th')?.cellIndex
   const target = at === undefined ? undefined : next?.cells[at]?.querySelector('input')
   event.preventDefault()
   if (target) target.focus()

@@ -1,0 +1,35 @@
+import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
+import { change, look, useStudio } from '../store'
+import { writeNote } from './note_node'
+import type { Places } from './sheet_layout'
+
+/** What commands do with the sheet on the screen; `null` while there is none. */
+export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = { fit: null, middle: null }
+
+/** Begin a note in the middle of what is seen. */
+export function addNote(): void {
+  const at = sheetView.middle?.()
+  if (at) writeNote(at.x, at.y)
+}
+
+/** A double click: into a subsystem that has no mask, else the parameters of a block. */
+export function openBlock(block: SheetBlock): void {
+  const { document, edit } = useStudio.getState()
+  if (block.opens && !block.mask.length && document) look([...document.inside, block.name])
+  else edit(block.name)
+}
+
+/** Put blocks and notes where they are now, as one step; some wires may give way to others by it. */
+export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[] }): Promise<void> {
+  const { document } = useStudio.getState()
+  const places: Record<string, Place> = {}
+  const notes: Record<string, SheetNote> = {}
+  for (const [id, at] of Object.entries(to)) {
+    const { x, y } = at
+    const place = document?.blocks[id]?.place
+    const note = document?.notes[id]
+    if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, ...at }
+    if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
+  }
+  if (Object.keys(places).length || Object.keys(notes).length) await change({ kind: 'move', places, notes, ...wiring })
+}

@@ -1,0 +1,178 @@
+import { lastShown, remember } from './documents/last_shown'
+import type { EventOf, ServerEvent } from './messages'
+import type { Checked, Wire } from './protocol'
+import { attachAgain, leaveEditor, robotOpened, robotShown } from './robot/editor/desk'
+import { isFree } from './run/pace'
+import * as runs from './run/runs'
+import { ask, line, refuse, useStudio, type OpenDocument } from './store'
+
+const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
+
+function changed(document: OpenDocument, event: EventOf<'changed'>): OpenDocument {
+  const { change, state } = event
+  const blocks = { ...document.blocks }
+  for (const [name, block] of Object.entries(change.blocks)) {
+    if (block) blocks[name] = block
+    else delete blocks[name]
+  }
+  const removed = new Set(change.wires_removed.map(wireKey))
+  return {
+    ...document,
+    state,
+    blocks,
+    name: document.inside.length ? document.name : state.title,
+    wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...change.wires_added],
+    notes: change.notes ?? document.notes,
+    description: change.description ?? document.description,
+    logged: change.logged ?? document.logged,
+  }
+}
+
+function checked(document: OpenDocument, event: Checked): OpenDocument {
+  if (event.version !== document.state.version) return document
+  // While something is wrong nothing new is known of the wires; what was known still helps the eye.
+  const wireKinds = event.findings.length ? document.wireKinds : event.wires
+  return { ...document, findings: event.findings, wireKinds }
+}
+
+/** What the page shows after the server has told something. */
+export function receive(event: ServerEvent): void {
+  const { document, run } = useStudio.getState()
+  switch (event.kind) {
+    case 'welcome': {
+      useStudio.setState({
+        welcome: event,
+        library: new Map(event.library.map((kind) => [kind.type, kind])),
+        documents: event.documents,
+      })
+      void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
+      break
+    }
+    case 'documents':
+      useStudio.setState({ documents: event.documents, recoveries: event.recoveries })
+      break
+    case 'opened': {
+      const { state, sheet, inside } = event
+      const same = document?.state.document === state.document
+      const moved = same && document.inside.join('/') !== inside.join('/')
+      if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
+      if (same && run && (run.state === 'running' || run.state === 'paused') && event.run !== run.run)
+        useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
+      useStudio.setState({
+        document: {
+          state,
+          inside,
+          ...sheet,
+          findings: same ? document.findings : [],
+          wireKinds: same ? document.wireKinds : {},
+        },
+        ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
+      })
+      if (!same) {
+        runs.forget()
+        leaveEditor()
+      }
+      remember(state, inside)
+      break
+    }
+    case 'changed':
+      if (document?.state.document !== event.state.document) break
+      if (event.before !== document.state.version && event.state.version !== document.state.version)
+        void ask({ kind: 'look', document: event.state.document, inside: document.inside })
+      else {
+        useStudio.setState({ document: changed(document, event) })
+        remember(event.state, document.inside)
+      }
+      break
+    case 'checked':
+      if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
+      break
+    case 'run_started':
+      if (run?.run === event.run) break // told again after the line was down: its samples are the same
+      runs.began(event)
+      useStudio.setState({
+        run: {
+          run: event.run,
+          state: 'running',
+          time: 0,
+          stopTime: event.stop_time,
+          realTimeFactor: 0,
+          message: '',
+          fault: null,
+          solver: '',
+          reason: '',
+          channels: event.channels,
+          views: event.views,
+          aliases: event.aliases,
+          tunables: event.tunables,
+        },
+      })
+      break
+    case 'run_tuned':
+      runs.tuned(event)
+      break
+    case 'run_rewound':
+      runs.rewound(event)
+      break
+    case 'run_progress':
+      runs.progressed(event)
+      // How far a run that goes on has come may wait; what else is told of it may not.
+      if (run?.run === event.run && (event.state !== 'running' || run.state !== 'running' || isFree(performance.now())))
+        useStudio.setState({
+          run: {
+            ...run,
+            state: event.state,
+            time: event.time,
+            realTimeFactor: event.real_time_factor,
+            message: event.message,
+            fault: event.fault ?? null,
+            solver: event.solver ?? '',
+            reason: event.reason ?? '',
+          },
+        })
+      if (event.fault) refuse(event.fault)
+      break
+    case 'robot':
+      robotShown(event)
+      break
+    case 'robot_opened':
+      robotOpened(event.opening)
+      break
+    case 'reply':
+      break
+  }
+}
+
+/** Show the document that this page showed before, or else what its address names; then let requests flow. */
+async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
+  const robot = await attachAgain()
+  await showDocumentAgain(welcome)
+  if (robot) robotOpened(robot)
+}
+
+async function showDocumentAgain(welcome: EventOf<'welcome'>): Promise<void> {
+  const shown = useStudio.getState().document
+  const last = shown ? { ...shown.state, inside: shown.inside } : lastShown()
+  if (last) {
+    const { document, inside, path, example } = last
+    useStudio.setState({ returned: true })
+    const found = await ask<string>({ kind: 'attach', document, inside, path, example })
+    if (found !== undefined) {
+      line.resend()
+      return
+    }
+    useStudio.setState({ returned: false })
+  }
+  line.resend()
+  if (!shown) await openFromAddress(welcome)
+}
+
+async function openFromAddress(welcome: EventOf<'welcome'>): Promise<void> {
+  const wanted = decodeURIComponent(location.hash.slice(1))
+  if (wanted) {
+    const found = await ask(wanted in welcome.examples ? { kind: 'open', example: wanted } : { kind: 'open', path: wanted })
+    if (found !== undefined) return
+  }
+  const open = welcome.documents[0]
+  await ask(open ? { kind: 'attach', document: open.document } : { kind: 'open', example: 'kr180model' })
+}
