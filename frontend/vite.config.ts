@@ -32,7 +32,10 @@ function characters(ranges: string): string {
   return ranges
     .split(',')
     .map((range) => {
-      const [from, to = from] = range.slice(2).split('-').map((code) => parseInt(code, 16)) as [number, number?]
+      const [from, to = from] = range
+        .slice(2)
+        .split('-')
+        .map((code) => parseInt(code, 16)) as [number, number?]
       return String.fromCodePoint(...Array.from({ length: to - from + 1 }, (_, k) => from + k))
     })
     .join('')
@@ -46,7 +49,10 @@ function lighterSans(): Plugin {
     async generateBundle(_, bundle) {
       for (const part of Object.values(bundle))
         if (part.type === 'asset' && /inter-latin-wght-normal/.test(part.fileName))
-          part.source = await subsetFont(Buffer.from(part.source), characters(LATIN), { targetFormat: 'woff2', variationAxes: { wght: { min: 400, max: 700 } } })
+          part.source = await subsetFont(Buffer.from(part.source), characters(LATIN), {
+            targetFormat: 'woff2',
+            variationAxes: { wght: { min: 400, max: 700 } },
+          })
     },
   }
 }

@@ -10,7 +10,13 @@ export default defineConfig({
     outDir: `${process.env['ARMBLOCKS_OUT'] ?? '../src/armblocks/studio/web'}/notebook`,
     emptyOutDir: true,
     cssCodeSplit: false,
-    lib: { entry: 'src/notebook/frame.tsx', formats: ['iife'], name: 'armblocksFrame', fileName: () => 'frame.js', cssFileName: 'frame' },
+    lib: {
+      entry: 'src/notebook/frame.tsx',
+      formats: ['iife'],
+      name: 'armblocksFrame',
+      fileName: () => 'frame.js',
+      cssFileName: 'frame',
+    },
     chunkSizeWarningLimit: 2500,
   },
 })

@@ -1,5 +1,10 @@
 import { useComputedColorScheme } from '@mantine/core'
-import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps, type IDockviewPanelProps } from 'dockview-react'
+import {
+  DockviewReact,
+  type DockviewReadyEvent,
+  type IDockviewPanelHeaderProps,
+  type IDockviewPanelProps,
+} from 'dockview-react'
 import { lazy, Suspense, useEffect, useState, type ComponentType, type FunctionComponent } from 'react'
 import { Canvas } from './canvas/canvas'
 import { later, useSettled, useSettling, useWanted } from './later'
@@ -16,7 +21,10 @@ const RobotView = later(async () => (await import('./robot/robot_view')).default
 const Dialogs = later(async () => (await import('./all_dialogs')).AllDialogs)
 const Explorer = later(async () => (await import('./library/explorer')).Explorer, 'Loading the tree …')
 const Scopes = later(async () => (await import('./scopes/scopes')).Scopes, 'Loading the scopes …')
-const SignalInspector = later(async () => (await import('./scopes/inspector')).SignalInspector, 'Loading the signals …')
+const SignalInspector = later(
+  async () => (await import('./scopes/inspector')).SignalInspector,
+  'Loading the signals …',
+)
 const TunePanel = later(async () => (await import('./run/tune_panel')).TunePanel, 'Loading the parameters …')
 
 function ScopesPanel() {
@@ -68,7 +76,13 @@ function arrange({ api }: DockviewReadyEvent): void {
     position: { referencePanel: 'canvas', direction: 'left' },
     initialWidth: 216,
   })
-  api.addPanel({ id: 'explorer', component: 'explorer', title: 'Model', position: { referencePanel: 'library' }, inactive: true })
+  api.addPanel({
+    id: 'explorer',
+    component: 'explorer',
+    title: 'Model',
+    position: { referencePanel: 'library' },
+    inactive: true,
+  })
   api.addPanel({
     id: 'robot',
     component: 'robot',
@@ -76,7 +90,13 @@ function arrange({ api }: DockviewReadyEvent): void {
     position: { referencePanel: 'canvas', direction: 'right' },
     initialWidth: Math.min(640, 0.28 * innerWidth),
   })
-  api.addPanel({ id: 'tune', component: 'tune', title: 'Tune', position: { referencePanel: 'robot' }, inactive: true })
+  api.addPanel({
+    id: 'tune',
+    component: 'tune',
+    title: 'Tune',
+    position: { referencePanel: 'robot' },
+    inactive: true,
+  })
   api.addPanel({
     id: 'scopes',
     component: 'scopes',
@@ -84,7 +104,13 @@ function arrange({ api }: DockviewReadyEvent): void {
     position: { referencePanel: 'canvas', direction: 'below' },
     initialHeight: Math.min(460, 0.34 * innerHeight),
   })
-  api.addPanel({ id: 'signals', component: 'signals', title: 'Signals', position: { referencePanel: 'scopes' }, inactive: true })
+  api.addPanel({
+    id: 'signals',
+    component: 'signals',
+    title: 'Signals',
+    position: { referencePanel: 'scopes' },
+    inactive: true,
+  })
 }
 
 /** A component of its own: a dialog that opens or closes renders nothing else of the page. */

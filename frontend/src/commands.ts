@@ -44,7 +44,13 @@ const LIST: Command[] = [
   { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
   { title: 'New diagram', run: () => void ask({ kind: 'new' }) },
   { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
-  { title: 'Edit the mask: parameters of the subsystem or the model', keys: 'Ctrl+M', onSheet: true, possible: () => !useStudio.getState().document?.linked.length && !masked()?.link, run: () => openMask(masked()?.name) },
+  {
+    title: 'Edit the mask: parameters of the subsystem or the model',
+    keys: 'Ctrl+M',
+    onSheet: true,
+    possible: () => !useStudio.getState().document?.linked.length && !masked()?.link,
+    run: () => openMask(masked()?.name),
+  },
   { title: 'Rotate', keys: 'Ctrl+R', onSheet: true, possible: chosen, run: rotate },
   { title: 'Flip', keys: 'Ctrl+I', onSheet: true, possible: chosen, run: flip },
   { title: 'Duplicate', keys: 'Ctrl+D', onSheet: true, possible: selected, run: () => void duplicate() },
@@ -91,12 +97,20 @@ function pressed(keys: string, event: KeyboardEvent): boolean {
   return keys.split(', ').some((way) => {
     const parts = way.split('+')
     const key = parts.at(-1)!.toLowerCase()
-    return parts.includes('Ctrl') && (event.ctrlKey || event.metaKey) && event.shiftKey === parts.includes('Shift') && event.key.toLowerCase() === key
+    return (
+      parts.includes('Ctrl') &&
+      (event.ctrlKey || event.metaKey) &&
+      event.shiftKey === parts.includes('Shift') &&
+      event.key.toLowerCase() === key
+    )
   })
 }
 
 /** The command that these keys call, among those of the sheet or among all others. */
 export function commandOf(event: KeyboardEvent, ofSheet: boolean): Command | undefined {
   const typing = event.target instanceof Element && event.target.closest('input, textarea') !== null
-  return LIST.find(({ keys, onSheet = false, fieldsOwn = false }) => keys && onSheet === ofSheet && !(fieldsOwn && typing) && pressed(keys, event))
+  return LIST.find(
+    ({ keys, onSheet = false, fieldsOwn = false }) =>
+      keys && onSheet === ofSheet && !(fieldsOwn && typing) && pressed(keys, event),
+  )
 }

@@ -50,7 +50,8 @@ export class Connection {
     private readonly onLine: (line: Line) => void,
     onRefused: (reason: Refusal) => void,
   ) {
-    for (const request of unsent()) this.waiting.set(++this.number, { request, resolve: () => {}, reject: onRefused })
+    for (const request of unsent())
+      this.waiting.set(++this.number, { request, resolve: () => {}, reject: onRefused })
     setInterval(() => this.listen(), PING_MS)
   }
 
@@ -116,7 +117,8 @@ export class Connection {
     return new Promise<T>((resolve, reject) => {
       this.waiting.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
       this.keep()
-      if (this.flowing || request.kind === 'attach' || request.kind === 'robot_attach') this.send(number, request)
+      if (this.flowing || request.kind === 'attach' || request.kind === 'robot_attach')
+        this.send(number, request)
     })
   }
 

@@ -2,7 +2,17 @@ import { create } from 'zustand'
 import { ask, useStudio } from './store'
 
 /** Every dialog that opens by itself; that of a block opens with `useStudio().edit`, and the tour has its own stops. */
-type Dialog = 'commands' | 'find' | 'keys' | 'insert' | 'connect' | 'configuration' | 'mask' | 'save_as' | 'open' | 'recovery'
+type Dialog =
+  | 'commands'
+  | 'find'
+  | 'keys'
+  | 'insert'
+  | 'connect'
+  | 'configuration'
+  | 'mask'
+  | 'save_as'
+  | 'open'
+  | 'recovery'
 
 interface Dialogs {
   open: Dialog | null
@@ -18,7 +28,14 @@ interface Dialogs {
 }
 
 /** Which dialog is open: known before the dialogs themselves, which come after the first picture of the page. */
-export const useDialogs = create<Dialogs>(() => ({ open: null, times: 0, typed: '', of: '', ofSheet: false, at: null }))
+export const useDialogs = create<Dialogs>(() => ({
+  open: null,
+  times: 0,
+  typed: '',
+  of: '',
+  ofSheet: false,
+  at: null,
+}))
 
 /** Open a dialog, or close the one that is open. */
 export function show(open: Dialog | null, typed = '', at: Dialogs['at'] = null): void {

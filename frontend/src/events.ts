@@ -85,7 +85,8 @@ export function receive(event: ServerEvent): void {
       }
       break
     case 'checked':
-      if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
+      if (document?.state.document === event.document)
+        useStudio.setState({ document: checked(document, event) })
       break
     case 'run_started':
       if (run?.run === event.run) break // told again after the line was down: its samples are the same
@@ -117,7 +118,10 @@ export function receive(event: ServerEvent): void {
     case 'run_progress':
       runs.progressed(event)
       // How far a run that goes on has come may wait; what else is told of it may not.
-      if (run?.run === event.run && (event.state !== 'running' || run.state !== 'running' || isFree(performance.now())))
+      if (
+        run?.run === event.run &&
+        (event.state !== 'running' || run.state !== 'running' || isFree(performance.now()))
+      )
         useStudio.setState({
           run: {
             ...run,
@@ -170,7 +174,9 @@ async function showDocumentAgain(welcome: EventOf<'welcome'>): Promise<void> {
 async function openFromAddress(welcome: EventOf<'welcome'>): Promise<void> {
   const wanted = decodeURIComponent(location.hash.slice(1))
   if (wanted) {
-    const found = await ask(wanted in welcome.examples ? { kind: 'open', example: wanted } : { kind: 'open', path: wanted })
+    const found = await ask(
+      wanted in welcome.examples ? { kind: 'open', example: wanted } : { kind: 'open', path: wanted },
+    )
     if (found !== undefined) return
   }
   const open = welcome.documents[0]

@@ -45,7 +45,14 @@ export const KEYS: KeysOf[] = [
   },
   {
     place: 'Lists, fields and the tour',
-    sources: ['library/pick_list.tsx', 'documents/open_dialog.tsx', 'documents/tour.tsx', 'scopes/inspector.tsx', 'run/tune_panel.tsx', 'robot/editor/joints_panel.tsx'],
+    sources: [
+      'library/pick_list.tsx',
+      'documents/open_dialog.tsx',
+      'documents/tour.tsx',
+      'scopes/inspector.tsx',
+      'run/tune_panel.tsx',
+      'robot/editor/joints_panel.tsx',
+    ],
     keys: [
       ['↑, ↓', 'Go through the list'],
       ['Enter', 'Take what is chosen or typed'],

@@ -13,17 +13,31 @@ export function Notices() {
     <Stack className="notices" gap="xs" role="status" aria-live="polite">
       {started && line === 'down' && (
         <Alert color="orange" icon={<IconAlertTriangle />} title="The studio does not answer">
-          What you do is kept here and sent when it is back. If it was ended, start it again in the same folder.
+          What you do is kept here and sent when it is back. If it was ended, start it again in the same
+          folder.
         </Alert>
       )}
       {started && line === 'stranger' && (
-        <Alert color="orange" icon={<IconAlertTriangle />} title="The studio was started again and does not know this page">
-          Open the link that it printed in another tab: this one then goes on by itself, with what you did meanwhile.
+        <Alert
+          color="orange"
+          icon={<IconAlertTriangle />}
+          title="The studio was started again and does not know this page"
+        >
+          Open the link that it printed in another tab: this one then goes on by itself, with what you did
+          meanwhile.
         </Alert>
       )}
       <DiskNotice />
       {notices.map(({ id, what, fix }) => (
-        <Alert key={id} color="red" icon={<IconAlertTriangle />} title={what} withCloseButton closeButtonLabel="Dismiss" onClose={() => dismiss(id)}>
+        <Alert
+          key={id}
+          color="red"
+          icon={<IconAlertTriangle />}
+          title={what}
+          withCloseButton
+          closeButtonLabel="Dismiss"
+          onClose={() => dismiss(id)}
+        >
           {fix}
         </Alert>
       ))}

@@ -171,7 +171,8 @@ export function look(inside: string[]): void {
 export async function showBlock(inside: string[], name: string): Promise<void> {
   const { document } = useStudio.getState()
   if (!document) return
-  if (document.inside.join('/') !== inside.join('/')) await ask({ kind: 'look', document: document.state.document, inside })
+  if (document.inside.join('/') !== inside.join('/'))
+    await ask({ kind: 'look', document: document.state.document, inside })
   useStudio.setState({ selection: new Set([name]), sought: name })
 }
 

@@ -6,10 +6,54 @@ export const theme = createTheme({
   fontFamilyMonospace: 'var(--mono)',
   colors: {
     // The greys of the component library are neutral: ours lean to warm in the light, to blue in the dark.
-    gray: ['#f6f4f1', '#f1eeea', '#e9e5e0', '#ddd7d0', '#cfc9c1', '#a39c92', '#7d756b', '#635d55', '#45403a', '#23211e'],
-    dark: ['#e8ebf0', '#c9d0da', '#a3adba', '#7d8794', '#3d4652', '#2a313b', '#222831', '#1b2028', '#151a20', '#12151a'],
-    red: ['#fbe9e7', '#f9d6d2', '#f6b7b0', '#ff9d8f', '#e0675c', '#cc453a', '#bf3328', '#b3261e', '#8f1e18', '#6d1712'],
-    accent: ['#fff1e6', '#ffe0c7', '#ffc08f', '#ff9a4d', '#f07d24', '#d9650d', '#c25603', '#b04a00', '#8f3c00', '#702f00'],
+    gray: [
+      '#f6f4f1',
+      '#f1eeea',
+      '#e9e5e0',
+      '#ddd7d0',
+      '#cfc9c1',
+      '#a39c92',
+      '#7d756b',
+      '#635d55',
+      '#45403a',
+      '#23211e',
+    ],
+    dark: [
+      '#e8ebf0',
+      '#c9d0da',
+      '#a3adba',
+      '#7d8794',
+      '#3d4652',
+      '#2a313b',
+      '#222831',
+      '#1b2028',
+      '#151a20',
+      '#12151a',
+    ],
+    red: [
+      '#fbe9e7',
+      '#f9d6d2',
+      '#f6b7b0',
+      '#ff9d8f',
+      '#e0675c',
+      '#cc453a',
+      '#bf3328',
+      '#b3261e',
+      '#8f1e18',
+      '#6d1712',
+    ],
+    accent: [
+      '#fff1e6',
+      '#ffe0c7',
+      '#ffc08f',
+      '#ff9a4d',
+      '#f07d24',
+      '#d9650d',
+      '#c25603',
+      '#b04a00',
+      '#8f3c00',
+      '#702f00',
+    ],
   },
   respectReducedMotion: true,
   primaryColor: 'accent',
@@ -22,7 +66,12 @@ export const theme = createTheme({
       styles: { title: { color: 'var(--ink)' } },
       vars: (_theme: MantineTheme, { color }: AlertProps) => {
         const kind = color === 'red' ? 'error' : color === 'blue' || color === 'gray' ? 'muted' : 'warning'
-        return { root: { '--alert-bg': kind === 'muted' ? 'var(--sunken)' : `var(--${kind}-wash)`, '--alert-color': `var(--${kind})` } }
+        return {
+          root: {
+            '--alert-bg': kind === 'muted' ? 'var(--sunken)' : `var(--${kind}-wash)`,
+            '--alert-color': `var(--${kind})`,
+          },
+        }
       },
     },
     // A stop for the focus before the first entry is no entry; the arrows find the entries without it.

@@ -28,7 +28,11 @@ const ALIGNS = [
 ]
 const SPREADS = [
   { label: 'Equal gaps from left to right', icon: IconLayoutDistributeVertical, run: () => distribute('x') },
-  { label: 'Equal gaps from top to bottom', icon: IconLayoutDistributeHorizontal, run: () => distribute('y') },
+  {
+    label: 'Equal gaps from top to bottom',
+    icon: IconLayoutDistributeHorizontal,
+    run: () => distribute('y'),
+  },
 ]
 
 /** What can be done with the selected blocks, at the head of the sheet while several are selected. */

@@ -10,7 +10,9 @@ export function chosenBlocks(): SheetBlock[] {
 
 function place(change_: (block: SheetBlock) => Partial<Place>): void {
   const chosen = chosenBlocks()
-  const places = Object.fromEntries(chosen.map((block) => [block.name, { ...block.place, ...change_(block) }]))
+  const places = Object.fromEntries(
+    chosen.map((block) => [block.name, { ...block.place, ...change_(block) }]),
+  )
   const same = chosen.every((block) => JSON.stringify(places[block.name]) === JSON.stringify(block.place))
   if (!same) void change({ kind: 'move', places })
 }
@@ -21,7 +23,8 @@ export function rotate(): void {
   place(({ place }) => ({ rotation: (((place.rotation ?? 0) + 90) % 360) as 0 | 90 | 180 | 270 }))
 }
 
-export const shift = (dx: number, dy: number): void => place(({ place }) => ({ x: place.x + dx, y: place.y + dy }))
+export const shift = (dx: number, dy: number): void =>
+  place(({ place }) => ({ x: place.x + dx, y: place.y + dy }))
 
 export type Edge = 'left' | 'centre' | 'right' | 'top' | 'middle' | 'bottom'
 

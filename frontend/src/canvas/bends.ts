@@ -7,7 +7,8 @@ import { corners, type Point, type RoutedNet } from './router'
 
 const STUB = 15
 
-export const isFlat = (path: readonly Point[], piece: number): boolean => path[piece]![1] === path[piece + 1]![1]
+export const isFlat = (path: readonly Point[], piece: number): boolean =>
+  path[piece]![1] === path[piece + 1]![1]
 
 /** A wire's whole way: its own path, and before it what it shares with the wire that it branches from. */
 export function wholeWay(net: RoutedNet, key: string, seen: ReadonlySet<string> = new Set([key])): Point[] {
@@ -29,7 +30,10 @@ const same = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1]
 
 function lies(p: Point, a: Point, b: Point): boolean {
   return (
-    Math.min(a[0], b[0]) <= p[0] && p[0] <= Math.max(a[0], b[0]) && Math.min(a[1], b[1]) <= p[1] && p[1] <= Math.max(a[1], b[1])
+    Math.min(a[0], b[0]) <= p[0] &&
+    p[0] <= Math.max(a[0], b[0]) &&
+    Math.min(a[1], b[1]) <= p[1] &&
+    p[1] <= Math.max(a[1], b[1])
   )
 }
 

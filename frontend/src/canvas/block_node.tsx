@@ -9,12 +9,30 @@ import { nameSide, nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
 
 /** A block: the drawing that the server made of it, its ports, its name, and what is wrong with it. */
-export const BlockNode = memo(function BlockNode({ data: { block, findings }, selected }: NodeProps<BlockNodeType>) {
+export const BlockNode = memo(function BlockNode({
+  data: { block, findings },
+  selected,
+}: NodeProps<BlockNodeType>) {
   return (
-    <div className={selected ? 'block selected' : 'block'} style={{ width: block.width, height: block.height }} title={block.title}>
-      <svg className="face" width={block.width} height={block.height} aria-hidden dangerouslySetInnerHTML={{ __html: block.face }} />
+    <div
+      className={selected ? 'block selected' : 'block'}
+      style={{ width: block.width, height: block.height }}
+      title={block.title}
+    >
+      <svg
+        className="face"
+        width={block.width}
+        height={block.height}
+        aria-hidden
+        dangerouslySetInnerHTML={{ __html: block.face }}
+      />
       {block.inputs.map((spot) => (
-        <Port key={`i${spot.name}`} spot={spot} output={false} faulty={findings.some(({ port }) => port === spot.name)} />
+        <Port
+          key={`i${spot.name}`}
+          spot={spot}
+          output={false}
+          faulty={findings.some(({ port }) => port === spot.name)}
+        />
       ))}
       {block.outputs.map((spot) => (
         <Port key={`o${spot.name}`} spot={spot} output faulty={false} />
@@ -33,7 +51,11 @@ export const BlockNode = memo(function BlockNode({ data: { block, findings }, se
             </span>
           ))}
         >
-          <IconAlertCircleFilled className="fault" size={16} aria-label={findings.map(({ what }) => what).join('; ')} />
+          <IconAlertCircleFilled
+            className="fault"
+            size={16}
+            aria-label={findings.map(({ what }) => what).join('; ')}
+          />
         </Tooltip>
       )}
     </div>
@@ -47,7 +69,13 @@ function Port({ spot, output, faulty }: { spot: PortSpot; output: boolean; fault
       type={output ? 'source' : 'target'}
       position={side(spot, output)}
       className={faulty ? 'port faulty' : 'port'}
-      style={{ left: spot.x - PORT / 2, top: spot.y - PORT / 2, right: 'auto', bottom: 'auto', transform: 'none' }}
+      style={{
+        left: spot.x - PORT / 2,
+        top: spot.y - PORT / 2,
+        right: 'auto',
+        bottom: 'auto',
+        transform: 'none',
+      }}
       title={`${spot.name}: ${spot.doc}${spot.unit && `, ${spot.unit}`}`}
     />
   )

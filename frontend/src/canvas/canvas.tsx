@@ -49,7 +49,12 @@ export function Canvas() {
       {inside.length > 0 && (
         <Breadcrumbs className="breadcrumbs" separator="›" aria-label="Subsystems">
           {[state.title, ...inside].map((name, depth) => (
-            <Anchor key={`${depth} ${name}`} component="button" size="sm" onClick={() => look(inside.slice(0, depth))}>
+            <Anchor
+              key={`${depth} ${name}`}
+              component="button"
+              size="sm"
+              onClick={() => look(inside.slice(0, depth))}
+            >
               {name}
             </Anchor>
           ))}
@@ -121,9 +126,18 @@ function Sheet() {
     if (bending) return wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire))
     return freed.length ? takenOut(present(blocks, freed), wires) : wires
   }, [wires, bending, freed, blocks])
-  const routed = useMemo(() => routes.update(blocks, shown, drag, loose), [routes, blocks, shown, drag, loose])
-  const nodes = useMemo(() => graph.nodes(blocks, notes, findings, level, drag, selection), [graph, blocks, notes, findings, level, drag, selection])
-  const edges = useMemo(() => graph.edges(shown, routed, kinds, level, chosenWires, into), [graph, shown, routed, kinds, level, chosenWires, into])
+  const routed = useMemo(
+    () => routes.update(blocks, shown, drag, loose),
+    [routes, blocks, shown, drag, loose],
+  )
+  const nodes = useMemo(
+    () => graph.nodes(blocks, notes, findings, level, drag, selection),
+    [graph, blocks, notes, findings, level, drag, selection],
+  )
+  const edges = useMemo(
+    () => graph.edges(shown, routed, kinds, level, chosenWires, into),
+    [graph, shown, routed, kinds, level, chosenWires, into],
+  )
 
   const onNodesChange = useCallback(
     (changes: NodeChange<SheetNode>[]) => {
@@ -145,7 +159,10 @@ function Sheet() {
 
   const connect = useCallback(({ source, sourceHandle, target, targetHandle }: Connection) => {
     if (sourceHandle && targetHandle)
-      void change({ kind: 'connect', wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` } })
+      void change({
+        kind: 'connect',
+        wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` },
+      })
   }, [])
 
   const drop = useCallback(
@@ -163,7 +180,10 @@ function Sheet() {
   )
 
   const takeHold = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
-    const taken = present(blocks, nodes.map(({ id }) => id))
+    const taken = present(
+      blocks,
+      nodes.map(({ id }) => id),
+    )
     const freed = event.shiftKey || event.altKey ? taken.map(({ name }) => name) : []
     const [one] = taken
     const alone = taken.length === 1 && one && isLoose(one, freed.length ? takenOut(taken, wires) : wires)
@@ -183,13 +203,23 @@ function Sheet() {
     if (found) to[block.name] = levelled(block, node.position, found)
     const after = found ? putInto(block, found.wire, left) : left
     // The wires stay as they are drawn until the server has them so.
-    void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() => setHeld((now) => (now === held.current ? now : NOTHING_HELD)))
+    void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() =>
+      setHeld((now) => (now === held.current ? now : NOTHING_HELD)),
+    )
     setInto(null)
   }
   const hover = (event: React.DragEvent) => {
     event.preventDefault()
     if (!event.dataTransfer.types.includes(BLOCK_TYPE)) return
-    setInto(keyOf(wireAt(flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }), edges, wires)?.wire))
+    setInto(
+      keyOf(
+        wireAt(
+          flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }),
+          edges,
+          wires,
+        )?.wire,
+      ),
+    )
   }
 
   const sheet = useRef<HTMLDivElement>(null)
@@ -201,8 +231,13 @@ function Sheet() {
     const { place, width, height } = block
     // After the sheet has fitted itself into the window, where it has just been opened.
     setTimeout(() => {
-      void flow.setCenter(place.x + width / 2, place.y + height / 2, { zoom: Math.max(flow.getZoom(), 0.8), duration: 150 })
-      sheet.current?.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(block.name)}"]`)?.focus({ preventScroll: true })
+      void flow.setCenter(place.x + width / 2, place.y + height / 2, {
+        zoom: Math.max(flow.getZoom(), 0.8),
+        duration: 150,
+      })
+      sheet.current
+        ?.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(block.name)}"]`)
+        ?.focus({ preventScroll: true })
     }, 2 * SETTLE_MS)
   }, [sought, blocks, flow])
 
@@ -221,7 +256,8 @@ function Sheet() {
       sized.disconnect()
     }
     sized.observe(element)
-    for (const kind of ['pointerdown', 'wheel', 'keydown']) element.addEventListener(kind, leave, { once: true })
+    for (const kind of ['pointerdown', 'wheel', 'keydown'])
+      element.addEventListener(kind, leave, { once: true })
     return leave
   }, [flow])
 
@@ -245,9 +281,25 @@ function Sheet() {
   const chosenEdge = chosenWires.size === 1 ? edges.find(({ selected }) => selected) : undefined
   const empty = Object.keys(blocks).length === 0 && Object.keys(notes).length === 0
   return (
-    <div className="canvas" ref={sheet} onFocus={selectFocused} onDragOver={hover} onDragLeave={() => setInto(null)} onDrop={drop}>
+    <div
+      className="canvas"
+      ref={sheet}
+      onFocus={selectFocused}
+      onDragOver={hover}
+      onDragLeave={() => setInto(null)}
+      onDrop={drop}
+    >
       <svg className="defs" width="0" height="0" aria-hidden>
-        <marker id="wire-head" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" markerUnits="userSpaceOnUse" orient="auto">
+        <marker
+          id="wire-head"
+          viewBox="0 0 8 8"
+          refX="8"
+          refY="4"
+          markerWidth="8"
+          markerHeight="8"
+          markerUnits="userSpaceOnUse"
+          orient="auto"
+        >
           <path d="M0 0.300L8 4L0 7.700Z" className="f-wire" />
         </marker>
       </svg>
@@ -259,7 +311,8 @@ function Sheet() {
         colorMode={scheme}
         {...handlers}
         onDoubleClick={(event) => {
-          if ((event.target as Element).classList.contains('react-flow__pane')) show('insert', '', { x: event.clientX, y: event.clientY })
+          if ((event.target as Element).classList.contains('react-flow__pane'))
+            show('insert', '', { x: event.clientX, y: event.clientY })
         }}
         zoomOnDoubleClick={false}
         connectionLineType={ConnectionLineType.Step}
@@ -286,19 +339,28 @@ function Sheet() {
       </ReactFlow>
       <ArrangeBar />
       {empty && level === '' && <Welcome />}
-      {empty && level !== '' && <p className="empty over">Nothing is inside yet: type to add a block, such as In and Out.</p>}
+      {empty && level !== '' && (
+        <p className="empty over">Nothing is inside yet: type to add a block, such as In and Out.</p>
+      )}
     </div>
   )
 }
 
 /** Going through the blocks with Tab selects the one that has the focus. */
 function selectFocused({ target }: React.FocusEvent): void {
-  const name = target.classList.contains('react-flow__node') && target.matches(':focus-visible') ? target.getAttribute('data-id') : null
+  const name =
+    target.classList.contains('react-flow__node') && target.matches(':focus-visible')
+      ? target.getAttribute('data-id')
+      : null
   if (name) useStudio.getState().select([name])
 }
 
 const keyOf = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
 
-const present = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] => names.map((name) => blocks[name]).filter((block) => block !== undefined)
+const present = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] =>
+  names.map((name) => blocks[name]).filter((block) => block !== undefined)
 
-const middleOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({ x: at.x + width / 2, y: at.y + height / 2 })
+const middleOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({
+  x: at.x + width / 2,
+  y: at.y + height / 2,
+})

@@ -8,7 +8,13 @@ async function copied(): Promise<string | undefined> {
   const blocks = [...selection].filter((name) => document?.blocks[name])
   const notes = [...selection].filter((name) => document?.notes[name])
   if (!document || !(blocks.length || notes.length)) return undefined
-  return ask<string>({ kind: 'copy', document: document.state.document, inside: document.inside, blocks, notes })
+  return ask<string>({
+    kind: 'copy',
+    document: document.state.document,
+    inside: document.inside,
+    blocks,
+    notes,
+  })
 }
 
 /** Put what such a text holds on the sheet, under names that are free, and select it. */

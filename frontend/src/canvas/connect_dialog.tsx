@@ -8,7 +8,12 @@ import { change, useStudio } from '../store'
  * How a port is chosen: by typing. Without `selectFirstOptionOnDropdownOpen`, Mantine forgets the highlighted option in a
  * timer after the list opens; on a busy machine that is after the first keys, and Enter chooses nothing.
  */
-const TYPED = { ...SCROLLED, searchable: true, selectFirstOptionOnChange: true, selectFirstOptionOnDropdownOpen: true } as const
+const TYPED = {
+  ...SCROLLED,
+  searchable: true,
+  selectFirstOptionOnChange: true,
+  selectFirstOptionOnDropdownOpen: true,
+} as const
 
 /** The way to draw a wire by keyboard: type the names of two ports. The selected block's are suggested. */
 export function ConnectDialog() {
@@ -19,7 +24,13 @@ export function ConnectDialog() {
   const [source, setSource] = useState<string | null>(null)
   const [target, setTarget] = useState<string | null>(null)
   const close = () => show(null)
-  const sources = useMemo(() => Object.values(blocks ?? {}).flatMap(({ name, outputs }) => outputs.map((port) => `${name}/${port.name}`)), [blocks])
+  const sources = useMemo(
+    () =>
+      Object.values(blocks ?? {}).flatMap(({ name, outputs }) =>
+        outputs.map((port) => `${name}/${port.name}`),
+      ),
+    [blocks],
+  )
   const targets = useMemo(() => {
     const driven = new Set(wires?.map((wire) => wire.target))
     return Object.values(blocks ?? {})
@@ -28,7 +39,8 @@ export function ConnectDialog() {
   }, [blocks, wires])
   useEffect(() => {
     if (!opened) return
-    const of = (ports: string[]) => ports.find((port) => [...selection].some((name) => port.startsWith(`${name}/`))) ?? null
+    const of = (ports: string[]) =>
+      ports.find((port) => [...selection].some((name) => port.startsWith(`${name}/`))) ?? null
     setSource(of(sources))
     setTarget(selection.size > 1 ? of(targets) : null)
     // The suggestion is made once, when the dialog opens.
@@ -48,8 +60,24 @@ export function ConnectDialog() {
         }}
       >
         <Stack gap="sm">
-          <Select {...TYPED} label="From the output" data={sources} value={source} onChange={setSource} data-autofocus={!source || undefined} nothingFoundMessage="no such output" />
-          <Select {...TYPED} label="To the input" data={targets} value={target} onChange={setTarget} data-autofocus={source ? true : undefined} nothingFoundMessage="no such free input" />
+          <Select
+            {...TYPED}
+            label="From the output"
+            data={sources}
+            value={source}
+            onChange={setSource}
+            data-autofocus={!source || undefined}
+            nothingFoundMessage="no such output"
+          />
+          <Select
+            {...TYPED}
+            label="To the input"
+            data={targets}
+            value={target}
+            onChange={setTarget}
+            data-autofocus={source ? true : undefined}
+            nothingFoundMessage="no such free input"
+          />
           <Group justify="flex-end" gap="xs">
             <Button variant="default" onClick={close}>
               Cancel

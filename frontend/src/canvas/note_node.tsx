@@ -15,11 +15,13 @@ export function writeNote(x: number, y: number): void {
   if (!document) return
   const taken = Object.keys(document.notes).map((id) => Number(id.slice(1)) || 0)
   const id = `/${Math.max(0, ...taken) + 1}`
-  void change({ kind: 'notes', notes: { [id]: { x: Math.round(x), y: Math.round(y), text: 'Note' } } }).then((version) => {
-    if (version === undefined) return
-    select([id])
-    useWriting.setState({ id })
-  })
+  void change({ kind: 'notes', notes: { [id]: { x: Math.round(x), y: Math.round(y), text: 'Note' } } }).then(
+    (version) => {
+      if (version === undefined) return
+      select([id])
+      useWriting.setState({ id })
+    },
+  )
 }
 
 export const editNote = (id: string): void => useWriting.setState({ id })

@@ -18,5 +18,9 @@ export function Overview({ blocks }: { blocks: Record<string, SheetBlock> }) {
       left * zoom + x < 0 || top * zoom + y < 0 || right * zoom + x > width || low * zoom + y > height,
     [left, top, right, low],
   )
-  return useStore(beyond) && <MiniMap pannable zoomable ariaLabel="Map of the sheet" style={{ width: 160, height: 110 }} />
+  return (
+    useStore(beyond) && (
+      <MiniMap pannable zoomable ariaLabel="Map of the sheet" style={{ width: 160, height: 110 }} />
+    )
+  )
 }

@@ -14,7 +14,10 @@ const passes = (block: SheetBlock): boolean => block.inputs.length > 0 && block.
 
 /** Whether a block has no wire, so that it goes into one that it is dropped on. */
 export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
-  return passes(block) && !wires.some(({ source, target }) => blockOf(source) === block.name || blockOf(target) === block.name)
+  return (
+    passes(block) &&
+    !wires.some(({ source, target }) => blockOf(source) === block.name || blockOf(target) === block.name)
+  )
 }
 
 /** The wires without those between some blocks and all others; where that is one block with one input and one output they close behind it. */
@@ -36,13 +39,20 @@ export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
   const [input, output] = [block.inputs[0], block.outputs[0]]
   if (!input || !output) return wires
   const others = wires.filter((other) => wireKey(other) !== wireKey(wire))
-  return [...others, { source: wire.source, target: `${block.name}/${input.name}` }, { source: `${block.name}/${output.name}`, target: wire.target }]
+  return [
+    ...others,
+    { source: wire.source, target: `${block.name}/${input.name}` },
+    { source: `${block.name}/${output.name}`, target: wire.target },
+  ]
 }
 
 /** What an edit says that makes one list of wires of another. */
 export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead: Wire[] } {
   const [old, next] = [new Set(before.map(wireKey)), new Set(after.map(wireKey))]
-  return { wires: after.filter((wire) => !old.has(wireKey(wire))), instead: before.filter((wire) => !next.has(wireKey(wire))) }
+  return {
+    wires: after.filter((wire) => !old.has(wireKey(wire))),
+    instead: before.filter((wire) => !next.has(wireKey(wire))),
+  }
 }
 
 /** A level piece of a wire: its height and its ends, and whether it runs to the left. */
@@ -55,7 +65,11 @@ interface Piece {
 }
 
 /** The level piece that passes under a point, of the wires that are on the sheet already. */
-export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wires: Wire[]): Piece | undefined {
+export function wireAt(
+  at: { x: number; y: number },
+  edges: WireEdgeType[],
+  wires: Wire[],
+): Piece | undefined {
   const present = new Set(wires.map(wireKey))
   for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
     // What has just closed behind a block does not take it in again.
@@ -65,7 +79,13 @@ export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wire
       const [[ax, ay], [bx, by]] = [path[k - 1]!, path[k]!]
       const [left, right] = [Math.min(ax, bx), Math.max(ax, bx)]
       if (ay === by && Math.abs(at.y - ay) < INTO_WIRE && at.x > left && at.x < right)
-        return { wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` }, y: ay, left, right, flipped: ax > bx }
+        return {
+          wire: { source: `${source}/${sourceHandle}`, target: `${target}/${targetHandle}` },
+          y: ay,
+          left,
+          right,
+          flipped: ax > bx,
+        }
     }
   }
   return undefined
@@ -75,7 +95,11 @@ export function wireAt(at: { x: number; y: number }, edges: WireEdgeType[], wire
  * Where a block stands so that a wire runs straight into its first input, and through it the way that the wire goes;
  * where there is little room, in the middle of it.
  */
-export function levelled(block: SheetBlock, at: { x: number; y: number }, { y, left, right, flipped }: Piece): Places[string] {
+export function levelled(
+  block: SheetBlock,
+  at: { x: number; y: number },
+  { y, left, right, flipped }: Piece,
+): Places[string] {
   const input = block.inputs[0]
   if (input?.dy !== 0) return at
   const narrow = right - left < block.width + ROOM

@@ -87,7 +87,11 @@ const ahead = (end: WireEnd): Point => [end.x + STUB * end.dx, end.y + STUB * en
 const behind = (end: WireEnd): Point => [end.x - STUB * end.dx, end.y - STUB * end.dy]
 
 /** Wires for the nets given, the short ones first, around `obstacles` and what `kept` nets have laid already. */
-export function route(obstacles: Obstacle[], nets: Net[], kept: Map<string, RoutedNet> = new Map()): Map<string, RoutedNet> {
+export function route(
+  obstacles: Obstacle[],
+  nets: Net[],
+  kept: Map<string, RoutedNet> = new Map(),
+): Map<string, RoutedNet> {
   const laid: Segment[] = []
   for (const [key, routed] of kept) for (const path of routed.paths.values()) lay(laid, key, path)
   const done = new Map<string, RoutedNet>()
@@ -96,7 +100,9 @@ export function route(obstacles: Obstacle[], nets: Net[], kept: Map<string, Rout
     .sort((a, b) => a.free - b.free || a.length - b.length || (a.net.key < b.net.key ? -1 : 1))
   for (const { net } of order) {
     const plainly = straight(net, obstacles, laid)
-    const routed = plainly ? { paths: new Map([[net.targets[0]!.key, plainly]]), dots: [] } : new NetRouter(net, obstacles, laid).routed()
+    const routed = plainly
+      ? { paths: new Map([[net.targets[0]!.key, plainly]]), dots: [] }
+      : new NetRouter(net, obstacles, laid).routed()
     for (const path of routed.paths.values()) lay(laid, net.key, path)
     done.set(net.key, routed)
   }
@@ -136,12 +142,17 @@ class NetRouter {
     const stubs = [ahead(net.source), ...net.targets.map((target) => behind(target.end))]
     this.drawn = drawnWays(net)
     const turns = [...this.drawn.values()].flatMap((path) => path.slice(1, -1))
-    const [allX, allY] = [[...ends.map((e) => e.x), ...turns.map(([x]) => x)], [...ends.map((e) => e.y), ...turns.map(([, y]) => y)]]
+    const [allX, allY] = [
+      [...ends.map((e) => e.x), ...turns.map(([x]) => x)],
+      [...ends.map((e) => e.y), ...turns.map(([, y]) => y)],
+    ]
     const left = Math.min(...allX) - WINDOW
     const far = Math.max(...allX) + WINDOW
     const top = Math.min(...allY) - WINDOW
     const low = Math.max(...allY) + WINDOW
-    const near = obstacles.filter((o) => o.x < far && o.x + o.width > left && o.y < low && o.y + o.height > top)
+    const near = obstacles.filter(
+      (o) => o.x < far && o.x + o.width > left && o.y < low && o.y + o.height > top,
+    )
     const others = laid.filter(
       ({ net: key, a, b }) =>
         key !== net.key &&
@@ -154,7 +165,9 @@ class NetRouter {
     const lanes = near.length > 60 ? LANES.slice(0, 1) : LANES
     this.xs = merged(
       [...stubs, ...turns].map(([x]) => x),
-      near.flatMap((o) => lanes.flatMap((lane) => [o.x - lane, o.x + o.width + lane])).filter((x) => x > left && x < far),
+      near
+        .flatMap((o) => lanes.flatMap((lane) => [o.x - lane, o.x + o.width + lane]))
+        .filter((x) => x > left && x < far),
     )
     this.ys = merged(
       [...stubs, ...turns].map(([, y]) => y),
@@ -189,7 +202,10 @@ class NetRouter {
       const goal = this.node(behind(end))
       const walked = this.columns * this.ys.length > MOST_NODES ? null : this.search(tree, start, goal, end)
       if (!walked) {
-        paths.set(key, corners([[net.source.x, net.source.y], ...plain(ahead(net.source), behind(end)), [end.x, end.y]]))
+        paths.set(
+          key,
+          corners([[net.source.x, net.source.y], ...plain(ahead(net.source), behind(end)), [end.x, end.y]]),
+        )
         continue
       }
       for (let k = 1; k < walked.length; k++) {
@@ -212,7 +228,7 @@ class NetRouter {
   /** Make a drawn way part of the tree, so that others can branch from it. */
   private follow(tree: Map<number, Set<number>>, path: Point[]): void {
     const { source } = this.net
-    const free = ((path[1]![0] - source.x) * source.dx + (path[1]![1] - source.y) * source.dy) >= STUB
+    const free = (path[1]![0] - source.x) * source.dx + (path[1]![1] - source.y) * source.dy >= STUB
     const turns = [...(free ? [ahead(source)] : []), ...path.slice(1, -1)].map((point) => this.node(point))
     for (let k = 1; k < turns.length; k++) {
       const [from, to] = [turns[k - 1]!, turns[k]!]
@@ -259,7 +275,9 @@ class NetRouter {
   private occupy({ a, b }: Segment): void {
     const flat = a[1] === b[1]
     const [along, across] = flat ? [this.xs, this.ys] : [this.ys, this.xs]
-    const [from, to] = flat ? [Math.min(a[0], b[0]), Math.max(a[0], b[0])] : [Math.min(a[1], b[1]), Math.max(a[1], b[1])]
+    const [from, to] = flat
+      ? [Math.min(a[0], b[0]), Math.max(a[0], b[0])]
+      : [Math.min(a[1], b[1]), Math.max(a[1], b[1])]
     const level = flat ? a[1] : a[0]
     for (let m = 0; m < across.length; m++) {
       const gap = Math.abs(across[m]! - level)
@@ -282,7 +300,12 @@ class NetRouter {
     }
   }
 
-  private search(tree: Map<number, Set<number>>, start: number, goal: number, target: WireEnd): number[] | null {
+  private search(
+    tree: Map<number, Set<number>>,
+    start: number,
+    goal: number,
+    target: WireEnd,
+  ): number[] | null {
     const [gx, gy] = this.point(goal)
     const guess = (node: number) => {
       const [x, y] = this.point(node)
@@ -360,14 +383,27 @@ function straight({ source, targets }: Net, obstacles: Obstacle[], laid: Segment
   if (!level || along < 2 * STUB || end.dx !== source.dx || end.dy !== source.dy) return null
   const [left, right] = [Math.min(source.x, end.x), Math.max(source.x, end.x)]
   const [top, low] = [Math.min(source.y, end.y), Math.max(source.y, end.y)]
-  const meets = (x0: number, y0: number, x1: number, y1: number) => x0 < right && x1 > left && y0 < low + 0.5 && y1 > top - 0.5
+  const meets = (x0: number, y0: number, x1: number, y1: number) =>
+    x0 < right && x1 > left && y0 < low + 0.5 && y1 > top - 0.5
   const blocked = ({ x, y, width, height, label: [lx, ly, lw, lh] }: Obstacle) =>
-    (meets(x - CLEARANCE, y - CLEARANCE, x + width + CLEARANCE, y + height + CLEARANCE) && !touches(x, y, width, height, source) && !touches(x, y, width, height, end)) ||
+    (meets(x - CLEARANCE, y - CLEARANCE, x + width + CLEARANCE, y + height + CLEARANCE) &&
+      !touches(x, y, width, height, source) &&
+      !touches(x, y, width, height, end)) ||
     (lw > 0 && meets(lx - 3, ly, lx + lw + 3, ly + lh))
   if (obstacles.some(blocked)) return null
   const near = ({ a, b }: Segment) =>
-    meets(Math.min(a[0], b[0]) - NEAR, Math.min(a[1], b[1]) - NEAR, Math.max(a[0], b[0]) + NEAR, Math.max(a[1], b[1]) + NEAR)
-  return laid.some(near) ? null : [[source.x, source.y], [end.x, end.y]]
+    meets(
+      Math.min(a[0], b[0]) - NEAR,
+      Math.min(a[1], b[1]) - NEAR,
+      Math.max(a[0], b[0]) + NEAR,
+      Math.max(a[1], b[1]) + NEAR,
+    )
+  return laid.some(near)
+    ? null
+    : [
+        [source.x, source.y],
+        [end.x, end.y],
+      ]
 }
 
 const touches = (x: number, y: number, width: number, height: number, at: WireEnd) =>
@@ -413,7 +449,11 @@ export function corners(points: Point[]): Point[] {
     const last = kept.at(-1)
     if (last && last[0] === point[0] && last[1] === point[1]) continue
     const before = kept.at(-2)
-    if (last && before && ((before[0] === last[0] && last[0] === point[0]) || (before[1] === last[1] && last[1] === point[1])))
+    if (
+      last &&
+      before &&
+      ((before[0] === last[0] && last[0] === point[0]) || (before[1] === last[1] && last[1] === point[1]))
+    )
       kept[kept.length - 1] = point
     else kept.push(point)
   }
@@ -441,7 +481,7 @@ class Queue {
     const last = items.pop()
     if (!first || !last || items.length === 0) return first
     items[0] = last
-    for (let k = 0; ; ) {
+    for (let k = 0; ;) {
       let least = k
       for (const child of [2 * k + 1, 2 * k + 2])
         if (child < items.length && items[child]!.rank < items[least]!.rank) least = child

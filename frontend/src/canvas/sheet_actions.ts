@@ -4,7 +4,10 @@ import { writeNote } from './note_node'
 import type { Places } from './sheet_layout'
 
 /** What commands do with the sheet on the screen; `null` while there is none. */
-export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = { fit: null, middle: null }
+export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = {
+  fit: null,
+  middle: null,
+}
 
 /** Begin a note in the middle of what is seen. */
 export function addNote(): void {
@@ -31,5 +34,6 @@ export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[]
     if (place && (wiring || place.x !== x || place.y !== y)) places[id] = { ...place, ...at }
     if (note && (note.x !== x || note.y !== y)) notes[id] = { ...note, x, y }
   }
-  if (Object.keys(places).length || Object.keys(notes).length) await change({ kind: 'move', places, notes, ...wiring })
+  if (Object.keys(places).length || Object.keys(notes).length)
+    await change({ kind: 'move', places, notes, ...wiring })
 }

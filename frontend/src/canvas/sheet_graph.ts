@@ -56,19 +56,26 @@ export class SheetGraph {
       const own = found.get(name) ?? NO_FINDINGS
       const [x, y] = [drag[name]?.x ?? block.place.x, drag[name]?.y ?? block.place.y]
       const selected = selection.has(name)
-      return this.blocks.get(name, [block, own === NO_FINDINGS ? '' : JSON.stringify(own), x, y, selected], () => ({
-        id: name,
-        type: 'block',
-        position: { x, y },
-        selected,
-        width: block.width,
-        height: block.height,
-        // All is known, so nothing of a block need be measured on the screen.
-        measured: { width: block.width, height: block.height },
-        handles: [...block.inputs.map((spot) => port(spot, false)), ...block.outputs.map((spot) => port(spot, true))],
-        ariaLabel: `${name}, ${block.title}`,
-        data: { block, findings: own },
-      }))
+      return this.blocks.get(
+        name,
+        [block, own === NO_FINDINGS ? '' : JSON.stringify(own), x, y, selected],
+        () => ({
+          id: name,
+          type: 'block',
+          position: { x, y },
+          selected,
+          width: block.width,
+          height: block.height,
+          // All is known, so nothing of a block need be measured on the screen.
+          measured: { width: block.width, height: block.height },
+          handles: [
+            ...block.inputs.map((spot) => port(spot, false)),
+            ...block.outputs.map((spot) => port(spot, true)),
+          ],
+          ariaLabel: `${name}, ${block.title}`,
+          data: { block, findings: own },
+        }),
+      )
     })
     for (const [id, note] of Object.entries(notes)) {
       const [x, y] = [drag[id]?.x ?? note.x, drag[id]?.y ?? note.y]
@@ -91,7 +98,14 @@ export class SheetGraph {
     return (this.lastNodes = unlessSame(this.lastNodes, made))
   }
 
-  edges(wires: Wire[], routed: Map<string, RoutedNet>, kinds: Record<string, WireKind>, level: string, chosen: ReadonlySet<string>, into: string | null): WireEdgeType[] {
+  edges(
+    wires: Wire[],
+    routed: Map<string, RoutedNet>,
+    kinds: Record<string, WireKind>,
+    level: string,
+    chosen: ReadonlySet<string>,
+    into: string | null,
+  ): WireEdgeType[] {
     const dotted = new Set<string>()
     const made = wires.map((wire) => {
       const net = routed.get(wire.source)
@@ -113,7 +127,14 @@ export class SheetGraph {
         selected,
         className: key === into ? 'into' : '',
         ariaLabel: `wire from ${wire.source} to ${wire.target}`,
-        data: { path, dots, rank, label, bent: Boolean(wire.bends?.length), way: () => (net ? wholeWay(net, key) : []) },
+        data: {
+          path,
+          dots,
+          rank,
+          label,
+          bent: Boolean(wire.bends?.length),
+          way: () => (net ? wholeWay(net, key) : []),
+        },
       }))
     })
     this.wires.turn()

@@ -39,7 +39,12 @@ export function useSheetKeys(
     const { document, selection, select } = useStudio.getState()
     if (!document) return false
     const step = event.shiftKey ? 1 : NUDGE
-    const arrows: Record<string, [number, number]> = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }
+    const arrows: Record<string, [number, number]> = {
+      ArrowLeft: [-step, 0],
+      ArrowRight: [step, 0],
+      ArrowUp: [0, -step],
+      ArrowDown: [0, step],
+    }
     const arrow = arrows[event.key]
     const [first] = selection
     if (event.key === 'Delete' || event.key === 'Backspace') remove()
@@ -56,7 +61,8 @@ export function useSheetKeys(
     else if (event.key === '?') show('keys')
     else if (event.key === '"') addNote()
     else if (event.key === ' ') sheetView.fit?.()
-    else if (event.key === 'Escape' && document.inside.length && !selection.size) look(document.inside.slice(0, -1))
+    else if (event.key === 'Escape' && document.inside.length && !selection.size)
+      look(document.inside.slice(0, -1))
     else if (event.key === 'Escape') select([])
     else if (/^\p{L}$/u.test(event.key)) show('insert', typedSoFar() + event.key)
     else return false
@@ -66,7 +72,11 @@ export function useSheetKeys(
   const onKeyDown = (event: KeyboardEvent) => {
     // A focused block may have gone, and then nothing has the focus; a button elsewhere keeps only the keys that press it.
     const focused = event.target instanceof Element ? event.target : null
-    if (focused instanceof HTMLInputElement || focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')) return
+    if (
+      focused instanceof HTMLInputElement ||
+      focused?.closest('textarea, [role="dialog"], [role="menu"], [role="slider"], [role="tree"]')
+    )
+      return
     const ours = focused === window.document.body || sheet.current?.contains(focused)
     if (!ours && (event.key === 'Enter' || event.key === ' ' || event.key.length > 1)) return
     const command = commandOf(event, true)

@@ -46,7 +46,10 @@ export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'besi
 }
 
 /** How the sheet is fitted into its panel: nothing of it lies under the buttons at the left, and the lowest names are seen. */
-export const FIT: FitViewOptions = { padding: { top: '16px', right: '24px', bottom: '32px', left: '56px' }, maxZoom: 1.25 }
+export const FIT: FitViewOptions = {
+  padding: { top: '16px', right: '24px', bottom: '32px', left: '56px' },
+  maxZoom: 1.25,
+}
 
 function obstacle(block: SheetBlock, at: { x: number; y: number }): Obstacle {
   const width = nameWidth(block.name)
@@ -64,7 +67,12 @@ function obstacle(block: SheetBlock, at: { x: number; y: number }): Obstacle {
   }
 }
 
-function end(block: SheetBlock, at: { x: number; y: number }, port: string, output: boolean): WireEnd | undefined {
+function end(
+  block: SheetBlock,
+  at: { x: number; y: number },
+  port: string,
+  output: boolean,
+): WireEnd | undefined {
   const spot = (output ? block.outputs : block.inputs).find(({ name }) => name === port)
   return spot && { x: at.x + spot.x, y: at.y + spot.y, dx: spot.dx, dy: spot.dy }
 }
@@ -79,9 +87,18 @@ export class SheetRoutes {
   private obstacles = new Map<string, string>()
 
   /** `loose`: a block that no wire goes around, because it is about to go into one. */
-  update(blocks: Record<string, SheetBlock>, wires: Wire[], places: Places, loose: string | null): Map<string, RoutedNet> {
+  update(
+    blocks: Record<string, SheetBlock>,
+    wires: Wire[],
+    places: Places,
+    loose: string | null,
+  ): Map<string, RoutedNet> {
     const nets = collect(blocks, wires, places)
-    const obstacles = new Map(Object.values(blocks).filter(({ name }) => name !== loose).map((block) => [block.name, obstacle(block, places[block.name] ?? block.place)]))
+    const obstacles = new Map(
+      Object.values(blocks)
+        .filter(({ name }) => name !== loose)
+        .map((block) => [block.name, obstacle(block, places[block.name] ?? block.place)]),
+    )
     const moved: Obstacle[] = []
     const keys = new Map<string, string>()
     for (const [name, box] of obstacles) {
@@ -97,7 +114,8 @@ export class SheetRoutes {
       const description = JSON.stringify([net.source, net.targets])
       described.set(net.key, description)
       const old = this.routed.get(net.key)
-      if (old && this.nets.get(net.key) === description && !moved.some((box) => crosses(old, box))) kept.set(net.key, old)
+      if (old && this.nets.get(net.key) === description && !moved.some((box) => crosses(old, box)))
+        kept.set(net.key, old)
       else fresh.push(net)
     }
     this.nets = described
@@ -124,7 +142,9 @@ function collect(blocks: Record<string, SheetBlock>, wires: Wire[], places: Plac
     const source = end(from, places[from.name] ?? from.place, portOf(wire.source), true)
     const target = end(to, places[to.name] ?? to.place, portOf(wire.target), false)
     if (!source || !target) continue
-    const bends = wire.bends?.length ? wire.bends.map((value, k) => value + shift(from, to, places)[(k + Number(source.dx === 0)) % 2]!) : undefined
+    const bends = wire.bends?.length
+      ? wire.bends.map((value, k) => value + shift(from, to, places)[(k + Number(source.dx === 0)) % 2]!)
+      : undefined
     const net = nets.get(wire.source) ?? { key: wire.source, source, targets: [] }
     net.targets.push({ key: wireKey(wire), end: target, bends })
     nets.set(wire.source, net)
@@ -137,7 +157,12 @@ function crosses({ paths }: RoutedNet, box: Obstacle): boolean {
   for (const path of paths.values())
     for (let k = 1; k < path.length; k++) {
       const [a, b] = [path[k - 1]!, path[k]!]
-      if (Math.max(a[0], b[0]) > left && Math.min(a[0], b[0]) < right && Math.max(a[1], b[1]) > top && Math.min(a[1], b[1]) < low)
+      if (
+        Math.max(a[0], b[0]) > left &&
+        Math.min(a[0], b[0]) < right &&
+        Math.max(a[1], b[1]) > top &&
+        Math.min(a[1], b[1]) < low
+      )
         return true
     }
   return false

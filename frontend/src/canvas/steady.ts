@@ -11,6 +11,11 @@ export function useSteady<T extends Handlers>(latest: T): T {
   useLayoutEffect(() => {
     now.current = latest
   })
-  const [steady] = useState(() => Object.fromEntries(Object.keys(latest).map((name) => [name, (...given: never[]) => now.current[name]!(...given)])) as T)
+  const [steady] = useState(
+    () =>
+      Object.fromEntries(
+        Object.keys(latest).map((name) => [name, (...given: never[]) => now.current[name]!(...given)]),
+      ) as T,
+  )
   return steady
 }

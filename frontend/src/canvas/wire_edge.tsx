@@ -26,19 +26,41 @@ export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire:
 const SNAP = 7
 
 /** A wire along its way: thin for a scalar, heavier for a vector, double for a matrix, three lines for a bus. Its pieces can be dragged. */
-export const WireEdge = memo(function WireEdge({ id, data, selected, sourceX, sourceY, targetX, targetY }: EdgeProps<WireEdgeType>) {
-  const path = data?.path.length ? data.path : ([[sourceX, sourceY], [targetX, targetY]] as Point[])
+export const WireEdge = memo(function WireEdge({
+  id,
+  data,
+  selected,
+  sourceX,
+  sourceY,
+  targetX,
+  targetY,
+}: EdgeProps<WireEdgeType>) {
+  const path = data?.path.length
+    ? data.path
+    : ([
+        [sourceX, sourceY],
+        [targetX, targetY],
+      ] as Point[])
   const rank = data?.rank ?? 0
   const line = svgPath(path)
   return (
     <g className={selected ? 'wire selected' : 'wire'}>
-      <BaseEdge id={id} path={line} className={`line rank${rank}`} markerEnd="url(#wire-head)" interactionWidth={0} />
+      <BaseEdge
+        id={id}
+        path={line}
+        className={`line rank${rank}`}
+        markerEnd="url(#wire-head)"
+        interactionWidth={0}
+      />
       {rank >= 2 && <path d={line} className={rank === 3 ? 'core wide' : 'core'} />}
       {rank === 3 && <path d={line} className="line rank0 inner" />}
       {data?.dots.map(([x, y]) => (
         <circle key={`${x} ${y}`} cx={x} cy={y} r={2.6 + 0.3 * rank} className="dot" />
       ))}
-      {data && path.slice(1).map((_, piece) => <Piece key={piece} id={id} path={path} piece={piece} way={data.way} />)}
+      {data &&
+        path
+          .slice(1)
+          .map((_, piece) => <Piece key={piece} id={id} path={path} piece={piece} way={data.way} />)}
       {data?.label && <title>{data.label}</title>}
     </g>
   )
@@ -62,7 +84,9 @@ function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: num
       const gone = flat ? at.clientY - start.y : at.clientX - start.x
       if (Math.abs(gone) < 3 && !useBending.getState().wire) return
       const place = flow.screenToFlowPosition({ x: at.clientX, y: at.clientY }, { snapToGrid: false })
-      useBending.setState({ wire: { source, target, bends: dragged(whole, index, level(whole, index, flat ? place.y : place.x)) } })
+      useBending.setState({
+        wire: { source, target, bends: dragged(whole, index, level(whole, index, flat ? place.y : place.x)) },
+      })
     }
     const end = (at: PointerEvent) => {
       element.removeEventListener('pointermove', move)
@@ -70,14 +94,24 @@ function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: num
       element.removeEventListener('pointercancel', end)
       const { wire } = useBending.getState()
       if (!wire) return
-      if (at.type === 'pointerup') void change({ kind: 'bend', wires: [wire] }).finally(() => useBending.setState({ wire: null }))
+      if (at.type === 'pointerup')
+        void change({ kind: 'bend', wires: [wire] }).finally(() => useBending.setState({ wire: null }))
       else useBending.setState({ wire: null })
     }
     element.addEventListener('pointermove', move)
     element.addEventListener('pointerup', end)
     element.addEventListener('pointercancel', end)
   }
-  return <line x1={x1} y1={y1} x2={x2} y2={y2} className={flat ? 'piece nopan flat' : 'piece nopan'} onPointerDown={take} />
+  return (
+    <line
+      x1={x1}
+      y1={y1}
+      x2={x2}
+      y2={y2}
+      className={flat ? 'piece nopan flat' : 'piece nopan'}
+      onPointerDown={take}
+    />
+  )
 }
 
 /** Where a piece comes to lie: level with the next parallel pieces where it is near them, else on the grid. */

@@ -12,12 +12,19 @@ interface Standing {
 }
 
 /** That somebody else has written the file of a drawing or robot, or that nothing keeps its edits: with what can be done. */
-export function FileNotice({ path, disk, dirty, journaled, actions }: Standing & { actions: { reload: () => void; keepMine: () => void; saveAs: () => void } }) {
+export function FileNotice({
+  path,
+  disk,
+  dirty,
+  journaled,
+  actions,
+}: Standing & { actions: { reload: () => void; keepMine: () => void; saveAs: () => void } }) {
   return (
     <>
       {disk === 'changed' && (
         <Alert color="yellow" icon={<IconFileAlert />} title={`${path} has changed on the disk`}>
-          {dirty ? 'Your edits are here and in the journal.' : 'You have no edits that are not saved.'} Reloading can be undone.
+          {dirty ? 'Your edits are here and in the journal.' : 'You have no edits that are not saved.'}{' '}
+          Reloading can be undone.
           <Group gap="xs" mt="xs">
             <Button size="compact-sm" onClick={actions.reload}>
               Reload
@@ -52,7 +59,11 @@ export function DiskNotice() {
   return (
     <>
       {lost > 0 && (
-        <Alert color="blue" icon={<IconHistory />} title={lost === 1 ? 'Something else was not saved' : `${lost} other things were not saved`}>
+        <Alert
+          color="blue"
+          icon={<IconHistory />}
+          title={lost === 1 ? 'Something else was not saved' : `${lost} other things were not saved`}
+        >
           The studio ended before; its journal has kept what was edited.
           <Group gap="xs" mt="xs">
             <Button size="compact-sm" variant="default" onClick={() => show('recovery')}>

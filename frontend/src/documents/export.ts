@@ -7,7 +7,10 @@ export function exportDrawing(kind: 'svg' | 'png' | 'pdf'): void {
   const { document } = useStudio.getState()
   if (!document) return
   const query = new URLSearchParams({ sheet: document.inside.join('/') })
-  void download(`drawing/${document.state.document}.${kind}?${query}`, [document.state.title, ...document.inside].join('-') + `.${kind}`)
+  void download(
+    `drawing/${document.state.document}.${kind}?${query}`,
+    [document.state.title, ...document.inside].join('-') + `.${kind}`,
+  )
 }
 
 async function download(path: string, name: string): Promise<void> {

@@ -1,5 +1,14 @@
 import { ActionIcon, Badge, Kbd, Menu, Text } from '@mantine/core'
-import { IconDeviceFloppy, IconFilePlus, IconFolderOpen, IconHistory, IconMenu2, IconPencil, IconRobot, IconX } from '@tabler/icons-react'
+import {
+  IconDeviceFloppy,
+  IconFilePlus,
+  IconFolderOpen,
+  IconHistory,
+  IconMenu2,
+  IconPencil,
+  IconRobot,
+  IconX,
+} from '@tabler/icons-react'
 import { showRobot, useDesk } from '../robot/editor/desk'
 import { ask, useStudio } from '../store'
 import { save, show } from '../dialogs'
@@ -30,17 +39,35 @@ export function FileMenu() {
         <Menu.Item leftSection={<IconRobot size={15} />} onClick={() => void ask({ kind: 'robot_open' })}>
           New robot
         </Menu.Item>
-        <Menu.Item leftSection={<IconFolderOpen size={15} />} rightSection={<Kbd size="xs">Ctrl+O</Kbd>} onClick={() => show('open')}>
+        <Menu.Item
+          leftSection={<IconFolderOpen size={15} />}
+          rightSection={<Kbd size="xs">Ctrl+O</Kbd>}
+          onClick={() => show('open')}
+        >
           Open …
         </Menu.Item>
-        <Menu.Item leftSection={<IconDeviceFloppy size={15} />} rightSection={<Kbd size="xs">Ctrl+S</Kbd>} disabled={!document} onClick={() => void save()}>
+        <Menu.Item
+          leftSection={<IconDeviceFloppy size={15} />}
+          rightSection={<Kbd size="xs">Ctrl+S</Kbd>}
+          disabled={!document}
+          onClick={() => void save()}
+        >
           Save
         </Menu.Item>
-        <Menu.Item leftSection={<IconDeviceFloppy size={15} />} rightSection={<Kbd size="xs">Ctrl+Shift+S</Kbd>} disabled={!document} onClick={() => show('save_as')}>
+        <Menu.Item
+          leftSection={<IconDeviceFloppy size={15} />}
+          rightSection={<Kbd size="xs">Ctrl+Shift+S</Kbd>}
+          disabled={!document}
+          onClick={() => show('save_as')}
+        >
           Save as …
         </Menu.Item>
         {recoveries.length > 0 && (
-          <Menu.Item leftSection={<IconHistory size={15} />} rightSection={<Badge size="sm">{recoveries.length}</Badge>} onClick={() => show('recovery')}>
+          <Menu.Item
+            leftSection={<IconHistory size={15} />}
+            rightSection={<Badge size="sm">{recoveries.length}</Badge>}
+            onClick={() => show('recovery')}
+          >
             Recover …
           </Menu.Item>
         )}

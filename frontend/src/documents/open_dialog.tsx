@@ -56,23 +56,45 @@ function Choice() {
               component="button"
               leftSection={<IconPencil size={15} />}
               label={entry.path ?? entry.title}
-              rightSection={entry.dirty && <Badge variant="light" color="gray">not saved</Badge>}
+              rightSection={
+                entry.dirty && (
+                  <Badge variant="light" color="gray">
+                    not saved
+                  </Badge>
+                )
+              }
               onClick={() => go({ kind: 'attach', document: entry.document })}
             />
           ))}
         </Part>
         <Part title="Used last">
           {recent.map((path) => (
-            <NavLink key={path} component="button" leftSection={<IconHistory size={15} />} label={path} onClick={() => go({ kind: 'open', path })} />
+            <NavLink
+              key={path}
+              component="button"
+              leftSection={<IconHistory size={15} />}
+              label={path}
+              onClick={() => go({ kind: 'open', path })}
+            />
           ))}
         </Part>
         <Part title="Files of this folder">
           {files.map((path) => (
-            <NavLink key={path} component="button" leftSection={<IconFile size={15} />} label={path} onClick={() => go({ kind: 'open', path })} />
+            <NavLink
+              key={path}
+              component="button"
+              leftSection={<IconFile size={15} />}
+              label={path}
+              onClick={() => go({ kind: 'open', path })}
+            />
           ))}
         </Part>
         {found && !open.length && !recent.length && !files.length && (
-          <p className="empty">{typed ? 'No file has such a name.' : 'This folder has no models yet: save one, or begin with an example.'}</p>
+          <p className="empty">
+            {typed
+              ? 'No file has such a name.'
+              : 'This folder has no models yet: save one, or begin with an example.'}
+          </p>
         )}
       </div>
     </Stack>

@@ -25,8 +25,8 @@ export function RecoveryDialog() {
     <Modal opened={opened} onClose={() => show(null)} title="Work that was not saved" size="lg">
       <Stack gap="sm">
         <Text size="sm" c="dimmed">
-          The studio ended before these were saved; its journal has kept them. No file has been changed. What you leave for later
-          stays in the menu.
+          The studio ended before these were saved; its journal has kept them. No file has been changed. What
+          you leave for later stays in the menu.
         </Text>
         {recoveries.map((recovery) => (
           <Offer key={recovery.document} recovery={recovery} />
@@ -49,7 +49,8 @@ function Offer({ recovery }: { recovery: Recovery }) {
         <div>
           <Text fw={600}>{path ?? `${title}, never saved`}</Text>
           <Text size="sm">
-            {counted(edits, 'edit')} from {when(began)} to {when(last)}; {counted(parts, holds === 'robot' ? 'link' : 'block')}
+            {counted(edits, 'edit')} from {when(began)} to {when(last)};{' '}
+            {counted(parts, holds === 'robot' ? 'link' : 'block')}
           </Text>
         </div>
         {disk !== 'same' && (
@@ -60,7 +61,8 @@ function Offer({ recovery }: { recovery: Recovery }) {
       </Group>
       {disk === 'changed' && (
         <Text size="sm" mt={6}>
-          Somebody has written {path} since. Keep both saves the recovered {holds === 'robot' ? 'robot' : 'drawing'} as a file of its own beside it.
+          Somebody has written {path} since. Keep both saves the recovered{' '}
+          {holds === 'robot' ? 'robot' : 'drawing'} as a file of its own beside it.
         </Text>
       )}
       {missing && (
@@ -69,7 +71,12 @@ function Offer({ recovery }: { recovery: Recovery }) {
         </Text>
       )}
       <Group gap="xs" mt="sm" justify="flex-end">
-        <Button variant="subtle" color="red" onClick={() => (sure ? act('discard') : setSure(true))} onBlur={() => setSure(false)}>
+        <Button
+          variant="subtle"
+          color="red"
+          onClick={() => (sure ? act('discard') : setSure(true))}
+          onBlur={() => setSure(false)}
+        >
           {sure ? 'Discard for good' : 'Discard'}
         </Button>
         {disk === 'changed' ? (

@@ -23,7 +23,10 @@ function SaveAs() {
   const [typed, setTyped] = useState(document?.state.path ?? `${document?.state.title ?? 'untitled'}.json`)
   const [files, setFiles] = useState<string[]>([])
   const [fault, setFault] = useState<Refusal | null>(null)
-  useEffect(() => void projectFiles().then((found) => setFiles(found.files.filter((file) => file.endsWith('.json')))), [])
+  useEffect(
+    () => void projectFiles().then((found) => setFiles(found.files.filter((file) => file.endsWith('.json')))),
+    [],
+  )
   if (!document) return null
   const path = named(typed)
   const taken = files.includes(path) && path !== document.state.path

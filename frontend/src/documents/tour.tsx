@@ -15,13 +15,41 @@ interface Stop {
 }
 
 const STOPS: Stop[] = [
-  { at: '.sheet', title: 'The sheet', text: 'Blocks and wires of the model. Drag from port to port to wire; drag a piece of a wire to lead it elsewhere; double-click a block to open it.' },
-  { at: '.palette', title: 'The library', text: 'All blocks by family. Drag one to the sheet, onto a wire to put it in between. Faster: type its name on the sheet.' },
-  { at: '.run-controls', title: 'Run', text: 'Run (Ctrl+Enter), pause, step forward and back, stop. Beside it the stop time and the speed against real time.' },
-  { at: '.scopes-panel, .chart', title: 'Scopes', text: 'What was recorded: zoom with the mouse, measure between cursors, export. Click a wire on the sheet to log its signal too.' },
-  { at: '.timeline', title: 'One time for everything', text: 'Drag the cursor or play the run: scopes, values on wires and the arm all show this instant.' },
-  { at: '.robot', title: 'The arm', text: 'Turn the view with the mouse. The arm stands as the signals say at the instant of the cursor.' },
-  { at: '[aria-label="Menu"]', title: 'Where to go on', text: 'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.' },
+  {
+    at: '.sheet',
+    title: 'The sheet',
+    text: 'Blocks and wires of the model. Drag from port to port to wire; drag a piece of a wire to lead it elsewhere; double-click a block to open it.',
+  },
+  {
+    at: '.palette',
+    title: 'The library',
+    text: 'All blocks by family. Drag one to the sheet, onto a wire to put it in between. Faster: type its name on the sheet.',
+  },
+  {
+    at: '.run-controls',
+    title: 'Run',
+    text: 'Run (Ctrl+Enter), pause, step forward and back, stop. Beside it the stop time and the speed against real time.',
+  },
+  {
+    at: '.scopes-panel, .chart',
+    title: 'Scopes',
+    text: 'What was recorded: zoom with the mouse, measure between cursors, export. Click a wire on the sheet to log its signal too.',
+  },
+  {
+    at: '.timeline',
+    title: 'One time for everything',
+    text: 'Drag the cursor or play the run: scopes, values on wires and the arm all show this instant.',
+  },
+  {
+    at: '.robot',
+    title: 'The arm',
+    text: 'Turn the view with the mouse. The arm stands as the signals say at the instant of the cursor.',
+  },
+  {
+    at: '[aria-label="Menu"]',
+    title: 'Where to go on',
+    text: 'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.',
+  },
 ]
 
 function leave(): void {
@@ -75,8 +103,21 @@ export function Tour() {
   const last = stop === STOPS.length - 1
   return (
     <>
-      {box && <div className="tour-mark" style={{ left: box.x, top: box.y, width: box.width, height: box.height }} />}
-      <Paper className="tour" withBorder shadow="lg" p="sm" role="dialog" aria-label={here.title} style={beside(box)}>
+      {box && (
+        <div
+          className="tour-mark"
+          style={{ left: box.x, top: box.y, width: box.width, height: box.height }}
+        />
+      )}
+      <Paper
+        className="tour"
+        withBorder
+        shadow="lg"
+        p="sm"
+        role="dialog"
+        aria-label={here.title}
+        style={beside(box)}
+      >
         <Group justify="space-between" wrap="nowrap">
           <Text fw={600}>{here.title}</Text>
           <CloseButton size="sm" aria-label="Leave the tour" onClick={leave} />
@@ -90,11 +131,21 @@ export function Tour() {
           </Text>
           <Group gap="xs">
             {stop! > 0 && (
-              <Button size="compact-sm" variant="default" onClick={() => useTour.setState({ stop: stop! - 1 })}>
+              <Button
+                size="compact-sm"
+                variant="default"
+                onClick={() => useTour.setState({ stop: stop! - 1 })}
+              >
                 Back
               </Button>
             )}
-            <Button size="compact-sm" data-autofocus autoFocus key={stop} onClick={() => (last ? leave() : useTour.setState({ stop: stop! + 1 }))}>
+            <Button
+              size="compact-sm"
+              data-autofocus
+              autoFocus
+              key={stop}
+              onClick={() => (last ? leave() : useTour.setState({ stop: stop! + 1 }))}
+            >
               {last ? 'Done' : 'Next'}
             </Button>
           </Group>
@@ -110,5 +161,9 @@ function beside(box: DOMRect | null): React.CSSProperties {
   const top = Math.min(Math.max(box.y + 8, 8), innerHeight - 190)
   if (box.right + GAP + WIDTH < innerWidth) return { left: box.right + GAP, top, width: WIDTH }
   if (box.x - GAP - WIDTH > 0) return { left: box.x - GAP - WIDTH, top, width: WIDTH }
-  return { left: box.x + (box.width - WIDTH) / 2, top: box.y > 220 ? box.y - 170 : Math.min(box.bottom + GAP, innerHeight - 190), width: WIDTH }
+  return {
+    left: box.x + (box.width - WIDTH) / 2,
+    top: box.y > 220 ? box.y - 170 : Math.min(box.bottom + GAP, innerHeight - 190),
+    width: WIDTH,
+  }
 }

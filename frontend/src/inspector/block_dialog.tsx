@@ -28,7 +28,10 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
   )
   const rules = useMemo(() => [...(kind?.parameters ?? []), ...block.mask], [block, kind])
   const start = useMemo(
-    () => Object.fromEntries(rules.map((rule) => [rule.name, block.formulas[rule.name] ?? valueText(valueOf(block, rule))])),
+    () =>
+      Object.fromEntries(
+        rules.map((rule) => [rule.name, block.formulas[rule.name] ?? valueText(valueOf(block, rule))]),
+      ),
     [block, rules],
   )
   const [typed, setTyped] = useState<Record<string, string>>(start)
@@ -39,7 +42,9 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
   const apply = async () => {
     if (wrong) return false
     if (!changed.length) return true
-    const values = Object.fromEntries(changed.map((rule) => [rule.name, sent(rule, typed[rule.name] ?? '', rule.name in block.formulas)]))
+    const values = Object.fromEntries(
+      changed.map((rule) => [rule.name, sent(rule, typed[rule.name] ?? '', rule.name in block.formulas)]),
+    )
     return (await change({ kind: 'parameters', block: block.name, values })) !== undefined
   }
   const [summary, ...rest] = kind.documentation.split('\n\n')
@@ -83,14 +88,23 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
               text={typed[rule.name] ?? ''}
               focus={index === 0}
               onText={(text) => setTyped((now) => ({ ...now, [rule.name]: text }))}
-              onFault={(fault) => setFaults((now) => (now[rule.name] === fault ? now : { ...now, [rule.name]: fault }))}
+              onFault={(fault) =>
+                setFaults((now) => (now[rule.name] === fault ? now : { ...now, [rule.name]: fault }))
+              }
             />
           ))}
           {rules.length === 0 && <Text size="sm">This block has no parameters.</Text>}
           <Group justify="flex-end" gap="xs" className="dialog-actions">
             {block.opens && (
               <Group gap={0} mr="auto">
-                <Button variant="subtle" px="xs" onClick={() => (onClose(), look([...(useStudio.getState().document?.inside ?? []), block.name]))}>
+                <Button
+                  variant="subtle"
+                  px="xs"
+                  onClick={() => (
+                    onClose(),
+                    look([...(useStudio.getState().document?.inside ?? []), block.name])
+                  )}
+                >
                   Look under the mask
                 </Button>
                 {!block.link && (
@@ -138,14 +152,36 @@ function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
   const common = { label, description: rule.doc, size: 'sm' as const, 'data-autofocus': focus || undefined }
   const formula = rule.name in block.formulas
   if (rule.kind === 'boolean' && !formula)
-    return <Switch label={label} description={rule.doc} checked={text === 'true'} onChange={(event) => onText(String(event.currentTarget.checked))} />
+    return (
+      <Switch
+        label={label}
+        description={rule.doc}
+        checked={text === 'true'}
+        onChange={(event) => onText(String(event.currentTarget.checked))}
+      />
+    )
   if (rule.kind === 'choice' && !formula)
-    return <NativeSelect {...common} data={rule.choices} value={text} onChange={(event) => onText(event.currentTarget.value)} />
+    return (
+      <NativeSelect
+        {...common}
+        data={rule.choices}
+        value={text}
+        onChange={(event) => onText(event.currentTarget.value)}
+      />
+    )
   if (rule.kind === 'robot' && !formula) {
     const known = [...(robots ?? []), ...(files ?? [])]
-    return <NativeSelect {...common} data={known.includes(text) ? known : [text, ...known]} value={text} onChange={(event) => onText(event.currentTarget.value)} />
+    return (
+      <NativeSelect
+        {...common}
+        data={known.includes(text) ? known : [text, ...known]}
+        value={text}
+        onChange={(event) => onText(event.currentTarget.value)}
+      />
+    )
   }
-  if (rule.kind === 'table' || rule.kind === 'function') return <TextInput {...common} value={text} readOnly />
+  if (rule.kind === 'table' || rule.kind === 'function')
+    return <TextInput {...common} value={text} readOnly />
   return (
     <TextInput
       {...common}
@@ -163,7 +199,11 @@ function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
 function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault: (fault: string) => void) {
   const [state, setState] = useState({ fault: '', value: '' })
   useEffect(() => {
-    if (['boolean', 'choice', 'robot', 'table', 'function'].includes(rule.kind) && !(rule.name in block.formulas)) return
+    if (
+      ['boolean', 'choice', 'robot', 'table', 'function'].includes(rule.kind) &&
+      !(rule.name in block.formulas)
+    )
+      return
     let current = true
     const report = (fault: string, value: string) => {
       if (!current) return
@@ -175,7 +215,8 @@ function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault:
       const where = { document: document?.state.document, inside: document?.inside, block: block.name }
       line.ask({ kind: 'typed', ...where, type: block.type, parameter: rule.name, text }).then(
         (value) => report('', valueText(value)),
-        (error: unknown) => error instanceof Refusal && report(`${error.what}. Allowed: ${error.allowed}`, ''),
+        (error: unknown) =>
+          error instanceof Refusal && report(`${error.what}. Allowed: ${error.allowed}`, ''),
       )
     }, CHECK_DELAY_MS)
     return () => {

@@ -37,7 +37,13 @@ export function MaskDialog() {
   const block = useDialogs((s) => s.of)
   const close = () => show(null)
   return (
-    <Modal opened={opened} onClose={close} closeButtonProps={{ 'aria-label': 'Close' }} title={<b>{block ? `Mask of ${block}` : 'Parameters of the model'}</b>} size={940}>
+    <Modal
+      opened={opened}
+      onClose={close}
+      closeButtonProps={{ 'aria-label': 'Close' }}
+      title={<b>{block ? `Mask of ${block}` : 'Parameters of the model'}</b>}
+      size={940}
+    >
       {opened && <Mask onClose={close} />}
     </Modal>
   )
@@ -51,24 +57,33 @@ function Mask({ onClose }: { onClose: () => void }) {
   useEffect(() => {
     const { document } = useStudio.getState()
     if (!document) return
-    void ask<SetMask>({ kind: 'ask_mask', document: document.state.document, inside, block }).then((found) => {
-      if (!found) return onClose()
-      setRows(found.parameters.map(rowOf))
-      setFace(found.name ?? '')
-    })
+    void ask<SetMask>({ kind: 'ask_mask', document: document.state.document, inside, block }).then(
+      (found) => {
+        if (!found) return onClose()
+        setRows(found.parameters.map(rowOf))
+        setFace(found.name ?? '')
+      },
+    )
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [])
   if (!rows) return null
   const readable = rows.every(isReadable)
-  const put = (key: string, change: Partial<Row>) => setRows(rows.map((row) => (row.key === key ? { ...row, ...change } : row)))
+  const put = (key: string, change: Partial<Row>) =>
+    setRows(rows.map((row) => (row.key === key ? { ...row, ...change } : row)))
   const swap = (k: number, by: number) => {
     const next = [...rows]
     ;[next[k], next[k + by]] = [next[k + by]!, next[k]!]
     setRows(next)
   }
   const add = () => {
-    const name = freeName('k', rows.map((row) => row.name)).replace(' ', '')
-    setRows([...rows, { key: newKey(), was: '', name, kind: 'number', value: '1', unit: '', range: '', doc: '' }])
+    const name = freeName(
+      'k',
+      rows.map((row) => row.name),
+    ).replace(' ', '')
+    setRows([
+      ...rows,
+      { key: newKey(), was: '', name, kind: 'number', value: '1', unit: '', range: '', doc: '' },
+    ])
   }
   const apply = async () => {
     try {
@@ -91,9 +106,19 @@ function Mask({ onClose }: { onClose: () => void }) {
     >
       <Stack gap="sm">
         <Text size="sm">
-          Values of the blocks inside may be formulas over these names, such as <code>2*{rows[0]?.name ?? 'k'}</code>. {block && 'From outside they are the parameters of the block.'}
+          Values of the blocks inside may be formulas over these names, such as{' '}
+          <code>2*{rows[0]?.name ?? 'k'}</code>.{' '}
+          {block && 'From outside they are the parameters of the block.'}
         </Text>
-        {block && <TextInput label="What its face says" size="sm" w={280} value={face} onChange={(event) => setFace(event.currentTarget.value)} />}
+        {block && (
+          <TextInput
+            label="What its face says"
+            size="sm"
+            w={280}
+            value={face}
+            onChange={(event) => setFace(event.currentTarget.value)}
+          />
+        )}
         {rows.length > 0 && (
           <div className="mask-rows" role="table" aria-label="Parameters">
             <div role="row" className="head">
@@ -105,17 +130,42 @@ function Mask({ onClose }: { onClose: () => void }) {
               <span role="columnheader" aria-label="Order" />
             </div>
             {rows.map((row, k) => (
-              <RowFields key={row.key} row={row} put={(change) => put(row.key, change)} first={k === 0} last={k === rows.length - 1} swap={(by) => swap(k, by)} remove={() => setRows(rows.filter((one) => one !== row))} />
+              <RowFields
+                key={row.key}
+                row={row}
+                put={(change) => put(row.key, change)}
+                first={k === 0}
+                last={k === rows.length - 1}
+                swap={(by) => swap(k, by)}
+                remove={() => setRows(rows.filter((one) => one !== row))}
+              />
             ))}
           </div>
         )}
-        {rows.length === 0 && <Text size="sm" c="dimmed">It has no parameters yet.</Text>}
-        <Button variant="default" size="xs" leftSection={<IconPlus size={14} />} style={{ alignSelf: 'start' }} onClick={add} data-autofocus={rows.length === 0 || undefined}>
+        {rows.length === 0 && (
+          <Text size="sm" c="dimmed">
+            It has no parameters yet.
+          </Text>
+        )}
+        <Button
+          variant="default"
+          size="xs"
+          leftSection={<IconPlus size={14} />}
+          style={{ alignSelf: 'start' }}
+          onClick={add}
+          data-autofocus={rows.length === 0 || undefined}
+        >
           Add a parameter
         </Button>
         {fault && (
           <Alert color="red" title={fault.what} role="alert">
-            {[fault.where && `${fault.where}.`, fault.allowed && `Allowed: ${fault.allowed}.`, fault.fix && `To do: ${fault.fix}.`].filter(Boolean).join(' ')}
+            {[
+              fault.where && `${fault.where}.`,
+              fault.allowed && `Allowed: ${fault.allowed}.`,
+              fault.fix && `To do: ${fault.fix}.`,
+            ]
+              .filter(Boolean)
+              .join(' ')}
           </Alert>
         )}
         <Group justify="flex-end" gap="xs">
@@ -145,18 +195,46 @@ interface RowProps {
 
 function RowFields({ row, put, first, last, swap, remove }: RowProps) {
   const robots = useStudio((s) => s.welcome?.robots) ?? []
-  const field = (label: string, key: 'name' | 'value' | 'unit' | 'range' | 'doc', mono = false, placeholder = '') => (
+  const field = (
+    label: string,
+    key: 'name' | 'value' | 'unit' | 'range' | 'doc',
+    mono = false,
+    placeholder = '',
+  ) => (
     <span role="cell">
-      <TextInput size="xs" aria-label={`${label} of ${row.name}`} value={row[key]} placeholder={placeholder} error={key === 'range' && !isReadable(row)} onChange={(event) => put({ [key]: event.currentTarget.value })} {...(mono ? { classNames: { input: 'typed' } } : {})} {...(key === 'name' && first ? { 'data-autofocus': true } : {})} />
+      <TextInput
+        size="xs"
+        aria-label={`${label} of ${row.name}`}
+        value={row[key]}
+        placeholder={placeholder}
+        error={key === 'range' && !isReadable(row)}
+        onChange={(event) => put({ [key]: event.currentTarget.value })}
+        {...(mono ? { classNames: { input: 'typed' } } : {})}
+        {...(key === 'name' && first ? { 'data-autofocus': true } : {})}
+      />
     </span>
   )
-  const choose = (label: string, data: string[] | typeof KINDS, value: string, put: (value: string) => void) => (
+  const choose = (
+    label: string,
+    data: string[] | typeof KINDS,
+    value: string,
+    put: (value: string) => void,
+  ) => (
     <span role="cell">
-      <NativeSelect size="xs" aria-label={`${label} of ${row.name}`} data={data} value={value} onChange={(event) => put(event.currentTarget.value)} />
+      <NativeSelect
+        size="xs"
+        aria-label={`${label} of ${row.name}`}
+        data={data}
+        value={value}
+        onChange={(event) => put(event.currentTarget.value)}
+      />
     </span>
   )
   const value = (value: string) => put({ value })
-  const options = row.range.split(',').map((word) => word.trim()).filter(Boolean)
+  const options = row.range
+    .split(',')
+    .map((word) => word.trim())
+    .filter(Boolean)
   const ranged = isRanged(row.kind)
   return (
     <div role="row">
@@ -167,19 +245,50 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
         : row.kind === 'robot'
           ? choose('Default', robots.includes(row.value) ? robots : [row.value, ...robots], row.value, value)
           : row.kind === 'choice' && options.length > 0
-            ? choose('Default', options.includes(row.value) ? options : [row.value, ...options], row.value, value)
+            ? choose(
+                'Default',
+                options.includes(row.value) ? options : [row.value, ...options],
+                row.value,
+                value,
+              )
             : field('Default', 'value', true)}
       {ranged ? field('Unit', 'unit') : <span role="cell" />}
-      {ranged ? field('Range', 'range', true, '0 … 10, > 0') : row.kind === 'choice' ? field('Choices', 'range', false, 'one, another') : <span role="cell" />}
+      {ranged ? (
+        field('Range', 'range', true, '0 … 10, > 0')
+      ) : row.kind === 'choice' ? (
+        field('Choices', 'range', false, 'one, another')
+      ) : (
+        <span role="cell" />
+      )}
       {field('Description', 'doc')}
       <span role="cell" className="order">
-        <ActionIcon size="sm" variant="subtle" color="gray" aria-label={`Move ${row.name} up`} disabled={first} onClick={() => swap(-1)}>
+        <ActionIcon
+          size="sm"
+          variant="subtle"
+          color="gray"
+          aria-label={`Move ${row.name} up`}
+          disabled={first}
+          onClick={() => swap(-1)}
+        >
           <IconArrowUp size={14} />
         </ActionIcon>
-        <ActionIcon size="sm" variant="subtle" color="gray" aria-label={`Move ${row.name} down`} disabled={last} onClick={() => swap(1)}>
+        <ActionIcon
+          size="sm"
+          variant="subtle"
+          color="gray"
+          aria-label={`Move ${row.name} down`}
+          disabled={last}
+          onClick={() => swap(1)}
+        >
           <IconArrowDown size={14} />
         </ActionIcon>
-        <ActionIcon size="sm" variant="subtle" color="gray" aria-label={`Remove ${row.name}`} onClick={remove}>
+        <ActionIcon
+          size="sm"
+          variant="subtle"
+          color="gray"
+          aria-label={`Remove ${row.name}`}
+          onClick={remove}
+        >
           <IconTrash size={14} />
         </ActionIcon>
       </span>
@@ -202,19 +311,51 @@ function fresh(kind: string, robots: string[]): Partial<Row> {
   return { value: kind === 'string' ? '' : kind === 'array' ? '[1 2]' : '1', range: '' }
 }
 
-function rowOf({ name, was = '', kind = 'number', default: value, unit = '', doc = '', minimum, above, maximum, choices = [] }: MaskParameter): Row {
-  return { key: newKey(), was, name, kind, value: valueText(value), unit, doc, range: kind === 'choice' ? choices.join(', ') : rangeText(minimum ?? null, above ?? null, maximum ?? null) }
+function rowOf({
+  name,
+  was = '',
+  kind = 'number',
+  default: value,
+  unit = '',
+  doc = '',
+  minimum,
+  above,
+  maximum,
+  choices = [],
+}: MaskParameter): Row {
+  return {
+    key: newKey(),
+    was,
+    name,
+    kind,
+    value: valueText(value),
+    unit,
+    doc,
+    range:
+      kind === 'choice' ? choices.join(', ') : rangeText(minimum ?? null, above ?? null, maximum ?? null),
+  }
 }
 
 function rangeText(minimum: number | null, above: number | null, maximum: number | null): string {
-  const low = above !== null ? `> ${above}` : minimum !== null ? (maximum === null ? `>= ${minimum}` : String(minimum)) : ''
+  const low =
+    above !== null
+      ? `> ${above}`
+      : minimum !== null
+        ? maximum === null
+          ? `>= ${minimum}`
+          : String(minimum)
+        : ''
   if (maximum === null) return low
   return low ? `${low} … ${maximum}` : `<= ${maximum}`
 }
 
 /** The bounds that a range says; a bound that is no number is NaN. */
 function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maximum'> {
-  const found = { minimum: null, above: null, maximum: null } as { minimum: number | null; above: number | null; maximum: number | null }
+  const found = { minimum: null, above: null, maximum: null } as {
+    minimum: number | null
+    above: number | null
+    maximum: number | null
+  }
   const [low = '', high] = range.split(/…|\.\.+/).map((part) => part.trim())
   for (const part of high === undefined ? [low] : [low, high && `<=${high.replace(/^<=/, '')}`]) {
     const [, sign = '', number = ''] = /^(>=|>|<=|)\s*(.*)$/.exec(part) ?? []
@@ -228,9 +369,27 @@ function bounds(range: string): Pick<MaskParameter, 'minimum' | 'above' | 'maxim
 
 /** Whether numbers of this kind have bounds, and whether those of a row can be read. */
 const isRanged = (kind: Row['kind']): boolean => kind === 'number' || kind === 'array' || kind === 'integer'
-const isReadable = ({ kind, range }: Row): boolean => !isRanged(kind) || !Object.values(bounds(range)).some(Number.isNaN)
+const isReadable = ({ kind, range }: Row): boolean =>
+  !isRanged(kind) || !Object.values(bounds(range)).some(Number.isNaN)
 
 function declared({ was, name, kind, value, unit, range, doc }: Row): MaskParameter {
-  const own = kind === 'choice' ? { choices: range.split(',').map((word) => word.trim()).filter(Boolean) } : isRanged(kind) ? { ...bounds(range), unit: unit.trim() } : {}
-  return { was, name: name.trim(), kind, default: kind === 'choice' ? value.trim() : value, doc: doc.trim(), ...own }
+  const own =
+    kind === 'choice'
+      ? {
+          choices: range
+            .split(',')
+            .map((word) => word.trim())
+            .filter(Boolean),
+        }
+      : isRanged(kind)
+        ? { ...bounds(range), unit: unit.trim() }
+        : {}
+  return {
+    was,
+    name: name.trim(),
+    kind,
+    default: kind === 'choice' ? value.trim() : value,
+    doc: doc.trim(),
+    ...own,
+  }
 }

@@ -2,7 +2,8 @@
 export function valueText(value: unknown): string {
   if (Array.isArray(value)) {
     const rows = value as unknown[]
-    if (rows.some((row) => Array.isArray(row))) return `[${rows.map((row) => (row as unknown[]).map(valueText).join(' ')).join('; ')}]`
+    if (rows.some((row) => Array.isArray(row)))
+      return `[${rows.map((row) => (row as unknown[]).map(valueText).join(' ')).join('; ')}]`
     return `[${rows.map(valueText).join(' ')}]`
   }
   if (value && typeof value === 'object' && 'source' in value) {

@@ -28,7 +28,8 @@ export function Explorer() {
     }
   }, [document, version])
   useEffect(() => {
-    for (let depth = 0; depth <= (inside ?? []).length; depth++) tree.expand((inside ?? []).slice(0, depth).join(SEPARATOR))
+    for (let depth = 0; depth <= (inside ?? []).length; depth++)
+      tree.expand((inside ?? []).slice(0, depth).join(SEPARATOR))
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [here])
   const data = useMemo(() => (outline ? [node(outline, [], title)] : []), [outline, title])
@@ -41,7 +42,13 @@ export function Explorer() {
         aria-label="Subsystems of the model"
         levelOffset={14}
         expandOnClick={false}
-        renderNode={({ node: { value, label, nodeProps }, expanded, hasChildren, elementProps, tree: { toggleExpanded } }) => (
+        renderNode={({
+          node: { value, label, nodeProps },
+          expanded,
+          hasChildren,
+          elementProps,
+          tree: { toggleExpanded },
+        }) => (
           <div
             {...elementProps}
             className={`${elementProps.className} branch${value === here ? ' here' : ''}`}
@@ -62,7 +69,9 @@ export function Explorer() {
           </div>
         )}
       />
-      {outline.subsystems.length === 0 && <p className="empty">The model has one sheet. Ctrl+G puts the selected blocks into a subsystem.</p>}
+      {outline.subsystems.length === 0 && (
+        <p className="empty">The model has one sheet. Ctrl+G puts the selected blocks into a subsystem.</p>
+      )}
     </div>
   )
 }

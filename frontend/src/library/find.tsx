@@ -17,7 +17,9 @@ export function Find() {
     if (!opened || !document || !typed.trim()) return
     let current = true
     const timer = setTimeout(() => {
-      void ask<Found[]>({ kind: 'find', document, text: typed }).then((answer) => current && setFound(answer ?? []))
+      void ask<Found[]>({ kind: 'find', document, text: typed }).then(
+        (answer) => current && setFound(answer ?? []),
+      )
     }, WAIT_MS)
     return () => {
       current = false
@@ -33,7 +35,11 @@ export function Find() {
       list="Found"
       typed={typed}
       onTyped={(next) => useDialogs.setState({ typed: next })}
-      nothing={typed.trim() ? `Nothing in the model matches “${typed}”.` : 'Names, types and values of all blocks, in every subsystem.'}
+      nothing={
+        typed.trim()
+          ? `Nothing in the model matches “${typed}”.`
+          : 'Names, types and values of all blocks, in every subsystem.'
+      }
       items={found.map(({ inside, name, title, match }) => ({
         key: [...inside, name].join('/'),
         title: name,

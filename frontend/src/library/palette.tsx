@@ -29,7 +29,9 @@ export function Palette() {
         aria-label="Search the library"
         placeholder="Search blocks"
         leftSection={<IconSearch size={14} />}
-        rightSection={sought && <CloseButton size="xs" aria-label="Clear the search" onClick={() => setSought('')} />}
+        rightSection={
+          sought && <CloseButton size="xs" aria-label="Clear the search" onClick={() => setSought('')} />
+        }
         value={sought}
         onChange={(event) => setSought(event.currentTarget.value)}
       />
@@ -79,6 +81,11 @@ const Kind = memo(function Kind({ kind }: { kind: BlockType }) {
 
 export function Face({ kind }: { kind: BlockType }) {
   return (
-    <svg className="face" viewBox={`-1 -1 ${kind.width + 2} ${kind.height + 2}`} aria-hidden dangerouslySetInnerHTML={{ __html: kind.face }} />
+    <svg
+      className="face"
+      viewBox={`-1 -1 ${kind.width + 2} ${kind.height + 2}`}
+      aria-hidden
+      dangerouslySetInnerHTML={{ __html: kind.face }}
+    />
   )
 }

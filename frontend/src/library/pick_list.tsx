@@ -24,18 +24,40 @@ interface PickListProps {
 }
 
 /** Type a few letters, choose with the arrows, press Enter: how blocks, commands and places are found. */
-export function PickList({ opened, onClose, label, placeholder, list, typed, onTyped, items, nothing, onPick }: PickListProps) {
+export function PickList({
+  opened,
+  onClose,
+  label,
+  placeholder,
+  list,
+  typed,
+  onTyped,
+  items,
+  nothing,
+  onPick,
+}: PickListProps) {
   const [chosen, setChosen] = useState(0)
   const found = useRef<HTMLDivElement>(null)
   useEffect(() => setChosen(0), [typed, opened])
-  useEffect(() => found.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' }), [chosen])
+  useEffect(
+    () => found.current?.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: 'nearest' }),
+    [chosen],
+  )
   const pick = (index: number) => {
     if (!items[index]) return
     onClose()
     onPick(index)
   }
   return (
-    <Modal opened={opened} onClose={onClose} withCloseButton={false} size="md" padding="xs" yOffset="16vh" attributes={{ content: { 'aria-label': label } }}>
+    <Modal
+      opened={opened}
+      onClose={onClose}
+      withCloseButton={false}
+      size="md"
+      padding="xs"
+      yOffset="16vh"
+      attributes={{ content: { 'aria-label': label } }}
+    >
       <TextInput
         aria-label={label}
         placeholder={placeholder}
@@ -52,7 +74,15 @@ export function PickList({ opened, onClose, label, placeholder, list, typed, onT
       />
       <div role="listbox" aria-label={list} className="found" ref={found}>
         {items.map(({ key, title, note, face, keys }, index) => (
-          <button key={key} type="button" role="option" aria-selected={index === chosen} tabIndex={-1} onClick={() => pick(index)} onMouseMove={() => setChosen(index)}>
+          <button
+            key={key}
+            type="button"
+            role="option"
+            aria-selected={index === chosen}
+            tabIndex={-1}
+            onClick={() => pick(index)}
+            onMouseMove={() => setChosen(index)}
+          >
             {face}
             <span className="what">
               <b>{title}</b>

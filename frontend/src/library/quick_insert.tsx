@@ -25,7 +25,12 @@ export function QuickInsert() {
       typed={typed}
       onTyped={(next) => useDialogs.setState({ typed: next })}
       nothing={`No block matches “${typed}”.`}
-      items={found.map((kind) => ({ key: kind.type, face: <Face kind={kind} />, title: kind.title, note: kind.summary }))}
+      items={found.map((kind) => ({
+        key: kind.type,
+        face: <Face kind={kind} />,
+        title: kind.title,
+        note: kind.summary,
+      }))}
       onPick={(index) => {
         const kind = found[index]
         if (kind) insertBlock(kind.type, at ? place(at) : freePlace())
@@ -38,7 +43,10 @@ function place(at: { x: number; y: number }): { x: number; y: number } {
   const pane = document.querySelector('.react-flow__viewport')
   const matrix = new DOMMatrix(pane ? getComputedStyle(pane).transform : undefined)
   const corner = document.querySelector('.react-flow')?.getBoundingClientRect()
-  return { x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a, y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a }
+  return {
+    x: (at.x - (corner?.x ?? 0) - matrix.e) / matrix.a,
+    y: (at.y - (corner?.y ?? 0) - matrix.f) / matrix.a,
+  }
 }
 
 /** Right of the selected block, or right of everything: a new block never lies on another. */
@@ -46,9 +54,22 @@ function freePlace(): { x: number; y: number } {
   const { document: open, selection } = useStudio.getState()
   const blocks = Object.values(open?.blocks ?? {})
   const [last] = blocks.filter(({ name }) => selection.has(name))
-  let at = last ? { x: last.place.x + last.width + 90, y: last.place.y + last.height / 2 } : { x: 120, y: 120 }
-  if (!last && blocks.length) at = { x: Math.min(...blocks.map((b) => b.place.x)) + 40, y: Math.max(...blocks.map((b) => b.place.y + b.height)) + 80 }
-  const taken = (x: number, y: number) => blocks.some((b) => x > b.place.x - 60 && x < b.place.x + b.width + 60 && y > b.place.y - 45 && y < b.place.y + b.height + 45)
+  let at = last
+    ? { x: last.place.x + last.width + 90, y: last.place.y + last.height / 2 }
+    : { x: 120, y: 120 }
+  if (!last && blocks.length)
+    at = {
+      x: Math.min(...blocks.map((b) => b.place.x)) + 40,
+      y: Math.max(...blocks.map((b) => b.place.y + b.height)) + 80,
+    }
+  const taken = (x: number, y: number) =>
+    blocks.some(
+      (b) =>
+        x > b.place.x - 60 &&
+        x < b.place.x + b.width + 60 &&
+        y > b.place.y - 45 &&
+        y < b.place.y + b.height + 45,
+    )
   while (taken(at.x, at.y)) at = { x: at.x, y: at.y + 20 }
   return at
 }

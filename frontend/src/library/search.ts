@@ -13,7 +13,9 @@ export function matching(library: readonly BlockType[], typed: string): BlockTyp
     }
     if (rank < Infinity) ranked.push([rank, kind])
   }
-  return ranked.sort(([a, x], [b, y]) => a - b || x.title.length - y.title.length || (x.title < y.title ? -1 : 1)).map(([, kind]) => kind)
+  return ranked
+    .sort(([a, x], [b, y]) => a - b || x.title.length - y.title.length || (x.title < y.title ? -1 : 1))
+    .map(([, kind]) => kind)
 }
 
 function rankOf(kind: BlockType, word: string): number {

@@ -38,7 +38,18 @@ function show(told: Shown): void {
     made.close()
     showSamples(made)
     useStudio.setState({
-      run: { ...run, run: key, state: 'done', time: run.stopTime, realTimeFactor: 0, message: '', fault: null, solver: '', reason: '', tunables: [] },
+      run: {
+        ...run,
+        run: key,
+        state: 'done',
+        time: run.stopTime,
+        realTimeFactor: 0,
+        message: '',
+        fault: null,
+        solver: '',
+        reason: '',
+        tunables: [],
+      },
     })
   }
   shown = told
@@ -54,7 +65,14 @@ function draw(): void {
         <main className="notebook-views">
           <div className="beside">
             {run && scopes && <Scopes />}
-            {arm && <RunArm path={arm.path} scene={arm.scene} rest={listed(arm.rest)} drawing={() => Promise.resolve(arm.drawing)} />}
+            {arm && (
+              <RunArm
+                path={arm.path}
+                scene={arm.scene}
+                rest={listed(arm.rest)}
+                drawing={() => Promise.resolve(arm.drawing)}
+              />
+            )}
           </div>
           {run && <Timeline />}
         </main>
@@ -65,15 +83,21 @@ function draw(): void {
 
 const root = createRoot(document.getElementById('root')!)
 const cursor = shareCursor((time) => parent.postMessage({ kind: 'time', time }, '*'))
-addEventListener('message', ({ source, data }: MessageEvent<Shown | { kind: 'time'; time: number } | { kind: 'theme'; dark: boolean }>) => {
-  if (source !== parent) return
-  if (data.kind === 'time') cursor.show(data.time)
-  else if (data.kind === 'theme') {
-    shown = shown && { ...shown, dark: data.dark }
-    draw()
-  } else {
-    cursor.join(data.key)
-    show(data)
-  }
-})
+addEventListener(
+  'message',
+  ({
+    source,
+    data,
+  }: MessageEvent<Shown | { kind: 'time'; time: number } | { kind: 'theme'; dark: boolean }>) => {
+    if (source !== parent) return
+    if (data.kind === 'time') cursor.show(data.time)
+    else if (data.kind === 'theme') {
+      shown = shown && { ...shown, dark: data.dark }
+      draw()
+    } else {
+      cursor.join(data.key)
+      show(data)
+    }
+  },
+)
 parent.postMessage({ kind: 'ready' }, '*')

@@ -18,7 +18,10 @@ export interface Body {
 
 /** The bodies of a scene as geometry, given back when the scene goes. */
 export function useBodies(scene: RobotScene): Body[] {
-  const bodies = useMemo(() => scene.bodies.map((body) => ({ row: body.row, material: body.material, geometry: geometry(body) })), [scene])
+  const bodies = useMemo(
+    () => scene.bodies.map((body) => ({ row: body.row, material: body.material, geometry: geometry(body) })),
+    [scene],
+  )
   useEffect(() => () => bodies.forEach((body) => body.geometry.dispose()), [bodies])
   return bodies
 }
@@ -52,7 +55,13 @@ export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
         <group key={row} ref={(group) => void (groups.current[row] = group)} matrixAutoUpdate={false}>
           {bodies
             .filter((body) => body.row === row)
-            .map((body, k) => (ghost ? <GhostBody key={k} geometry={body.geometry} colour={ghost} /> : <SolidBody key={k} {...body} />))}
+            .map((body, k) =>
+              ghost ? (
+                <GhostBody key={k} geometry={body.geometry} colour={ghost} />
+              ) : (
+                <SolidBody key={k} {...body} />
+              ),
+            )}
         </group>
       ))}
     </group>

@@ -32,7 +32,12 @@ function cornersOf(arm: Object3D): Vector3[] {
     if (!(one instanceof Mesh) || !(one.geometry instanceof BufferGeometry)) return
     one.geometry.computeBoundingBox()
     const { min, max } = one.geometry.boundingBox!
-    for (let k = 0; k < 8; k++) corners.push(new Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).applyMatrix4(one.matrixWorld))
+    for (let k = 0; k < 8; k++)
+      corners.push(
+        new Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z).applyMatrix4(
+          one.matrixWorld,
+        ),
+      )
   })
   return corners
 }
@@ -54,7 +59,16 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
   const world = useThree((s) => s.scene)
   const camera = useThree((s) => s.camera) as PerspectiveCamera
   const follow = useViewOptions((s) => s.follow)
-  const scratch = useMemo(() => ({ matrix: new Matrix4(), tool: new Vector3(), last: new Vector3(), eye: new Vector3(), to: new Vector3() }), [])
+  const scratch = useMemo(
+    () => ({
+      matrix: new Matrix4(),
+      tool: new Vector3(),
+      last: new Vector3(),
+      eye: new Vector3(),
+      to: new Vector3(),
+    }),
+    [],
+  )
 
   const toolAt = (into: Vector3): boolean => {
     const now = poses()
@@ -70,7 +84,8 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
     const corners = cornersOf(arm)
     const box = new Box3()
     const thick = 0.05 * scene.reach
-    for (const [x, y, z] of extent?.() ?? []) corners.push(new Vector3(x, y, z + thick), new Vector3(x, y, z - thick))
+    for (const [x, y, z] of extent?.() ?? [])
+      corners.push(new Vector3(x, y, z + thick), new Vector3(x, y, z - thick))
     corners.push(new Vector3(0, 0, floor))
     box.setFromPoints(corners)
     const centre = box.getCenter(new Vector3())
@@ -84,7 +99,10 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
     let distance = 0.1 * scene.reach
     for (const corner of corners) {
       const p = corner.sub(centre)
-      distance = Math.max(distance, p.dot(d) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall))
+      distance = Math.max(
+        distance,
+        p.dot(d) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall),
+      )
     }
     const eye = centre.clone().addScaledVector(d, distance)
     mounted.current = false
@@ -159,8 +177,18 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
     void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
   })
 
-  return <CameraControls ref={controls} makeDefault minDistance={0.08 * scene.reach} maxDistance={15 * scene.reach} smoothTime={0.12} draggingSmoothTime={0.04} onControlStart={() => {
+  return (
+    <CameraControls
+      ref={controls}
+      makeDefault
+      minDistance={0.08 * scene.reach}
+      maxDistance={15 * scene.reach}
+      smoothTime={0.12}
+      draggingSmoothTime={0.04}
+      onControlStart={() => {
         mounted.current = false
         touched.current = true
-      }} />
+      }}
+    />
+  )
 }

@@ -50,11 +50,19 @@ export function DropZone() {
 /** Send a file to the server, which reads it as data: nothing of it is run. */
 export async function open(file: File): Promise<void> {
   if (!KINDS.some((kind) => file.name.toLowerCase().endsWith(kind))) {
-    refuse({ what: 'this kind of file cannot be opened', where: file.name, fix: 'drop a robot script (.m), a robot or a diagram (.json)' })
+    refuse({
+      what: 'this kind of file cannot be opened',
+      where: file.name,
+      fix: 'drop a robot script (.m), a robot or a diagram (.json)',
+    })
     return
   }
   if (file.size > MOST_BYTES) {
-    refuse({ what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`, where: file.name, fix: 'put it into the folder of the studio and open it there' })
+    refuse({
+      what: `the file has ${(file.size / 2 ** 20).toFixed(1)} MiB, and 5 MiB can be dropped`,
+      where: file.name,
+      fix: 'put it into the folder of the studio and open it there',
+    })
     return
   }
   const bytes = new Uint8Array(await file.arrayBuffer())

@@ -14,7 +14,15 @@ interface OverlayProps {
 }
 
 /** Something that rides on one row of the arm. */
-function Riding({ row, poses, children }: { row: number; poses: () => Poses | undefined; children: React.ReactNode }) {
+function Riding({
+  row,
+  poses,
+  children,
+}: {
+  row: number
+  poses: () => Poses | undefined
+  children: React.ReactNode
+}) {
   const group = useRef<Group>(null)
   const matrix = useMemo(() => new Matrix4(), [])
   useFrame(() => {
@@ -48,7 +56,15 @@ export function Frames({ scene, poses }: OverlayProps) {
     return (
       <Riding key={row} row={row} poses={poses}>
         {AXES.map((color, axis) => (
-          <Line toneMapped={false} key={axis} points={[[0, 0, 0], [0, 1, 2].map((k) => (k === axis ? size : 0)) as [number, number, number]]} color={color} lineWidth={2.4} depthTest={false} renderOrder={4} />
+          <Line
+            toneMapped={false}
+            key={axis}
+            points={[[0, 0, 0], [0, 1, 2].map((k) => (k === axis ? size : 0)) as [number, number, number]]}
+            color={color}
+            lineWidth={2.4}
+            depthTest={false}
+            renderOrder={4}
+          />
         ))}
       </Riding>
     )
@@ -62,7 +78,20 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
     return (
       <Riding key={joint.name} row={joint.carrier} poses={poses}>
         <Fixed at={joint.frame}>
-          <Line toneMapped={false} points={[[0, 0, -half], [0, 0, half]]} color={dark ? '#e8ebf0' : '#23211e'} lineWidth={1.2} dashed dashSize={0.03 * scene.reach} gapSize={0.015 * scene.reach} depthTest={false} renderOrder={3} />
+          <Line
+            toneMapped={false}
+            points={[
+              [0, 0, -half],
+              [0, 0, half],
+            ]}
+            color={dark ? '#e8ebf0' : '#23211e'}
+            lineWidth={1.2}
+            dashed
+            dashSize={0.03 * scene.reach}
+            gapSize={0.015 * scene.reach}
+            depthTest={false}
+            renderOrder={3}
+          />
         </Fixed>
       </Riding>
     )
@@ -71,10 +100,22 @@ export function JointAxes({ scene, poses, dark }: OverlayProps) {
 
 /** The ranges of the joints: an arc (a bar) where the joint may stand, and a hand where it stands. */
 export function Limits({ scene, poses, dark }: OverlayProps) {
-  return scene.joints.map((joint) => <Range key={joint.name} joint={joint} poses={poses} dark={dark} reach={scene.reach} />)
+  return scene.joints.map((joint) => (
+    <Range key={joint.name} joint={joint} poses={poses} dark={dark} reach={scene.reach} />
+  ))
 }
 
-function Range({ joint, poses, dark, reach }: { joint: SceneJoint; poses: () => Poses | undefined; dark: boolean; reach: number }) {
+function Range({
+  joint,
+  poses,
+  dark,
+  reach,
+}: {
+  joint: SceneJoint
+  poses: () => Poses | undefined
+  dark: boolean
+  reach: number
+}) {
   const colour = dark ? '#3d9fdc' : '#0072b2'
   const hand = dark ? '#ff9a4d' : '#b04a00'
   const inner = 1.3 * joint.radius
@@ -87,12 +128,28 @@ function Range({ joint, poses, dark, reach }: { joint: SceneJoint; poses: () => 
       <>
         <Riding row={joint.carrier} poses={poses}>
           <Fixed at={joint.frame}>
-            <Line toneMapped={false} points={[[outer, 0, low], [outer, 0, high]]} color={colour} lineWidth={5} />
+            <Line
+              toneMapped={false}
+              points={[
+                [outer, 0, low],
+                [outer, 0, high],
+              ]}
+              color={colour}
+              lineWidth={5}
+            />
           </Fixed>
         </Riding>
         <Riding row={joint.row} poses={poses}>
           <Fixed at={joint.moving}>
-            <Line toneMapped={false} points={[[inner, 0, 0], [1.2 * outer, 0, 0]]} color={hand} lineWidth={3} />
+            <Line
+              toneMapped={false}
+              points={[
+                [inner, 0, 0],
+                [1.2 * outer, 0, 0],
+              ]}
+              color={hand}
+              lineWidth={3}
+            />
           </Fixed>
         </Riding>
       </>
@@ -103,16 +160,40 @@ function Range({ joint, poses, dark, reach }: { joint: SceneJoint; poses: () => 
         <Fixed at={joint.frame}>
           <mesh renderOrder={3}>
             <ringGeometry args={[inner, outer, 64, 1, low, Math.min(high - low, MOST_ARC)]} />
-            <meshBasicMaterial toneMapped={false} color={colour} transparent opacity={0.28} side={DoubleSide} depthWrite={false} />
+            <meshBasicMaterial
+              toneMapped={false}
+              color={colour}
+              transparent
+              opacity={0.28}
+              side={DoubleSide}
+              depthWrite={false}
+            />
           </mesh>
           {[low, high].map((angle, k) => (
-            <Line toneMapped={false} key={k} points={[[inner * Math.cos(angle), inner * Math.sin(angle), 0], [outer * Math.cos(angle), outer * Math.sin(angle), 0]]} color={colour} lineWidth={2} />
+            <Line
+              toneMapped={false}
+              key={k}
+              points={[
+                [inner * Math.cos(angle), inner * Math.sin(angle), 0],
+                [outer * Math.cos(angle), outer * Math.sin(angle), 0],
+              ]}
+              color={colour}
+              lineWidth={2}
+            />
           ))}
         </Fixed>
       </Riding>
       <Riding row={joint.row} poses={poses}>
         <Fixed at={joint.moving}>
-          <Line toneMapped={false} points={[[inner, 0, 0.002 * reach], [1.08 * outer, 0, 0.002 * reach]]} color={hand} lineWidth={3} />
+          <Line
+            toneMapped={false}
+            points={[
+              [inner, 0, 0.002 * reach],
+              [1.08 * outer, 0, 0.002 * reach],
+            ]}
+            color={hand}
+            lineWidth={3}
+          />
         </Fixed>
       </Riding>
     </>

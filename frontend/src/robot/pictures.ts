@@ -33,22 +33,35 @@ export function takePicture(shot: React.RefObject<Shot | null>, name: string): v
 
 /** The kind of film that this browser can record; undefined where it records none. */
 export function filmKind(): string | undefined {
-  return typeof MediaRecorder === 'undefined' ? undefined : FILMS.find((kind) => MediaRecorder.isTypeSupported(kind))
+  return typeof MediaRecorder === 'undefined'
+    ? undefined
+    : FILMS.find((kind) => MediaRecorder.isTypeSupported(kind))
 }
 
 /** Film the view while something plays; the returned function ends the film early. */
-export function takeFilm(shot: React.RefObject<Shot | null>, name: string, play: () => Promise<void>, ended: () => void): () => void {
+export function takeFilm(
+  shot: React.RefObject<Shot | null>,
+  name: string,
+  play: () => Promise<void>,
+  ended: () => void,
+): () => void {
   const kind = filmKind()
   const canvas = shot.current?.gl.domElement
   if (!kind || !canvas) {
     ended()
     return () => {}
   }
-  const recorder = new MediaRecorder(canvas.captureStream(FRAMES_PER_SECOND), { mimeType: kind, videoBitsPerSecond: 8_000_000 })
+  const recorder = new MediaRecorder(canvas.captureStream(FRAMES_PER_SECOND), {
+    mimeType: kind,
+    videoBitsPerSecond: 8_000_000,
+  })
   const parts: Blob[] = []
   recorder.ondataavailable = ({ data }) => void parts.push(data)
   recorder.onstop = () => {
-    download(new Blob(parts, { type: kind.split(';')[0]! }), `${name}.${kind.includes('mp4') ? 'mp4' : 'webm'}`)
+    download(
+      new Blob(parts, { type: kind.split(';')[0]! }),
+      `${name}.${kind.includes('mp4') ? 'mp4' : 'webm'}`,
+    )
     ended()
   }
   const stop = () => recorder.state !== 'inactive' && recorder.stop()

@@ -21,8 +21,13 @@ interface RunArmProps {
 /** The arm as the samples of the run say it at the time cursor. */
 export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
-  const has = useStudio((s) => Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)))
-  const poses = useCallback(() => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest, [path, scene.rows, rest])
+  const has = useStudio((s) =>
+    Boolean(s.run?.views.some((view) => view.kind === 'robot' && view.block === path)),
+  )
+  const poses = useCallback(
+    () => posesAt(path, scene.rows, samples.indexAt(shownTime())) ?? rest,
+    [path, scene.rows, rest],
+  )
   const drawn = useRef('')
   const state = useCallback(() => {
     // A run that has begun and says nothing yet moves no arm: its first samples are there before a picture would be.
@@ -45,13 +50,25 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
       // Where the arm itself stands there is no ghost.
       start: () => (samples.indexAt(shownTime()) > 0 ? posesAt(path, scene.rows, 0) : undefined),
       goal: () =>
-        useStudio.getState().run?.state === 'done' && samples.indexAt(shownTime()) < samples.count - 1 ? posesAt(path, scene.rows, samples.count - 1) : undefined,
+        useStudio.getState().run?.state === 'done' && samples.indexAt(shownTime()) < samples.count - 1
+          ? posesAt(path, scene.rows, samples.count - 1)
+          : undefined,
     }),
     [path, scene.rows],
   )
   const extent = useCallback(() => extentOf(path, scene.rows), [path, scene.rows])
   return (
-    <Stage scene={scene} poses={poses} state={state} way={way} ghosts={ghosts} extent={extent} whole={whole} drawing={drawing} {...(has ? { film: playOnce } : {})}>
+    <Stage
+      scene={scene}
+      poses={poses}
+      state={state}
+      way={way}
+      ghosts={ghosts}
+      extent={extent}
+      whole={whole}
+      drawing={drawing}
+      {...(has ? { film: playOnce } : {})}
+    >
       {children}
     </Stage>
   )
@@ -80,7 +97,8 @@ function extentOf(path: string, rows: number): [number, number, number][] {
   const last = samples.count - 1
   for (let k = 0; k <= EXTENT_SAMPLES; k++) {
     const index = Math.round((last * k) / EXTENT_SAMPLES)
-    for (let row = 0; row < rows; row++) points.push([3, 7, 11].map((place) => found[16 * row + place]![index]!) as [number, number, number])
+    for (let row = 0; row < rows; row++)
+      points.push([3, 7, 11].map((place) => found[16 * row + place]![index]!) as [number, number, number])
   }
   return points
 }

@@ -19,12 +19,25 @@ export interface RunStageProps {
 export default function RunStage({ document, inside, block, scene, rest, q }: RunStageProps) {
   const poses = useMemo(() => listed(rest), [rest])
   const drawing = useCallback(
-    () => ask<string>({ kind: 'robot_picture', document, inside, block, q, theme: globalThis.document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light' }),
+    () =>
+      ask<string>({
+        kind: 'robot_picture',
+        document,
+        inside,
+        block,
+        q,
+        theme:
+          globalThis.document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light',
+      }),
     [document, inside, block, q],
   )
   return (
     <RunArm path={[...inside, block].join('/')} scene={scene} rest={poses} drawing={drawing}>
-      <Button label="Edit this robot" icon={IconEdit} onClick={() => void ask({ kind: 'robot_of_block', document, inside, block })} />
+      <Button
+        label="Edit this robot"
+        icon={IconEdit}
+        onClick={() => void ask({ kind: 'robot_of_block', document, inside, block })}
+      />
     </RunArm>
   )
 }

@@ -38,7 +38,24 @@ export function listed(poses: number[][][]): Poses {
 
 export function matrixAt(poses: Poses, row: number, into: Matrix4): Matrix4 {
   const at = (k: number) => poses(row, k)
-  return into.set(at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7), at(8), at(9), at(10), at(11), 0, 0, 0, 1)
+  return into.set(
+    at(0),
+    at(1),
+    at(2),
+    at(3),
+    at(4),
+    at(5),
+    at(6),
+    at(7),
+    at(8),
+    at(9),
+    at(10),
+    at(11),
+    0,
+    0,
+    0,
+    1,
+  )
 }
 
 export function matrixOf(numbers: number[]): Matrix4 {

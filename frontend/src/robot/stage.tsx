@@ -14,8 +14,22 @@ import { toggle, useViewOptions } from './view_options'
 import { ViewTools } from './view_tools'
 
 const COLOURS = {
-  light: { background: '#f1eeea', cell: '#e2dcd4', section: '#cbc3b8', shadow: 0.24, start: '#635d55', goal: '#0072b2' },
-  dark: { background: '#151a20', cell: '#262d36', section: '#39424d', shadow: 0.5, start: '#a3adba', goal: '#3d9fdc' },
+  light: {
+    background: '#f1eeea',
+    cell: '#e2dcd4',
+    section: '#cbc3b8',
+    shadow: 0.24,
+    start: '#635d55',
+    goal: '#0072b2',
+  },
+  dark: {
+    background: '#151a20',
+    cell: '#262d36',
+    section: '#39424d',
+    shadow: 0.5,
+    start: '#a3adba',
+    goal: '#3d9fdc',
+  },
 }
 
 /** Poses that are shown beside the arm: where it came from, where it goes. */
@@ -64,7 +78,12 @@ export function Stage(props: StageProps) {
   const onKeyDown = (event: React.KeyboardEvent) => {
     const view = camera.current
     if (!view || event.ctrlKey || event.metaKey || event.altKey) return
-    const turns: Record<string, [number, number]> = { ArrowLeft: [-TURN, 0], ArrowRight: [TURN, 0], ArrowUp: [0, -TURN], ArrowDown: [0, TURN] }
+    const turns: Record<string, [number, number]> = {
+      ArrowLeft: [-TURN, 0],
+      ArrowRight: [TURN, 0],
+      ArrowUp: [0, -TURN],
+      ArrowDown: [0, TURN],
+    }
     const turn = turns[event.key]
     if (turn) view.turn(...turn)
     else if (event.key === '+' || event.key === '=') view.zoom(0.85)
@@ -84,7 +103,19 @@ export function Stage(props: StageProps) {
         tabIndex={0}
         onKeyDown={onKeyDown}
       >
-        <Canvas shadows="percentage" frameloop="demand" dpr={[1, 2]} camera={{ position: [1.6 * scene.reach, -1.9 * scene.reach, 1.35 * scene.reach], up: [0, 0, 1], fov: 32, near: 0.02 * scene.reach, far: 60 * scene.reach }} aria-hidden>
+        <Canvas
+          shadows="percentage"
+          frameloop="demand"
+          dpr={[1, 2]}
+          camera={{
+            position: [1.6 * scene.reach, -1.9 * scene.reach, 1.35 * scene.reach],
+            up: [0, 0, 1],
+            fov: 32,
+            near: 0.02 * scene.reach,
+            far: 60 * scene.reach,
+          }}
+          aria-hidden
+        >
           <Inside {...props} scheme={scheme} camera={camera} shot={shot} />
         </Canvas>
       </div>
@@ -148,10 +179,18 @@ function Inside({ scene, poses, state, way, ghosts, extent, whole, scheme, camer
         shadow-normalBias={0.006 * reach}
         shadow-bias={-0.0004}
       />
-      <directionalLight position={[-2.4 * reach, 1.8 * reach, 1.6 * reach]} intensity={0.55} color="#dfe8f5" />
+      <directionalLight
+        position={[-2.4 * reach, 1.8 * reach, 1.6 * reach]}
+        intensity={0.55}
+        color="#dfe8f5"
+      />
       <Arm rows={scene.rows} bodies={bodies} poses={poses} />
-      {options.ghosts && ghosts && <Arm rows={scene.rows} bodies={bodies} poses={ghosts.start} ghost={colours.start} />}
-      {options.ghosts && ghosts && <Arm rows={scene.rows} bodies={bodies} poses={ghosts.goal} ghost={colours.goal} />}
+      {options.ghosts && ghosts && (
+        <Arm rows={scene.rows} bodies={bodies} poses={ghosts.start} ghost={colours.start} />
+      )}
+      {options.ghosts && ghosts && (
+        <Arm rows={scene.rows} bodies={bodies} poses={ghosts.goal} ghost={colours.goal} />
+      )}
       {options.frames && <Frames {...overlay} />}
       {options.axes && <JointAxes {...overlay} />}
       {options.limits && <Limits {...overlay} />}
@@ -168,15 +207,42 @@ const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
   return (
     <Environment resolution={64} environmentIntensity={dark ? 0.42 : 0.6}>
       <color attach="background" args={[dark ? '#39424d' : '#b9b4ad']} />
-      <Lightformer form="rect" intensity={3.2} color="#fff6ec" position={[3, -4, 6]} scale={[6, 4, 1]} target={[0, 0, 0]} />
-      <Lightformer form="rect" intensity={1.2} color="#dfe8f5" position={[-6, 3, 3]} scale={[5, 6, 1]} target={[0, 0, 0]} />
-      <Lightformer form="rect" intensity={1.6} color="#ffffff" position={[0, 6, 4]} scale={[8, 1, 1]} target={[0, 0, 0]} />
+      <Lightformer
+        form="rect"
+        intensity={3.2}
+        color="#fff6ec"
+        position={[3, -4, 6]}
+        scale={[6, 4, 1]}
+        target={[0, 0, 0]}
+      />
+      <Lightformer
+        form="rect"
+        intensity={1.2}
+        color="#dfe8f5"
+        position={[-6, 3, 3]}
+        scale={[5, 6, 1]}
+        target={[0, 0, 0]}
+      />
+      <Lightformer
+        form="rect"
+        intensity={1.6}
+        color="#ffffff"
+        position={[0, 6, 4]}
+        scale={[8, 1, 1]}
+        target={[0, 0, 0]}
+      />
     </Environment>
   )
 })
 
 /** The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it has reached. */
-function useFloor(scene: RobotScene, poses: () => Poses | undefined, foot: number, extent: StageProps['extent'], whole: string | undefined): number {
+function useFloor(
+  scene: RobotScene,
+  poses: () => Poses | undefined,
+  foot: number,
+  extent: StageProps['extent'],
+  whole: string | undefined,
+): number {
   const [lowest, setLowest] = useState<{ name: string; floor: number }>({ name: scene.name, floor: Infinity })
   const counted = useRef('')
   const step = (scene.reach > 1 ? 0.5 : 0.1) * Math.max(1, Math.round(0.12 * scene.reach))
@@ -197,7 +263,17 @@ function useFloor(scene: RobotScene, poses: () => Poses | undefined, foot: numbe
 }
 
 /** A column under an arm that reaches below its foot. */
-function Pedestal({ from, to, reach, poses }: { from: number; to: number; reach: number; poses: () => Poses | undefined }) {
+function Pedestal({
+  from,
+  to,
+  reach,
+  poses,
+}: {
+  from: number
+  to: number
+  reach: number
+  poses: () => Poses | undefined
+}) {
   const now = poses()
   if (to - from < 0.01 * reach || !now || now(0, 10) < 0.7) return null
   const r = 0.06 * reach
@@ -230,7 +306,15 @@ function useDrawnWhenChanged(state: () => string): void {
   }, [state, invalidate])
 }
 
-function Ground({ height, reach, colours }: { height: number; reach: number; colours: (typeof COLOURS)['light'] }) {
+function Ground({
+  height,
+  reach,
+  colours,
+}: {
+  height: number
+  reach: number
+  colours: (typeof COLOURS)['light']
+}) {
   return (
     <>
       {/* The shadow hides nothing: the lines lie so near above it that depth alone cannot tell them apart. */}
@@ -260,7 +344,15 @@ function Ground({ height, reach, colours }: { height: number; reach: number; col
 }
 
 /** Where the tool is, in a corner. */
-function Instant({ poses, rows, state }: { poses: () => Poses | undefined; rows: number; state: () => string }) {
+function Instant({
+  poses,
+  rows,
+  state,
+}: {
+  poses: () => Poses | undefined
+  rows: number
+  state: () => string
+}) {
   const text = useRef<HTMLOutputElement>(null)
   useEffect(() => {
     let seen = ''
@@ -269,7 +361,9 @@ function Instant({ poses, rows, state }: { poses: () => Poses | undefined; rows:
       if (key === seen || !text.current) return
       seen = key
       const now = poses()
-      text.current.textContent = now ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m' : ''
+      text.current.textContent = now
+        ? [3, 7, 11].map((k, axis) => `${'xyz'[axis]} ${now(rows - 1, k).toFixed(3)}`).join('   ') + ' m'
+        : ''
     })
   }, [poses, rows, state])
   return <output ref={text} className="instant numbers" aria-label="Position of the tool" />

@@ -16,12 +16,26 @@ export interface Way {
 }
 
 /** The way of the tool up to the instant shown; what is old fades. */
-export function ToolPath({ way, dark, background }: { way: () => Way | undefined; dark: boolean; background: string }) {
+export function ToolPath({
+  way,
+  dark,
+  background,
+}: {
+  way: () => Way | undefined
+  dark: boolean
+  background: string
+}) {
   const line = useRef<Line2>(null)
   const seen = useRef('')
   const start = useMemo(() => [new Vector3(), new Vector3(0, 0, 1e-6)], [])
   const colour = dark ? '#3d9fdc' : '#0072b2'
-  const white = useMemo<[number, number, number][]>(() => [[1, 1, 1], [1, 1, 1]], [])
+  const white = useMemo<[number, number, number][]>(
+    () => [
+      [1, 1, 1],
+      [1, 1, 1],
+    ],
+    [],
+  )
   useFrame(() => {
     const now = way()
     const key = `${now?.key} ${colour}`
@@ -48,5 +62,14 @@ export function ToolPath({ way, dark, background }: { way: () => Way | undefined
     line.current.geometry.setPositions(points)
     line.current.geometry.setColors(colours)
   })
-  return <Line ref={line} points={start} vertexColors={white} lineWidth={2.4} frustumCulled={false} toneMapped={false} />
+  return (
+    <Line
+      ref={line}
+      points={start}
+      vertexColors={white}
+      lineWidth={2.4}
+      frustumCulled={false}
+      toneMapped={false}
+    />
+  )
 }

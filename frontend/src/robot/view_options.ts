@@ -11,7 +11,14 @@ export interface ViewOptions {
 }
 
 const KEPT = 'armblocks-robot-view'
-const START: ViewOptions = { frames: false, axes: false, limits: false, path: true, ghosts: true, follow: false }
+const START: ViewOptions = {
+  frames: false,
+  axes: false,
+  limits: false,
+  path: true,
+  ghosts: true,
+  follow: false,
+}
 
 function kept(): Partial<ViewOptions> {
   try {

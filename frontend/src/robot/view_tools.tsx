@@ -42,11 +42,23 @@ interface ViewToolsProps {
 }
 
 /** Camera, what is shown, picture and film: the buttons over an arm. */
-export function ViewTools({ camera, shot, name, onPicture, film, hasPath, hasGhosts, onToggle, children }: ViewToolsProps) {
+export function ViewTools({
+  camera,
+  shot,
+  name,
+  onPicture,
+  film,
+  hasPath,
+  hasGhosts,
+  onToggle,
+  children,
+}: ViewToolsProps) {
   const options = useViewOptions()
   const [filming, setFilming] = useState(false)
   const stop = useRef<() => void>(() => {})
-  const offered = OPTION_LABELS.filter(([option]) => (option !== 'path' || hasPath) && (option !== 'ghosts' || hasGhosts))
+  const offered = OPTION_LABELS.filter(
+    ([option]) => (option !== 'path' || hasPath) && (option !== 'ghosts' || hasGhosts),
+  )
   return (
     <div className="view-tools" role="toolbar" aria-label="Robot view">
       {children}
@@ -62,7 +74,11 @@ export function ViewTools({ camera, shot, name, onPicture, film, hasPath, hasGho
           ))}
         </Menu.Dropdown>
       </Menu>
-      <Button label="Show all of the arm (Space)" icon={IconArrowsMaximize} onClick={() => camera.current?.fit()} />
+      <Button
+        label="Show all of the arm (Space)"
+        icon={IconArrowsMaximize}
+        onClick={() => camera.current?.fit()}
+      />
       <Menu position="bottom-end" shadow="md">
         <Menu.Target>
           <Button label="What is shown" icon={IconEye} />

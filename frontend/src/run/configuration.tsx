@@ -18,14 +18,19 @@ export function Configuration() {
 }
 
 /** Small numbers as one types them: 1e-6. */
-const numberText = (value: number | string | null) => (typeof value === 'number' && value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential() : valueText(value))
+const numberText = (value: number | string | null) =>
+  typeof value === 'number' && value !== 0 && Math.abs(value) < 1e-3
+    ? value.toExponential()
+    : valueText(value)
 
 function Form({ onClose }: { onClose: () => void }) {
   const document = useStudio((s) => s.document?.state.document ?? '')
   const settings = useStudio((s) => s.document?.state.settings)
   const welcome = useStudio((s) => s.welcome)
   const run = useStudio((s) => s.run)
-  const [start] = useState(() => Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])))
+  const [start] = useState(() =>
+    Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])),
+  )
   const [typed, setTyped] = useState<Record<string, string>>(start)
   const [faults, setFaults] = useState<Record<string, string>>({})
   const changed = Object.keys(typed).filter((name) => typed[name] !== start[name])
@@ -34,7 +39,11 @@ function Form({ onClose }: { onClose: () => void }) {
   useEffect(() => {
     let current = true
     const timer = setTimeout(() => {
-      void ask<Record<string, string>>({ kind: 'typed_settings', document, values: JSON.parse(asked) as typeof values }).then((found) => {
+      void ask<Record<string, string>>({
+        kind: 'typed_settings',
+        document,
+        values: JSON.parse(asked) as typeof values,
+      }).then((found) => {
         if (current && found) setFaults(found)
       })
     }, CHECK_DELAY_MS)
@@ -51,10 +60,17 @@ function Form({ onClose }: { onClose: () => void }) {
   const solvers = welcome?.solvers ?? []
   const group = (label: string, adaptive: boolean, stiff: boolean) => ({
     group: label,
-    items: solvers.filter((one) => one.name !== 'auto' && one.adaptive === adaptive && one.stiff === stiff).map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
+    items: solvers
+      .filter((one) => one.name !== 'auto' && one.adaptive === adaptive && one.stiff === stiff)
+      .map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
   })
   const choices = [
-    { group: 'Automatic', items: solvers.filter(({ name }) => name === 'auto').map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })) },
+    {
+      group: 'Automatic',
+      items: solvers
+        .filter(({ name }) => name === 'auto')
+        .map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
+    },
     group('Chooses its steps', true, false),
     group('Chooses its steps, for stiff systems', true, true),
     group('Fixed step', false, false),
@@ -65,23 +81,44 @@ function Form({ onClose }: { onClose: () => void }) {
       onSubmit={(event) => {
         event.preventDefault()
         if (!changed.length) onClose()
-        else if (!wrong) void change({ kind: 'settings', values }).then((done) => done !== undefined && onClose())
+        else if (!wrong)
+          void change({ kind: 'settings', values }).then((done) => done !== undefined && onClose())
       }}
     >
       <Stack gap="sm">
         <div className="settings">
-        {welcome?.settings.map(({ name, title, unit, doc }, index) => {
-          const label = (
-            <>
-              {title}
-              {unit && <span className="unit"> {unit}</span>}
-            </>
-          )
-          const fault = faults[name]
-          const common = { label, description: doc, size: 'sm' as const, error: fault || undefined }
-          if (name === 'solver') return <NativeSelect key={name} className="wide" {...common} data={choices} value={typed[name] ?? 'auto'} onChange={put(name)} />
-          return <TextInput key={name} {...common} data-autofocus={index === 0 || undefined} classNames={{ input: 'typed' }} value={typed[name] ?? ''} onChange={put(name)} placeholder="automatic" />
-        })}
+          {welcome?.settings.map(({ name, title, unit, doc }, index) => {
+            const label = (
+              <>
+                {title}
+                {unit && <span className="unit"> {unit}</span>}
+              </>
+            )
+            const fault = faults[name]
+            const common = { label, description: doc, size: 'sm' as const, error: fault || undefined }
+            if (name === 'solver')
+              return (
+                <NativeSelect
+                  key={name}
+                  className="wide"
+                  {...common}
+                  data={choices}
+                  value={typed[name] ?? 'auto'}
+                  onChange={put(name)}
+                />
+              )
+            return (
+              <TextInput
+                key={name}
+                {...common}
+                data-autofocus={index === 0 || undefined}
+                classNames={{ input: 'typed' }}
+                value={typed[name] ?? ''}
+                onChange={put(name)}
+                placeholder="automatic"
+              />
+            )
+          })}
         </div>
         {run?.reason && (
           <Alert color="gray" title={`The last run used ${run.solver}`}>

@@ -48,7 +48,8 @@ export const useRuns = create<Runs>((set) => ({
   runs: [],
   tried: {},
   speed: null,
-  rename: (key, name) => set((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, name } : run)) })),
+  rename: (key, name) =>
+    set((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, name } : run)) })),
   remove: (key) => set((s) => ({ runs: s.runs.filter((run) => run.key !== key || run.samples === samples) })),
 }))
 useRuns.subscribe(changed)
@@ -56,7 +57,9 @@ useRuns.subscribe(changed)
 let counted = 0
 
 function update(key: string, change: (run: KeptRun) => Partial<KeptRun>): void {
-  useRuns.setState((s) => ({ runs: s.runs.map((run) => (run.key === key ? { ...run, ...change(run) } : run)) }))
+  useRuns.setState((s) => ({
+    runs: s.runs.map((run) => (run.key === key ? { ...run, ...change(run) } : run)),
+  }))
 }
 
 export function began(event: EventOf<'run_started'>): void {
@@ -100,7 +103,9 @@ export function tuned({ run, time, parameter, value }: EventOf<'run_tuned'>): vo
 export function rewound({ run, time, count }: EventOf<'run_rewound'>): void {
   if (samples.run === run) samples.truncate(count)
   // What was tuned later holds from the instant to which the run has returned.
-  update(run, ({ tunings }) => ({ tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })) }))
+  update(run, ({ tunings }) => ({
+    tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })),
+  }))
 }
 
 export function progressed({ run, state, solver, reason }: EventOf<'run_progress'>): void {

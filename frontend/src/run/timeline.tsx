@@ -28,16 +28,35 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
   return (
     <footer className="timeline" onKeyDownCapture={keys}>
       <Tooltip label={`${label} (Space)`} openDelay={400}>
-        <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={!run} onClick={() => (playing ? hold() : play())}>
+        <ActionIcon
+          variant="subtle"
+          color="gray"
+          aria-label={label}
+          disabled={!run}
+          onClick={() => (playing ? hold() : play())}
+        >
           {playing ? <IconPlayerPauseFilled size={15} /> : <IconPlayerPlayFilled size={15} />}
         </ActionIcon>
       </Tooltip>
       <Tooltip label="Begin again at the end" openDelay={400}>
-        <ActionIcon variant={loop ? 'light' : 'subtle'} color={loop ? 'accent' : 'gray'} aria-label="Loop" aria-pressed={loop} onClick={() => useCursor.setState({ loop: !loop })}>
+        <ActionIcon
+          variant={loop ? 'light' : 'subtle'}
+          color={loop ? 'accent' : 'gray'}
+          aria-label="Loop"
+          aria-pressed={loop}
+          onClick={() => useCursor.setState({ loop: !loop })}
+        >
           <IconRepeat size={15} />
         </ActionIcon>
       </Tooltip>
-      <NativeSelect size="xs" w={74} aria-label="Playback rate" data={RATES} value={String(rate)} onChange={(event) => useCursor.setState({ rate: Number(event.currentTarget.value) })} />
+      <NativeSelect
+        size="xs"
+        w={74}
+        aria-label="Playback rate"
+        data={RATES}
+        value={String(rate)}
+        onChange={(event) => useCursor.setState({ rate: Number(event.currentTarget.value) })}
+      />
       <Slider
         className="track"
         size="sm"
@@ -51,11 +70,19 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
         onChange={(value) => useCursor.setState({ time: value, playing: false })}
       />
       {run?.state === 'paused' && time !== null && time < run.time && (
-        <Tooltip label="The run returns to this instant; what came later is forgotten, tuned values stay" multiline w={260}>
+        <Tooltip
+          label="The run returns to this instant; what came later is forgotten, tuned values stay"
+          multiline
+          w={260}
+        >
           <Button
             size="compact-xs"
             variant="default"
-            onClick={() => void ask({ kind: 'rewind', run: run.run, time }).then(() => useCursor.setState({ time: null, playing: false }))}
+            onClick={() =>
+              void ask({ kind: 'rewind', run: run.run, time }).then(() =>
+                useCursor.setState({ time: null, playing: false }),
+              )
+            }
           >
             Go back to here
           </Button>
@@ -63,7 +90,13 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
       )}
       {wires && (
         <Tooltip label="Values on all wires" openDelay={400}>
-          <ActionIcon variant={all ? 'light' : 'subtle'} color={all ? 'accent' : 'gray'} aria-label="Values on all wires" aria-pressed={all} onClick={() => useValues.setState({ all: !all })}>
+          <ActionIcon
+            variant={all ? 'light' : 'subtle'}
+            color={all ? 'accent' : 'gray'}
+            aria-label="Values on all wires"
+            aria-pressed={all}
+            onClick={() => useValues.setState({ all: !all })}
+          >
             <IconTag size={15} />
           </ActionIcon>
         </Tooltip>

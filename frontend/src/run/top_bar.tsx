@@ -33,7 +33,8 @@ export function TopBar() {
   const runKey = useStudio((s) => s.run?.run)
   const speed = useRuns((s) => s.speed)
   const busy = state === 'running' || state === 'paused'
-  const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') => runKey && void ask({ kind: 'control', run: runKey, action })
+  const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') =>
+    runKey && void ask({ kind: 'control', run: runKey, action })
   const goBack = () => {
     useCursor.setState({ time: null, playing: false })
     control('back')
@@ -58,16 +59,46 @@ export function TopBar() {
         <Undo />
         <Redo />
         <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} disabled={!known} onClick={() => void save()} />
-        <Tool label="Add a block (type on the canvas)" icon={IconPlus} disabled={!known} onClick={() => show('insert')} />
-        <Tool label="Arrange the blocks" icon={IconLayoutDistributeHorizontal} disabled={!known} onClick={() => alter('arrange')} />
+        <Tool
+          label="Add a block (type on the canvas)"
+          icon={IconPlus}
+          disabled={!known}
+          onClick={() => show('insert')}
+        />
+        <Tool
+          label="Arrange the blocks"
+          icon={IconLayoutDistributeHorizontal}
+          disabled={!known}
+          onClick={() => alter('arrange')}
+        />
       </Group>
       <Group gap={4} role="group" aria-label="Run" className="run-controls">
-        <Button size="compact-sm" leftSection={<IconPlayerPlayFilled size={14} />} disabled={!known || state === 'running'} onClick={startOrResume}>
+        <Button
+          size="compact-sm"
+          leftSection={<IconPlayerPlayFilled size={14} />}
+          disabled={!known || state === 'running'}
+          onClick={startOrResume}
+        >
           {state === 'paused' ? 'Resume' : 'Run'}
         </Button>
-        <Tool label={busy ? 'Step back' : 'One instant back'} icon={IconPlayerSkipBackFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? goBack() : stepCursor(-1))} />
-        <Tool label="Pause" icon={IconPlayerPauseFilled} disabled={state !== 'running'} onClick={() => control('pause')} />
-        <Tool label={busy ? 'Step' : 'One instant on'} icon={IconPlayerSkipForwardFilled} disabled={!runKey || state === 'running'} onClick={() => (busy ? control('step') : stepCursor(1))} />
+        <Tool
+          label={busy ? 'Step back' : 'One instant back'}
+          icon={IconPlayerSkipBackFilled}
+          disabled={!runKey || state === 'running'}
+          onClick={() => (busy ? goBack() : stepCursor(-1))}
+        />
+        <Tool
+          label="Pause"
+          icon={IconPlayerPauseFilled}
+          disabled={state !== 'running'}
+          onClick={() => control('pause')}
+        />
+        <Tool
+          label={busy ? 'Step' : 'One instant on'}
+          icon={IconPlayerSkipForwardFilled}
+          disabled={!runKey || state === 'running'}
+          onClick={() => (busy ? control('step') : stepCursor(1))}
+        />
         <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
         <StopTime />
         <NativeSelect
@@ -83,7 +114,12 @@ export function TopBar() {
           }}
         />
       </Group>
-      <Tool label="Configuration parameters (Ctrl+E)" icon={IconSettings} disabled={!known} onClick={openConfiguration} />
+      <Tool
+        label="Configuration parameters (Ctrl+E)"
+        icon={IconSettings}
+        disabled={!known}
+        onClick={openConfiguration}
+      />
       <RunState />
       <RunProgress />
     </header>
@@ -93,12 +129,26 @@ export function TopBar() {
 /** Components of their own: an edit renders no other tool. */
 function Undo() {
   const edit = useStudio((s) => s.document?.state.undo)
-  return <Tool label={edit ? `Undo ${edit} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!edit} onClick={() => alter('undo')} />
+  return (
+    <Tool
+      label={edit ? `Undo ${edit} (Ctrl+Z)` : 'Nothing to undo'}
+      icon={IconArrowBackUp}
+      disabled={!edit}
+      onClick={() => alter('undo')}
+    />
+  )
 }
 
 function Redo() {
   const edit = useStudio((s) => s.document?.state.redo)
-  return <Tool label={edit ? `Redo ${edit} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!edit} onClick={() => alter('redo')} />
+  return (
+    <Tool
+      label={edit ? `Redo ${edit} (Ctrl+Y)` : 'Nothing to redo'}
+      icon={IconArrowForwardUp}
+      disabled={!edit}
+      onClick={() => alter('redo')}
+    />
+  )
 }
 
 /** When the model stops, s: what is typed counts when the field is left. */
@@ -117,13 +167,24 @@ function StopTime() {
       onBlur={({ currentTarget }) => {
         const typed = Number.parseFloat(currentTarget.value)
         currentTarget.value = `${typed > 0 ? typed : value} s`
-        if (known && typed > 0 && typed !== value) void change({ kind: 'settings', values: { stop_time: typed } })
+        if (known && typed > 0 && typed !== value)
+          void change({ kind: 'settings', values: { stop_time: typed } })
       }}
     />
   )
 }
 
-function Tool({ label, icon: Icon, disabled, onClick }: { label: string; icon: React.ComponentType<{ size: number }>; disabled: boolean; onClick: () => void }) {
+function Tool({
+  label,
+  icon: Icon,
+  disabled,
+  onClick,
+}: {
+  label: string
+  icon: React.ComponentType<{ size: number }>
+  disabled: boolean
+  onClick: () => void
+}) {
   return (
     <Tooltip label={label} openDelay={400}>
       <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={disabled} onClick={onClick}>
@@ -138,13 +199,23 @@ function RunProgress() {
   const run = useStudio((s) => s.run)
   if (run?.state !== 'running' && run?.state !== 'paused') return null
   const part = run.stopTime ? Math.min(run.time / run.stopTime, 1) : 1
-  return <div className="run-progress" role="progressbar" aria-label="Progress of the run" aria-valuenow={Math.round(100 * part)} style={{ width: `${100 * part}%` }} />
+  return (
+    <div
+      className="run-progress"
+      role="progressbar"
+      aria-label="Progress of the run"
+      aria-valuenow={Math.round(100 * part)}
+      style={{ width: `${100 * part}%` }}
+    />
+  )
 }
 
 function RunState() {
   const run = useStudio((s) => s.run)
   if (!run) return <span className="run-state" />
-  const colour = { running: 'orange', paused: 'gray', done: 'teal', stopped: 'gray', failed: 'red' }[run.state]
+  const colour = { running: 'orange', paused: 'gray', done: 'teal', stopped: 'gray', failed: 'red' }[
+    run.state
+  ]
   return (
     <span className="run-state">
       <Text size="sm" className="numbers">
@@ -152,10 +223,16 @@ function RunState() {
       </Text>
       {run.realTimeFactor > 0 && (
         <Text size="xs" c="dimmed" className="numbers">
-          {run.realTimeFactor >= 100 ? run.realTimeFactor.toFixed(0) : run.realTimeFactor.toFixed(1)} × real time
+          {run.realTimeFactor >= 100 ? run.realTimeFactor.toFixed(0) : run.realTimeFactor.toFixed(1)} × real
+          time
         </Text>
       )}
-      <Badge color={colour} variant="light" styles={{ label: { color: 'var(--ink)' } }} title={run.message || run.fault?.what}>
+      <Badge
+        color={colour}
+        variant="light"
+        styles={{ label: { color: 'var(--ink)' } }}
+        title={run.message || run.fault?.what}
+      >
         {run.state}
       </Badge>
     </span>

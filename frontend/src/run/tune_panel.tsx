@@ -30,7 +30,14 @@ function useTunables(): Map<string, Tunable> {
         if (!rule.tunable || !NUMERIC.includes(rule.kind)) continue
         const path = `${level}${block.name}.${rule.name}`
         const known = found.get(path)
-        found.set(path, { path, value: block.parameters[rule.name], unit: rule.unit, doc: rule.doc, low: known?.low ?? null, high: known?.high ?? null })
+        found.set(path, {
+          path,
+          value: block.parameters[rule.name],
+          unit: rule.unit,
+          doc: rule.doc,
+          low: known?.low ?? null,
+          high: known?.high ?? null,
+        })
       }
     return found
   }, [blocks, library, level, ofRun])
@@ -45,7 +52,10 @@ export function TunePanel() {
   const tried = useRuns((s) => s.tried)
   const chosen = [...selection].map((name) => level + name)
   const shown = [...tunables.values()].filter(
-    ({ path }) => pinned.has(path) || path in tried || chosen.some((name) => path.startsWith(`${name}.`) || path.startsWith(`${name}/`)),
+    ({ path }) =>
+      pinned.has(path) ||
+      path in tried ||
+      chosen.some((name) => path.startsWith(`${name}.`) || path.startsWith(`${name}/`)),
   )
   const count = Object.keys(tried).length
   return (
@@ -54,7 +64,12 @@ export function TunePanel() {
         {shown.map((tunable) => (
           <TuneRow key={tunable.path} tunable={tunable} />
         ))}
-        {!shown.length && <p className="empty">Select a block to see the parameters that can be changed while the model runs. Pin those to keep at hand.</p>}
+        {!shown.length && (
+          <p className="empty">
+            Select a block to see the parameters that can be changed while the model runs. Pin those to keep
+            at hand.
+          </p>
+        )}
       </div>
       {count > 0 && (
         <Group gap="xs" className="tried">
@@ -75,7 +90,8 @@ export function TunePanel() {
 
 function send(path: string, value: unknown): void {
   const { run } = useStudio.getState()
-  if (run?.state === 'running' || run?.state === 'paused') void ask({ kind: 'tune', run: run.run, parameter: path, value })
+  if (run?.state === 'running' || run?.state === 'paused')
+    void ask({ kind: 'tune', run: run.run, parameter: path, value })
 }
 
 const waiting = new Map<string, unknown>()
@@ -97,7 +113,9 @@ function drop(paths: string[], tunables: Map<string, Tunable>): void {
     const model = tunables.get(path)?.value
     if (model !== undefined) send(path, model)
   }
-  useRuns.setState((s) => ({ tried: Object.fromEntries(Object.entries(s.tried).filter(([path]) => !paths.includes(path))) }))
+  useRuns.setState((s) => ({
+    tried: Object.fromEntries(Object.entries(s.tried).filter(([path]) => !paths.includes(path))),
+  }))
 }
 
 /** Put all that is tried into the model, as one step that can be undone. */
@@ -106,7 +124,13 @@ async function keep(): Promise<void> {
   const { tried } = useRuns.getState()
   if (!document) return
   const edit = { kind: 'keep_tuned' as const, values: tried }
-  const done = await ask({ kind: 'change', document: document.state.document, key: newKey(), inside: [], edit })
+  const done = await ask({
+    kind: 'change',
+    document: document.state.document,
+    key: newKey(),
+    inside: [],
+    edit,
+  })
   if (done !== undefined) useRuns.setState({ tried: {} })
 }
 
@@ -122,7 +146,10 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
   useEffect(() => setTyped(text), [text])
   const at = path.lastIndexOf('.')
   const model = typeof tunable.value === 'number' ? tunable.value : 0
-  const [from, to] = given ?? [low ?? Math.min(2 * model, model === 0 ? -1 : 0), high ?? Math.max(2 * model, model === 0 ? 1 : 0)]
+  const [from, to] = given ?? [
+    low ?? Math.min(2 * model, model === 0 ? -1 : 0),
+    high ?? Math.max(2 * model, model === 0 ? 1 : 0),
+  ]
   const done = () => {
     const number = Number(typed)
     if (typed.trim() && typed !== text) attempt(path, Number.isFinite(number) ? number : typed)
@@ -136,7 +163,8 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
       onBlur={(event) => {
         const number = Number(event.currentTarget.value)
         const range: [number, number] = index ? [from, number] : [number, to]
-        if (Number.isFinite(number) && range[0] < range[1]) useTuning.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
+        if (Number.isFinite(number) && range[0] < range[1])
+          useTuning.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
         else event.currentTarget.value = String(index ? to : from)
       }}
       onKeyDown={(event) => event.key === 'Enter' && event.currentTarget.blur()}
@@ -152,7 +180,13 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
         </span>
         {changed && (
           <Tooltip label={`Back to ${valueText(tunable.value)}`}>
-            <ActionIcon size="xs" variant="subtle" color="gray" aria-label={`Drop the value of ${path}`} onClick={() => drop([path], new Map([[path, tunable]]))}>
+            <ActionIcon
+              size="xs"
+              variant="subtle"
+              color="gray"
+              aria-label={`Drop the value of ${path}`}
+              onClick={() => drop([path], new Map([[path, tunable]]))}
+            >
               <IconArrowBackUp size={13} />
             </ActionIcon>
           </Tooltip>

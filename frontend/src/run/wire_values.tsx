@@ -40,7 +40,9 @@ export function valueAtInstant(path: string, time: number): string {
 }
 
 function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: SheetBlock; spot: PortSpot }[] {
-  return Object.values(blocks).flatMap((block) => block.outputs.map((spot) => ({ ref: `${block.name}/${spot.name}`, block, spot })))
+  return Object.values(blocks).flatMap((block) =>
+    block.outputs.map((spot) => ({ ref: `${block.name}/${spot.name}`, block, spot })),
+  )
 }
 
 /** Values on the wires, marks of what is logged, and what can be done with the wire that is `chosen`: on the sheet itself. */
@@ -69,30 +71,58 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   useWriting(layer)
   const found = outputs(blocks)
   const shown = ran ? found.filter(({ ref }) => all || ref === hovered || pinned.has(level + ref)) : []
-  const displays = (views ?? []).filter(({ kind, block }) => kind === 'value' && block.startsWith(level) && blocks[block.slice(level.length)])
+  const displays = (views ?? []).filter(
+    ({ kind, block }) => kind === 'value' && block.startsWith(level) && blocks[block.slice(level.length)],
+  )
   if (!portal) return null
   return createPortal(
-      <div ref={layer} className="wire-values" style={{ '--legible': Math.min(Math.max(1 / zoom, 1), 2.5) } as React.CSSProperties}>
-        {shown.map(({ ref, block, spot }) => (
-          <span key={ref} className="wire-value numbers" data-path={level + ref} style={{ transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -6 : 6)}px, ${block.place.y + spot.y - 4}px) scale(var(--legible)) translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)` }} />
+    <div
+      ref={layer}
+      className="wire-values"
+      style={{ '--legible': Math.min(Math.max(1 / zoom, 1), 2.5) } as React.CSSProperties}
+    >
+      {shown.map(({ ref, block, spot }) => (
+        <span
+          key={ref}
+          className="wire-value numbers"
+          data-path={level + ref}
+          style={{
+            transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -6 : 6)}px, ${block.place.y + spot.y - 4}px) scale(var(--legible)) translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)`,
+          }}
+        />
+      ))}
+      {displays.flatMap(({ block: path, signals }) => {
+        const block = blocks[path.slice(level.length)]!
+        return block.inputs
+          .filter(({ name }) => signals.includes(name))
+          .map((spot) => (
+            <span
+              key={`${path}/${spot.name}`}
+              className="display-value numbers"
+              data-path={`${path}/${spot.name}`}
+              style={{
+                width: block.width - 12,
+                transform: `translate(${block.place.x + 6}px, ${block.place.y + spot.y}px) translateY(-50%)`,
+              }}
+            />
+          ))
+      })}
+      {found
+        .filter(({ ref }) => logged.includes(ref))
+        .map(({ ref, block, spot }) => (
+          <span
+            key={ref}
+            className="logged-badge"
+            title={`${ref} is logged`}
+            style={{
+              transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -16 : 4)}px, ${block.place.y + spot.y + 3}px) scale(var(--legible))`,
+            }}
+          >
+            <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
+          </span>
         ))}
-        {displays.flatMap(({ block: path, signals }) => {
-          const block = blocks[path.slice(level.length)]!
-          return block.inputs
-            .filter(({ name }) => signals.includes(name))
-            .map((spot) => (
-              <span key={`${path}/${spot.name}`} className="display-value numbers" data-path={`${path}/${spot.name}`} style={{ width: block.width - 12, transform: `translate(${block.place.x + 6}px, ${block.place.y + spot.y}px) translateY(-50%)` }} />
-            ))
-        })}
-        {found
-          .filter(({ ref }) => logged.includes(ref))
-          .map(({ ref, block, spot }) => (
-            <span key={ref} className="logged-badge" title={`${ref} is logged`} style={{ transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -16 : 4)}px, ${block.place.y + spot.y + 3}px) scale(var(--legible))` }}>
-              <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
-            </span>
-          ))}
-        {chosen && <WireTools edge={chosen} level={level} logged={logged} pinned={pinned} />}
-      </div>,
+      {chosen && <WireTools edge={chosen} level={level} logged={logged} pinned={pinned} />}
+    </div>,
     portal,
   )
 }
@@ -115,7 +145,17 @@ function useWriting(layer: React.RefObject<HTMLDivElement | null>): void {
   )
 }
 
-function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level: string; logged: string[]; pinned: ReadonlySet<string> }) {
+function WireTools({
+  edge,
+  level,
+  logged,
+  pinned,
+}: {
+  edge: WireEdgeType
+  level: string
+  logged: string[]
+  pinned: ReadonlySet<string>
+}) {
   const ref = `${edge.source}/${edge.sourceHandle}`
   const path = edge.data?.path ?? []
   const longest = path.slice(1).reduce((best, _, k) => (length(path, k) > length(path, best) ? k : best), 0)
@@ -124,9 +164,23 @@ function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level:
   const isLogged = logged.includes(ref)
   const isPinned = pinned.has(level + ref)
   return (
-    <div className="wire-tools nodrag nopan" role="toolbar" aria-label={`Wire from ${ref}`} style={{ transform: `translate(${(from[0] + to[0]) / 2}px, ${(from[1] + to[1]) / 2 - 6}px) scale(var(--legible)) translate(-50%, -100%)` }}>
+    <div
+      className="wire-tools nodrag nopan"
+      role="toolbar"
+      aria-label={`Wire from ${ref}`}
+      style={{
+        transform: `translate(${(from[0] + to[0]) / 2}px, ${(from[1] + to[1]) / 2 - 6}px) scale(var(--legible)) translate(-50%, -100%)`,
+      }}
+    >
       <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal: it gets a scope of its own'}>
-        <ActionIcon size="sm" variant={isLogged ? 'light' : 'subtle'} color={isLogged ? 'accent' : 'gray'} aria-label={isLogged ? 'Stop logging' : 'Log'} aria-pressed={isLogged} onClick={() => void change({ kind: 'log', port: ref, logged: !isLogged })}>
+        <ActionIcon
+          size="sm"
+          variant={isLogged ? 'light' : 'subtle'}
+          color={isLogged ? 'accent' : 'gray'}
+          aria-label={isLogged ? 'Stop logging' : 'Log'}
+          aria-pressed={isLogged}
+          onClick={() => void change({ kind: 'log', port: ref, logged: !isLogged })}
+        >
           <IconAntennaBars5 size={15} />
         </ActionIcon>
       </Tooltip>
@@ -150,7 +204,18 @@ function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level:
       </Tooltip>
       {edge.data?.bent && (
         <Tooltip label="Let the wire find its own way again">
-          <ActionIcon size="sm" variant="subtle" color="gray" aria-label="Reset the route" onClick={() => void change({ kind: 'bend', wires: [{ source: ref, target: `${edge.target}/${edge.targetHandle}` }] })}>
+          <ActionIcon
+            size="sm"
+            variant="subtle"
+            color="gray"
+            aria-label="Reset the route"
+            onClick={() =>
+              void change({
+                kind: 'bend',
+                wires: [{ source: ref, target: `${edge.target}/${edge.targetHandle}` }],
+              })
+            }
+          >
             <IconRoute size={15} />
           </ActionIcon>
         </Tooltip>
@@ -159,4 +224,5 @@ function WireTools({ edge, level, logged, pinned }: { edge: WireEdgeType; level:
   )
 }
 
-const length = (path: Point[], k: number) => (path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0)
+const length = (path: Point[], k: number) =>
+  path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0

@@ -13,7 +13,17 @@ import { XyPlot } from './xy_plot'
 const SHORT = 8
 
 /** A plot with its title, its legend (a click hides a trace), its exports, and the measures beside it. */
-export function Chart({ title, traces, path = false, band }: { title: string; traces: Trace[]; path?: boolean; band?: number }) {
+export function Chart({
+  title,
+  traces,
+  path = false,
+  band,
+}: {
+  title: string
+  traces: Trace[]
+  path?: boolean
+  band?: number
+}) {
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
   const [values, setValues] = useState<Values | null>(null)
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
@@ -35,34 +45,78 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
           {!path && stem && <span className="stem">{stem}</span>}
           {!path &&
             traces.map(({ key, label, tone, dash }, k) => (
-              <button key={key} type="button" className={names[k]!.length > SHORT ? 'long' : undefined} aria-label={label} aria-pressed={!hidden.has(key)} title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`} onClick={() => toggle(key)}>
+              <button
+                key={key}
+                type="button"
+                className={names[k]!.length > SHORT ? 'long' : undefined}
+                aria-label={label}
+                aria-pressed={!hidden.has(key)}
+                title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`}
+                onClick={() => toggle(key)}
+              >
                 <svg width="16" height="4" aria-hidden>
-                  <line x1="0" x2="16" y1="2" y2="2" stroke={`var(--${tone})`} strokeWidth="2.5" strokeDasharray={dash.join(' ')} />
+                  <line
+                    x1="0"
+                    x2="16"
+                    y1="2"
+                    y2="2"
+                    stroke={`var(--${tone})`}
+                    strokeWidth="2.5"
+                    strokeDasharray={dash.join(' ')}
+                  />
                 </svg>
                 <span>{names[k]}</span>
               </button>
             ))}
         </span>
         {values && (
-          <ActionIcon className="all-values" variant="light" color="accent" size="xs" aria-label={`Show all values of ${title}`} title="Show all values" onClick={() => setValues(null)}>
+          <ActionIcon
+            className="all-values"
+            variant="light"
+            color="accent"
+            size="xs"
+            aria-label={`Show all values of ${title}`}
+            title="Show all values"
+            onClick={() => setValues(null)}
+          >
             <IconArrowsVertical size={13} />
           </ActionIcon>
         )}
         <Menu position="bottom-end" shadow="md">
           <Menu.Target>
-            <ActionIcon className="more" variant="subtle" color="gray" size="xs" aria-label={`Export ${title}`}>
+            <ActionIcon
+              className="more"
+              variant="subtle"
+              color="gray"
+              size="xs"
+              aria-label={`Export ${title}`}
+            >
               <IconDownload size={13} />
             </ActionIcon>
           </Menu.Target>
           <Menu.Dropdown>
-            <Menu.Item onClick={() => saveCsv(title, traces)}>{stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV'}</Menu.Item>
+            <Menu.Item onClick={() => saveCsv(title, traces)}>
+              {stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV'}
+            </Menu.Item>
             <Menu.Item onClick={() => figure() && void savePng(figure()!)}>Picture as PNG</Menu.Item>
             <Menu.Item onClick={() => figure() && saveSvg(figure()!)}>Picture as SVG</Menu.Item>
           </Menu.Dropdown>
         </Menu>
       </figcaption>
       <div className="with-measures">
-        {path ? <XyPlot traces={traces} title={title} handle={handle} /> : <Plot traces={traces} hidden={hidden} title={title} handle={handle} values={values} onValues={setValues} {...(band === undefined ? {} : { band })} />}
+        {path ? (
+          <XyPlot traces={traces} title={title} handle={handle} />
+        ) : (
+          <Plot
+            traces={traces}
+            hidden={hidden}
+            title={title}
+            handle={handle}
+            values={values}
+            onValues={setValues}
+            {...(band === undefined ? {} : { band })}
+          />
+        )}
         {measured && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
       </div>
     </figure>
@@ -72,6 +126,7 @@ export function Chart({ title, traces, path = false, band }: { title: string; tr
 /** The elements of one signal by their numbers alone, after the name of the signal. */
 function shortened(labels: string[]): { stem: string; names: string[] } {
   const stem = labels[0]?.match(/^(.*) 1$/)?.[1]
-  if (!stem || labels.length < 2 || !labels.every((label, k) => label === `${stem} ${k + 1}`)) return { stem: '', names: labels }
+  if (!stem || labels.length < 2 || !labels.every((label, k) => label === `${stem} ${k + 1}`))
+    return { stem: '', names: labels }
   return { stem, names: labels.map((_, k) => String(k + 1)) }
 }

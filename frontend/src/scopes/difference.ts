@@ -17,7 +17,12 @@ const MOST_KNOWN = 256
  * `compared - baseline` at the baseline's instants, where both have values. Between two samples of the other run
  * the straight line counts.
  */
-export function difference(baseline: RunSamples, compared: RunSamples, path: string, element: number): Difference | undefined {
+export function difference(
+  baseline: RunSamples,
+  compared: RunSamples,
+  path: string,
+  element: number,
+): Difference | undefined {
   const key = `${baseline.version} ${compared.version} ${path} ${element}`
   const before = known.get(key)
   if (before) return before
@@ -53,7 +58,11 @@ function between(a: Signal, b: Signal, element: number): Difference {
 }
 
 /** Of all elements of a signal, the one that is farthest apart. */
-export function farthest(baseline: RunSamples, compared: RunSamples, path: string): { largest: number; at: number } | undefined {
+export function farthest(
+  baseline: RunSamples,
+  compared: RunSamples,
+  path: string,
+): { largest: number; at: number } | undefined {
   const found = baseline.signal(path)
   let worst: { largest: number; at: number } | undefined
   found?.columns.forEach((_, element) => {

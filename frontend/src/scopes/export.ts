@@ -34,13 +34,15 @@ export function csvOf(traces: Trace[]): string {
   for (const { label, unit, read } of traces) {
     const found = read()
     if (!found) continue
-    if (!last || last.length !== found.time.length || last.buffer !== found.time.buffer) columns.push({ name: 'time [s]', values: found.time })
+    if (!last || last.length !== found.time.length || last.buffer !== found.time.buffer)
+      columns.push({ name: 'time [s]', values: found.time })
     last = found.time
     columns.push({ name: unit ? `${label} [${unit}]` : label, values: found.values })
   }
   const rows = Math.max(0, ...columns.map(({ values }) => values.length))
   const lines = [columns.map(({ name }) => quoted(name)).join(',')]
-  for (let row = 0; row < rows; row++) lines.push(columns.map(({ values }) => (row < values.length ? String(values[row]) : '')).join(','))
+  for (let row = 0; row < rows; row++)
+    lines.push(columns.map(({ values }) => (row < values.length ? String(values[row]) : '')).join(','))
   return `${lines.join('\n')}\n`
 }
 

@@ -15,14 +15,28 @@ export interface Figure {
   y: Axis
   /** One unit is as long both ways. */
   equal?: boolean
-  lines: { tone: string; dash: number[]; label: string; x: ArrayLike<number>; y: ArrayLike<number | null | undefined> }[]
+  lines: {
+    tone: string
+    dash: number[]
+    label: string
+    x: ArrayLike<number>
+    y: ArrayLike<number | null | undefined>
+  }[]
   /** Where the run stands, on a path. */
   mark?: [x: number, y: number] | undefined
 }
 
 interface Pen {
   line: (points: [number, number][], tone: string, width: number, dash: number[]) => void
-  text: (x: number, y: number, text: string, tone: string, anchor: 'start' | 'middle' | 'end', bold?: boolean, upright?: boolean) => void
+  text: (
+    x: number,
+    y: number,
+    text: string,
+    tone: string,
+    anchor: 'start' | 'middle' | 'end',
+    bold?: boolean,
+    upright?: boolean,
+  ) => void
   disc: (x: number, y: number, radius: number, tone: string) => void
   inside: (box: Box, paint: () => void) => void
 }
@@ -67,7 +81,12 @@ export function aired(min: number, max: number): [number, number] {
 function draw(figure: Figure, pen: Pen): void {
   const { width, height, x, y } = figure
   const legend = figure.lines.length > 1 || figure.title
-  const box: Box = { left: 58, top: legend ? 30 : 10, width: width - 58 - 12, height: height - (legend ? 30 : 10) - 40 }
+  const box: Box = {
+    left: 58,
+    top: legend ? 30 : 10,
+    width: width - 58 - 12,
+    height: height - (legend ? 30 : 10) - 40,
+  }
   let [x0, x1, y0, y1] = [x.min, x.max, y.min, y.max]
   if (figure.equal) {
     const scale = Math.max((x1 - x0) / box.width, (y1 - y0) / box.height)
@@ -80,11 +99,27 @@ function draw(figure: Figure, pen: Pen): void {
   const up = ticks(y0, y1, Math.max(2, Math.floor(box.height / 36)))
   const bottom = box.top + box.height
   for (const value of across) {
-    pen.line([[atX(value), box.top], [atX(value), bottom]], 'grid', 1, [])
+    pen.line(
+      [
+        [atX(value), box.top],
+        [atX(value), bottom],
+      ],
+      'grid',
+      1,
+      [],
+    )
     pen.text(atX(value), bottom + 15, tickText(value, across[1]! - across[0]! || 1), 'muted', 'middle')
   }
   for (const value of up) {
-    pen.line([[box.left, atY(value)], [box.left + box.width, atY(value)]], 'grid', 1, [])
+    pen.line(
+      [
+        [box.left, atY(value)],
+        [box.left + box.width, atY(value)],
+      ],
+      'grid',
+      1,
+      [],
+    )
     pen.text(box.left - 6, atY(value) + 4, tickText(value, up[1]! - up[0]! || 1), 'muted', 'end')
   }
   pen.text(box.left + box.width / 2, bottom + 32, x.label, 'muted', 'middle')
@@ -105,13 +140,22 @@ function draw(figure: Figure, pen: Pen): void {
   let at = box.left + 8.0 * figure.title.length + 18
   for (const { label, tone, dash } of figure.lines) {
     if (figure.lines.length < 2 || at + 24 + 6.4 * label.length > width) break
-    pen.line([[at, 13], [at + 16, 13]], tone, 2.5, dash)
+    pen.line(
+      [
+        [at, 13],
+        [at + 16, 13],
+      ],
+      tone,
+      2.5,
+      dash,
+    )
     pen.text(at + 21, 17, label, 'muted', 'start')
     at += 34 + 6.4 * label.length
   }
 }
 
-const colour = (tone: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${tone}`).trim()
+const colour = (tone: string) =>
+  getComputedStyle(document.documentElement).getPropertyValue(`--${tone}`).trim()
 const fontOf = () => colour('font') || 'sans-serif'
 
 /** Paint a figure; the canvas's own size is given by the caller, in device pixels. */
@@ -167,15 +211,21 @@ export function svgOf(figure: Figure): string {
     line: (points, tone, width, dash) => {
       const d = points.map(([x, y], k) => `${k ? 'L' : 'M'}${x.toFixed(2)} ${y.toFixed(2)}`).join('')
       const dashed = dash.length ? ` stroke-dasharray="${dash.join(' ')}"` : ''
-      if (points.length) parts.push(`<path d="${d}" fill="none" stroke="${colour(tone)}" stroke-width="${width}" stroke-linejoin="round"${dashed}/>`)
+      if (points.length)
+        parts.push(
+          `<path d="${d}" fill="none" stroke="${colour(tone)}" stroke-width="${width}" stroke-linejoin="round"${dashed}/>`,
+        )
     },
     text: (x, y, text, tone, anchor, bold, upright) =>
       parts.push(
         `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="${colour(tone)}" text-anchor="${anchor}" font-size="${bold ? FONT + 1 : FONT}"${bold ? ' font-weight="600"' : ''}${upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''}>${escaped(text)}</text>`,
       ),
-    disc: (x, y, radius, tone) => parts.push(`<circle cx="${x.toFixed(2)}" cy="${y.toFixed(2)}" r="${radius}" fill="${colour(tone)}"/>`),
+    disc: (x, y, radius, tone) =>
+      parts.push(`<circle cx="${x.toFixed(2)}" cy="${y.toFixed(2)}" r="${radius}" fill="${colour(tone)}"/>`),
     inside: ({ left, top, width, height }, within) => {
-      parts.push(`<clipPath id="field"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath><g clip-path="url(#field)">`)
+      parts.push(
+        `<clipPath id="field"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath><g clip-path="url(#field)">`,
+      )
       within()
       parts.push('</g>')
     },

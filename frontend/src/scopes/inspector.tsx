@@ -23,7 +23,15 @@ interface Inspector {
   tolerance: number
 }
 
-export const useInspector = create<Inspector>(() => ({ signals: new Set(), hidden: new Set(), search: '', comparing: false, baseline: '', compared: '', tolerance: 1e-6 }))
+export const useInspector = create<Inspector>(() => ({
+  signals: new Set(),
+  hidden: new Set(),
+  search: '',
+  comparing: false,
+  baseline: '',
+  compared: '',
+  tolerance: 1e-6,
+}))
 
 function toggled(set: ReadonlySet<string>, key: string): Set<string> {
   const next = new Set(set)
@@ -36,7 +44,12 @@ export function SignalInspector() {
   const document = useStudio((s) => s.document?.state.document)
   const all = useRuns((s) => s.runs)
   const runs = useMemo(() => all.filter((run) => run.document === document), [all, document])
-  if (!runs.length) return <p className="empty">Every run is kept here, to be looked at and compared. Run the model (Ctrl+Enter).</p>
+  if (!runs.length)
+    return (
+      <p className="empty">
+        Every run is kept here, to be looked at and compared. Run the model (Ctrl+Enter).
+      </p>
+    )
   return (
     <div className="signal-inspector">
       <PlotTools />
@@ -51,7 +64,11 @@ export function SignalInspector() {
 function changesOf({ tried, tunings }: KeptRun): string[] {
   return [
     ...Object.entries(tried).map(([parameter, value]) => `${parameter} = ${valueText(value)}`),
-    ...tunings.slice(-3).map(({ parameter, value, time }) => `${parameter} = ${valueText(value)} from ${time.toPrecision(3)} s`),
+    ...tunings
+      .slice(-3)
+      .map(
+        ({ parameter, value, time }) => `${parameter} = ${valueText(value)} from ${time.toPrecision(3)} s`,
+      ),
   ]
 }
 
@@ -64,12 +81,24 @@ function RunList({ runs }: { runs: KeptRun[] }) {
     <div className="run-list" role="group" aria-label="Runs">
       <header>
         Runs
-        {runs.length > 1 && <Switch size="xs" label="Difference" checked={comparing} onChange={() => useInspector.setState((s) => ({ comparing: !s.comparing }))} />}
+        {runs.length > 1 && (
+          <Switch
+            size="xs"
+            label="Difference"
+            checked={comparing}
+            onChange={() => useInspector.setState((s) => ({ comparing: !s.comparing }))}
+          />
+        )}
       </header>
       {comparing && runs.length > 1 && <Comparison runs={runs} />}
       {[...runs].reverse().map((run) => (
         <div key={run.key} className="kept-run">
-          <Checkbox size="xs" aria-label={`Show ${run.name}`} checked={!hidden.has(run.key)} onChange={() => useInspector.setState((s) => ({ hidden: toggled(s.hidden, run.key) }))} />
+          <Checkbox
+            size="xs"
+            aria-label={`Show ${run.name}`}
+            checked={!hidden.has(run.key)}
+            onChange={() => useInspector.setState((s) => ({ hidden: toggled(s.hidden, run.key) }))}
+          />
           <div className="about">
             <RunName run={run} onName={(name) => rename(run.key, name)} />
             <small>
@@ -83,7 +112,13 @@ function RunList({ runs }: { runs: KeptRun[] }) {
           </div>
           {run.key !== shown && (
             <Tooltip label="Forget this run">
-              <ActionIcon size="xs" variant="subtle" color="gray" aria-label={`Forget ${run.name}`} onClick={() => remove(run.key)}>
+              <ActionIcon
+                size="xs"
+                variant="subtle"
+                color="gray"
+                aria-label={`Forget ${run.name}`}
+                onClick={() => remove(run.key)}
+              >
                 <IconTrash size={13} />
               </ActionIcon>
             </Tooltip>
@@ -123,8 +158,20 @@ function Comparison({ runs }: { runs: KeptRun[] }) {
   const wrong = !(Number(typed) >= 0) || !typed.trim()
   return (
     <div className="comparison">
-      <NativeSelect size="xs" label="Baseline" data={data} value={a.key} onChange={(event) => useInspector.setState({ baseline: event.currentTarget.value })} />
-      <NativeSelect size="xs" label="Compared" data={data} value={b.key} onChange={(event) => useInspector.setState({ compared: event.currentTarget.value })} />
+      <NativeSelect
+        size="xs"
+        label="Baseline"
+        data={data}
+        value={a.key}
+        onChange={(event) => useInspector.setState({ baseline: event.currentTarget.value })}
+      />
+      <NativeSelect
+        size="xs"
+        label="Compared"
+        data={data}
+        value={b.key}
+        onChange={(event) => useInspector.setState({ compared: event.currentTarget.value })}
+      />
       <TextInput
         size="xs"
         label="Tolerance"
@@ -148,18 +195,35 @@ function SignalList({ runs }: { runs: KeptRun[] }) {
   const [a, b] = comparing && runs.length > 1 ? pair(runs, baseline, compared) : []
   return (
     <div className="signal-list">
-      <TextInput size="xs" aria-label="Search the signals" placeholder="Search signals" leftSection={<IconSearch size={13} />} value={search} onChange={(event) => useInspector.setState({ search: event.currentTarget.value })} />
+      <TextInput
+        size="xs"
+        aria-label="Search the signals"
+        placeholder="Search signals"
+        leftSection={<IconSearch size={13} />}
+        value={search}
+        onChange={(event) => useInspector.setState({ search: event.currentTarget.value })}
+      />
       <div className="signals" role="group" aria-label="Signals">
         {found.map((name) => {
           const apart = a && b && farthest(a.samples, b.samples, name)
           const unit = a?.samples.signal(name)?.channel.unit ?? ''
           return (
-            <label key={name} title={apart && `greatest difference ${spoken(apart.largest, unit)} at ${spoken(apart.at, 's')}`}>
-              <input type="checkbox" checked={signals.has(name)} onChange={() => useInspector.setState((s) => ({ signals: toggled(s.signals, name) }))} />
+            <label
+              key={name}
+              title={
+                apart && `greatest difference ${spoken(apart.largest, unit)} at ${spoken(apart.at, 's')}`
+              }
+            >
+              <input
+                type="checkbox"
+                checked={signals.has(name)}
+                onChange={() => useInspector.setState((s) => ({ signals: toggled(s.signals, name) }))}
+              />
               <span className="signal-name">{runs.at(-1)!.samples.title(name)}</span>
               {apart && (
                 <span className={apart.largest <= tolerance ? 'apart numbers' : 'apart beyond numbers'}>
-                  {apart.largest <= tolerance ? '✓' : '✗'} {spoken(apart.largest, unit, 3)} at {spoken(apart.at, 's', 3)}
+                  {apart.largest <= tolerance ? '✓' : '✗'} {spoken(apart.largest, unit, 3)} at{' '}
+                  {spoken(apart.at, 's', 3)}
                 </span>
               )}
             </label>
@@ -186,7 +250,12 @@ function InspectorPlot({ runs }: { runs: KeptRun[] }) {
       return tracesOf(a.samples, paths).map((trace) => {
         const at = trace.key.lastIndexOf(' ')
         const [path, element] = [trace.key.slice(0, at), Number(trace.key.slice(at + 1))]
-        return { ...trace, key: `${a.key} ${b.key} ${trace.key}`, label: `Δ ${trace.label}`, read: () => difference(a.samples, b.samples, path, element) }
+        return {
+          ...trace,
+          key: `${a.key} ${b.key} ${trace.key}`,
+          label: `Δ ${trace.label}`,
+          read: () => difference(a.samples, b.samples, path, element),
+        }
       })
     }
     const shown = runs.filter(({ key }) => !hidden.has(key))
@@ -206,7 +275,11 @@ function InspectorPlot({ runs }: { runs: KeptRun[] }) {
   if (!signals.size) return <p className="empty">Tick the signals to be shown.</p>
   return (
     <div className="scopes">
-      <Chart title={comparing ? 'Difference' : 'Signals'} traces={traces} {...(comparing ? { band: tolerance } : {})} />
+      <Chart
+        title={comparing ? 'Difference' : 'Signals'}
+        traces={traces}
+        {...(comparing ? { band: tolerance } : {})}
+      />
     </div>
   )
 }

@@ -40,7 +40,9 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
   const measuring = useWindow((s) => s.measuring)
   const [from, to] = shownWindow()
   const now = shownTime()
-  const read = traces.map((trace) => ({ trace, data: trace.read() })).flatMap(({ trace, data }) => (data ? [{ trace, data }] : []))
+  const read = traces
+    .map((trace) => ({ trace, data: trace.read() }))
+    .flatMap(({ trace, data }) => (data ? [{ trace, data }] : []))
   return (
     <div className="measures" tabIndex={0} role="region" aria-label="Measures">
       {cursors && (
@@ -48,14 +50,24 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
           <span>A {spoken(cursors[0], 's', 5)}</span>
           <span>B {spoken(cursors[1], 's', 5)}</span>
           <span>Δt {spoken(cursors[1] - cursors[0], 's', 5)}</span>
-          {cursors[1] !== cursors[0] && <span>1/Δt {spoken(1 / Math.abs(cursors[1] - cursors[0]), 'Hz', 5)}</span>}
+          {cursors[1] !== cursors[0] && (
+            <span>1/Δt {spoken(1 / Math.abs(cursors[1] - cursors[0]), 'Hz', 5)}</span>
+          )}
         </p>
       )}
       <table className="numbers">
         <thead>
           <tr>
             <th scope="col">signal</th>
-            {cursors ? ['A', 'B', 'Δ'].map((head) => <th key={head} scope="col">{head}</th>) : <th scope="col">at {digits(now, 4)} s</th>}
+            {cursors ? (
+              ['A', 'B', 'Δ'].map((head) => (
+                <th key={head} scope="col">
+                  {head}
+                </th>
+              ))
+            ) : (
+              <th scope="col">at {digits(now, 4)} s</th>
+            )}
             {measuring &&
               ROWS.map(([name, head, title]) => (
                 <th key={name} scope="col" title={title}>
@@ -67,8 +79,15 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
         <tbody>
           {read.map(({ trace, data }) => {
             const found = measuring ? measures(data, from, to) : undefined
-            const [a, b] = cursors ? [valueAt(data, cursors[0]), valueAt(data, cursors[1])] : [valueAt(data, Math.min(now, data.time.at(-1) ?? 0)), NaN]
-            const largest = Math.max(...[a, b, found?.least, found?.greatest].filter((v) => v !== undefined && Number.isFinite(v)).map((v) => Math.abs(v!)), 0)
+            const [a, b] = cursors
+              ? [valueAt(data, cursors[0]), valueAt(data, cursors[1])]
+              : [valueAt(data, Math.min(now, data.time.at(-1) ?? 0)), NaN]
+            const largest = Math.max(
+              ...[a, b, found?.least, found?.greatest]
+                .filter((v) => v !== undefined && Number.isFinite(v))
+                .map((v) => Math.abs(v!)),
+              0,
+            )
             const { factor, unit } = reading(trace.unit, largest)
             return (
               <tr key={trace.key}>
@@ -83,7 +102,15 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
                 {found &&
                   ROWS.map(([name]) => (
                     <td key={name}>
-                      {name === 'riseTime' ? (Number.isNaN(found.riseTime) ? '–' : spoken(found.riseTime, 's')) : name === 'overshoot' ? (Number.isNaN(found.overshoot) ? '–' : `${digits(100 * found.overshoot, 3)} %`) : digits(found[name] * factor)}
+                      {name === 'riseTime'
+                        ? Number.isNaN(found.riseTime)
+                          ? '–'
+                          : spoken(found.riseTime, 's')
+                        : name === 'overshoot'
+                          ? Number.isNaN(found.overshoot)
+                            ? '–'
+                            : `${digits(100 * found.overshoot, 3)} %`
+                          : digits(found[name] * factor)}
                     </td>
                   ))}
               </tr>

@@ -21,10 +21,22 @@ const SETTLED_BAND = 0.02
  * Measures of the straight lines between the samples, from one instant to another. Mean and RMS weigh by time, so
  * that uneven samples do not shift them: over a stretch the integral of y² is dt (a² + ab + b²) / 3.
  */
-export function measures(trace: { time: Float64Array; values: Float64Array }, from: number, to: number): Measures {
+export function measures(
+  trace: { time: Float64Array; values: Float64Array },
+  from: number,
+  to: number,
+): Measures {
   const { time, values } = cut(trace, from, to)
   const count = time.length
-  const nothing = { least: NaN, greatest: NaN, mean: NaN, rms: NaN, peakToPeak: NaN, riseTime: NaN, overshoot: NaN }
+  const nothing = {
+    least: NaN,
+    greatest: NaN,
+    mean: NaN,
+    rms: NaN,
+    peakToPeak: NaN,
+    riseTime: NaN,
+    overshoot: NaN,
+  }
   if (!count) return nothing
   let least = values[0]!
   let greatest = values[0]!
@@ -51,17 +63,27 @@ export function measures(trace: { time: Float64Array; values: Float64Array }, fr
 }
 
 /** Rise time and overshoot, where the trace ends settled elsewhere than it began. */
-function step(time: Float64Array, values: Float64Array, least: number, greatest: number): { riseTime: number; overshoot: number } {
+function step(
+  time: Float64Array,
+  values: Float64Array,
+  least: number,
+  greatest: number,
+): { riseTime: number; overshoot: number } {
   const count = values.length
   const first = values[0]!
   const last = values[count - 1]!
   const way = last - first
   const band = SETTLED_BAND * Math.abs(way)
   const late = time[count - 1]! - SETTLED_PART * (time[count - 1]! - time[0]!)
-  for (let k = count - 1; k >= 0 && time[k]! >= late; k--) if (!(Math.abs(values[k]! - last) <= band)) return { riseTime: NaN, overshoot: NaN }
-  if (!(Math.abs(way) > 1e-9 * Math.max(Math.abs(first), Math.abs(last))) || way === 0) return { riseTime: NaN, overshoot: NaN }
+  for (let k = count - 1; k >= 0 && time[k]! >= late; k--)
+    if (!(Math.abs(values[k]! - last) <= band)) return { riseTime: NaN, overshoot: NaN }
+  if (!(Math.abs(way) > 1e-9 * Math.max(Math.abs(first), Math.abs(last))) || way === 0)
+    return { riseTime: NaN, overshoot: NaN }
   const peak = way > 0 ? greatest - last : last - least
-  return { riseTime: crossing(time, values, first + 0.9 * way, way) - crossing(time, values, first + 0.1 * way, way), overshoot: peak / Math.abs(way) }
+  return {
+    riseTime: crossing(time, values, first + 0.9 * way, way) - crossing(time, values, first + 0.1 * way, way),
+    overshoot: peak / Math.abs(way),
+  }
 }
 
 /** When the trace first reaches a level, going the way it goes as a whole. */
@@ -69,7 +91,8 @@ function crossing(time: Float64Array, values: Float64Array, level: number, way: 
   for (let k = 1; k < values.length; k++) {
     const a = values[k - 1]!
     const b = values[k]!
-    if (way > 0 ? a < level && b >= level : a > level && b <= level) return time[k - 1]! + ((level - a) / (b - a)) * (time[k]! - time[k - 1]!)
+    if (way > 0 ? a < level && b >= level : a > level && b <= level)
+      return time[k - 1]! + ((level - a) / (b - a)) * (time[k]! - time[k - 1]!)
   }
   return NaN
 }

@@ -21,7 +21,8 @@ const CLICK_PX = 3
 const DENSE = 3
 /** While a run goes on, the part of its range that a vertical axis grows by beyond what is needed. */
 const ROOM = 0.15
-const colour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()
+const colour = (name: string) =>
+  getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()
 
 /** What a plot shows now, for those beside it: measures and exports. */
 export interface PlotHandle {
@@ -47,7 +48,9 @@ function axisReading(traces: Trace[], drawn: Drawn): Reading {
   const [first, ...others] = traces
   if (!first || others.some(({ unit }) => unit !== first.unit)) return { factor: 1, unit: '' }
   let largest = 0
-  for (const column of drawn.slice(1)) for (const value of column) if (typeof value === 'number' && Math.abs(value) > largest) largest = Math.abs(value)
+  for (const column of drawn.slice(1))
+    for (const value of column)
+      if (typeof value === 'number' && Math.abs(value) > largest) largest = Math.abs(value)
   return reading(first.unit, largest)
 }
 
@@ -59,7 +62,13 @@ interface ToDraw {
 }
 
 /** What there is to draw in a window: raw samples while few, else the extremes of each pixel. */
-function drawnOf(traces: Trace[], from: number, to: number, width: number, before: Extremes | undefined): ToDraw {
+function drawnOf(
+  traces: Trace[],
+  from: number,
+  to: number,
+  width: number,
+  before: Extremes | undefined,
+): ToDraw {
   const found = traces.map(({ read }) => read() ?? { time: new Float64Array(0), values: new Float64Array(0) })
   const parts = found.map((one) => within(one, from, to))
   if (parts.some(({ time }) => time.length > DENSE * width)) {
@@ -68,15 +77,36 @@ function drawnOf(traces: Trace[], from: number, to: number, width: number, befor
   }
   const [first, ...others] = parts
   if (!first) return { drawn: [new Float64Array(0)] }
-  if (others.every(({ time }) => time.buffer === first.time.buffer && time.length === first.time.length && time.byteOffset === first.time.byteOffset))
-    return { drawn: [first.time, ...parts.map(({ values }) => values)], ends: parts.map(({ time }) => time.length) }
-  return { drawn: uPlot.join(parts.map(({ time, values }) => [time, values] as uPlot.AlignedData)) as unknown as Drawn }
+  if (
+    others.every(
+      ({ time }) =>
+        time.buffer === first.time.buffer &&
+        time.length === first.time.length &&
+        time.byteOffset === first.time.byteOffset,
+    )
+  )
+    return {
+      drawn: [first.time, ...parts.map(({ values }) => values)],
+      ends: parts.map(({ time }) => time.length),
+    }
+  return {
+    drawn: uPlot.join(
+      parts.map(({ time, values }) => [time, values] as uPlot.AlignedData),
+    ) as unknown as Drawn,
+  }
 }
 
 function scaled(drawn: Drawn, factor: number): Drawn {
   if (factor === 1) return drawn
   const [time, ...columns] = drawn
-  return [time, ...columns.map((column) => (column instanceof Float64Array ? column.map((v) => v * factor) : column.map((v) => (typeof v === 'number' ? v * factor : v))))]
+  return [
+    time,
+    ...columns.map((column) =>
+      column instanceof Float64Array
+        ? column.map((v) => v * factor)
+        : column.map((v) => (typeof v === 'number' ? v * factor : v)),
+    ),
+  ]
 }
 
 /** Traces over time. All such plots share zoom, measuring cursors and the instant that is shown. */
@@ -93,19 +123,55 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
     let unit = ''
     let factor = 1
     let drawn: Drawn = [new Float64Array(0)]
-    const axis = { stroke: colour('muted'), grid: { stroke: colour('grid'), width: 1 }, ticks: { stroke: colour('grid'), width: 1 }, font: FONT, labelFont: FONT, labelSize: 16, labelGap: 0 }
+    const axis = {
+      stroke: colour('muted'),
+      grid: { stroke: colour('grid'), width: 1 },
+      ticks: { stroke: colour('grid'), width: 1 },
+      font: FONT,
+      labelFont: FONT,
+      labelSize: 16,
+      labelGap: 0,
+    }
     const plot = new uPlot(
       {
         width: Math.max(element.clientWidth, 60),
         height: Math.max(element.clientHeight, 60),
         legend: { show: false },
-        cursor: { points: { show: false }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => (useWindow.setState({ range: null }), null), mousedown: (u, _, handler) => (event) => (gripOf(u, event) !== null || event.button || event.shiftKey ? null : handler(event)) } },
+        cursor: {
+          points: { show: false },
+          drag: { x: true, y: false, setScale: false },
+          bind: {
+            dblclick: () => () => (useWindow.setState({ range: null }), null),
+            mousedown: (u, _, handler) => (event) =>
+              gripOf(u, event) !== null || event.button || event.shiftKey ? null : handler(event),
+          },
+        },
         scales: { x: { time: false, auto: false }, y: { auto: false } },
         axes: [
-          { ...axis, size: 32, label: 'time, s', values: (_, splits) => splits.map((value) => tick(value, splits)) },
-          { ...axis, size: 54, label: () => unit, values: (_, splits) => splits.map((value) => tick(value, splits)) },
+          {
+            ...axis,
+            size: 32,
+            label: 'time, s',
+            values: (_, splits) => splits.map((value) => tick(value, splits)),
+          },
+          {
+            ...axis,
+            size: 54,
+            label: () => unit,
+            values: (_, splits) => splits.map((value) => tick(value, splits)),
+          },
         ],
-        series: [{}, ...shown.map(({ label, tone, dash }) => ({ label, stroke: colour(tone), width: 1.5, dash, spanGaps: true, points: { show: false } }))],
+        series: [
+          {},
+          ...shown.map(({ label, tone, dash }) => ({
+            label,
+            stroke: colour(tone),
+            width: 1.5,
+            dash,
+            spanGaps: true,
+            points: { show: false },
+          })),
+        ],
         hooks: {
           drawClear: [(u) => band !== undefined && drawBand(u, band)],
           draw: [(u) => drawLines(u)],
@@ -121,7 +187,10 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       [[], ...shown.map(() => [])] as uPlot.AlignedData,
       element,
     )
-    const leave = [listen(plot), listenAtValues(plot, (next) => held.current.onValues(next && [next[0] / factor, next[1] / factor]))]
+    const leave = [
+      listen(plot),
+      listenAtValues(plot, (next) => held.current.onValues(next && [next[0] / factor, next[1] / factor])),
+    ]
     const growing = new Growing(
       plot,
       shown.map(({ tone, dash }) => ({ colour: colour(tone), dash })),
@@ -159,9 +228,12 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       seen = version
       const found = axisReading(shown, drawn)
       const wanted = held.current.values
-      const needed: [number, number] = wanted ? [wanted[0] * found.factor, wanted[1] * found.factor] : rangeOf(drawn, found.factor, from, to)
+      const needed: [number, number] = wanted
+        ? [wanted[0] * found.factor, wanted[1] * found.factor]
+        : rangeOf(drawn, found.factor, from, to)
       const fits = live && same && needed[0] >= range[0] && needed[1] <= range[1]
-      const grown = fits && marks === lines && found.factor === factor && Boolean(made.extremes) === Boolean(before)
+      const grown =
+        fits && marks === lines && found.factor === factor && Boolean(made.extremes) === Boolean(before)
       if (grown && made.ends) {
         growing.grow(drawn, factor, made.ends)
         return
@@ -209,7 +281,14 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
     // eslint-disable-next-line react-hooks/exhaustive-deps
   }, [identity, scheme, title, band])
   useEffect(changed, [values])
-  return <div ref={box} className="plot" role="img" aria-label={`${title}: ${shown.map(({ label }) => label).join(', ')}`} />
+  return (
+    <div
+      ref={box}
+      className="plot"
+      role="img"
+      aria-label={`${title}: ${shown.map(({ label }) => label).join(', ')}`}
+    />
+  )
 }
 
 function tick(value: number, splits: number[]): string {
@@ -278,7 +357,8 @@ function listen(plot: uPlot): () => void {
     const up = (ended: PointerEvent) => {
       removeEventListener('pointermove', move)
       removeEventListener('pointerup', up)
-      if (grip === null && !panning && Math.abs(ended.clientX - from) < CLICK_PX) useCursor.setState({ time: Math.max(timeOf(ended), 0), playing: false })
+      if (grip === null && !panning && Math.abs(ended.clientX - from) < CLICK_PX)
+        useCursor.setState({ time: Math.max(timeOf(ended), 0), playing: false })
     }
     if (panning || grip !== null) event.preventDefault()
     addEventListener('pointermove', move)
@@ -306,7 +386,8 @@ function listenAtValues(plot: uPlot, show: (values: Values | null) => void): () 
   axis.classList.add('values-axis')
   axis.title = 'Wheel: zoom the values. Drag: move them. Double click: show all.'
   const seen = (): Values => [plot.scales['y']?.min ?? 0, plot.scales['y']?.max ?? 1]
-  const valueOf = (event: MouseEvent) => plot.posToVal(event.clientY - plot.over.getBoundingClientRect().top, 'y')
+  const valueOf = (event: MouseEvent) =>
+    plot.posToVal(event.clientY - plot.over.getBoundingClientRect().top, 'y')
   const wheel = (event: WheelEvent) => {
     event.preventDefault()
     const by = event.deltaY > 0 ? ZOOM : 1 / ZOOM

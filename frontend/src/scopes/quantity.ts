@@ -36,7 +36,8 @@ export function reading(unit: string, largest: number, radians = useUnits.getSta
   }
   const spelled = spell(unit)
   // Prefixes go to plain units only: 1 kkg, 1 m m/s and 1 mrad would puzzle.
-  if (!spelled || !(largest > 0) || !/^(m|N|s|A|V|W|J|N m|Hz|Pa|H|F)\b/.test(spelled)) return { factor: 1, unit: spelled }
+  if (!spelled || !(largest > 0) || !/^(m|N|s|A|V|W|J|N m|Hz|Pa|H|F)\b/.test(spelled))
+    return { factor: 1, unit: spelled }
   const power = Math.floor(Math.log10(largest) / 3 + 1e-9) * 3
   const [exponent, prefix] = PREFIXES.find(([known]) => known <= power) ?? PREFIXES.at(-1)!
   return { factor: 10 ** -exponent, unit: prefix + spelled }
@@ -47,7 +48,8 @@ export function digits(value: number, significant = 4): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? '–' : value > 0 ? '∞' : '−∞'
   if (value === 0) return '0'
   const size = Math.abs(value)
-  const text = size >= 1e6 || size < 1e-4 ? value.toExponential(significant - 1) : value.toPrecision(significant)
+  const text =
+    size >= 1e6 || size < 1e-4 ? value.toExponential(significant - 1) : value.toPrecision(significant)
   const plain = text.includes('e') && size < 1e6 && size >= 1e-4 ? String(Number(text)) : text
   return plain.replaceAll('-', '−')
 }

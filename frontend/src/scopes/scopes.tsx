@@ -1,5 +1,12 @@
 import { ActionIcon, Tooltip } from '@mantine/core'
-import { IconAngle, IconArrowsHorizontal, IconRulerMeasure, IconTableOptions, IconZoomIn, IconZoomOut } from '@tabler/icons-react'
+import {
+  IconAngle,
+  IconArrowsHorizontal,
+  IconRulerMeasure,
+  IconTableOptions,
+  IconZoomIn,
+  IconZoomOut,
+} from '@tabler/icons-react'
 import { useMemo } from 'react'
 import type { ViewOf } from '../protocol'
 import { shownTime } from '../run/cursor'
@@ -17,7 +24,13 @@ export function Scopes() {
   const all = useStudio((s) => s.run?.views)
   const views = all?.filter(({ kind }) => kind === 'traces' || kind === 'path') ?? []
   if (!run) return null
-  if (!views.length) return <p className="empty">The model has no Scope and no XY Graph, and no wire is logged: add a Scope, or click a wire and log it.</p>
+  if (!views.length)
+    return (
+      <p className="empty">
+        The model has no Scope and no XY Graph, and no wire is logged: add a Scope, or click a wire and log
+        it.
+      </p>
+    )
   return (
     <div className="scopes-panel">
       <PlotTools />
@@ -32,7 +45,11 @@ export function Scopes() {
 
 function ScopeChart({ run, view }: { run: string; view: ViewOf }) {
   const traces = useMemo(
-    () => tracesOf(samples, view.signals.map((name, k) => ({ path: `${view.block}/${name}`, label: view.labels[k] ?? '' }))),
+    () =>
+      tracesOf(
+        samples,
+        view.signals.map((name, k) => ({ path: `${view.block}/${name}`, label: view.labels[k] ?? '' })),
+      ),
     // The samples of a run are one object as long as it is on the screen.
     // eslint-disable-next-line react-hooks/exhaustive-deps
     [run, view],
@@ -48,12 +65,32 @@ export function PlotTools() {
   const radians = useUnits((s) => s.radians)
   return (
     <div className="plot-tools" role="toolbar" aria-label="Plots" aria-orientation="vertical">
-      <PlotTool label="Show the whole run" icon={IconArrowsHorizontal} disabled={!zoomed} onClick={() => useWindow.setState({ range: null })} />
+      <PlotTool
+        label="Show the whole run"
+        icon={IconArrowsHorizontal}
+        disabled={!zoomed}
+        onClick={() => useWindow.setState({ range: null })}
+      />
       <PlotTool label="Zoom in (wheel)" icon={IconZoomIn} onClick={() => zoomBy(0.5, shownTime())} />
-      <PlotTool label="Zoom out" icon={IconZoomOut} disabled={!zoomed} onClick={() => zoomBy(2, shownTime())} />
+      <PlotTool
+        label="Zoom out"
+        icon={IconZoomOut}
+        disabled={!zoomed}
+        onClick={() => zoomBy(2, shownTime())}
+      />
       <PlotTool label="Measuring cursors" icon={IconRulerMeasure} pressed={cursors} onClick={toggleCursors} />
-      <PlotTool label="Measures of what is shown" icon={IconTableOptions} pressed={measuring} onClick={() => useWindow.setState({ measuring: !measuring })} />
-      <PlotTool label={radians ? 'Angles in degrees' : 'Angles in radians'} icon={IconAngle} pressed={radians} onClick={() => useUnits.setState({ radians: !radians })} />
+      <PlotTool
+        label="Measures of what is shown"
+        icon={IconTableOptions}
+        pressed={measuring}
+        onClick={() => useWindow.setState({ measuring: !measuring })}
+      />
+      <PlotTool
+        label={radians ? 'Angles in degrees' : 'Angles in radians'}
+        icon={IconAngle}
+        pressed={radians}
+        onClick={() => useUnits.setState({ radians: !radians })}
+      />
     </div>
   )
 }
@@ -69,7 +106,15 @@ interface ToolProps {
 function PlotTool({ label, icon: Icon, disabled = false, pressed, onClick }: ToolProps) {
   return (
     <Tooltip label={label} openDelay={400} position="right">
-      <ActionIcon variant={pressed ? 'light' : 'subtle'} color={pressed ? 'accent' : 'gray'} size="sm" aria-label={label} aria-pressed={pressed} disabled={disabled} onClick={onClick}>
+      <ActionIcon
+        variant={pressed ? 'light' : 'subtle'}
+        color={pressed ? 'accent' : 'gray'}
+        size="sm"
+        aria-label={label}
+        aria-pressed={pressed}
+        disabled={disabled}
+        onClick={onClick}
+      >
         <Icon size={15} />
       </ActionIcon>
     </Tooltip>

@@ -67,14 +67,30 @@ export interface Extremes {
  * The least and the greatest value of each trace in each of `width` stretches of a window of time: no more points
  * than can be seen, and no peak is lost. What `before` knows of the same window is not looked at again.
  */
-export function extremes(traces: { time: Float64Array; values: Float64Array }[], from: number, to: number, width: number, before?: Extremes): Extremes {
+export function extremes(
+  traces: { time: Float64Array; values: Float64Array }[],
+  from: number,
+  to: number,
+  width: number,
+  before?: Extremes,
+): Extremes {
   const span = (to - from) / width
-  const known = before?.from === from && before.to === to && before.width === width && before.rows.length === traces.length ? before : undefined
-  const time = known ? known.drawn[0] : new Float64Array(2 * width).map((_, k) => from + (Math.floor(k / 2) + (k % 2 ? 0.75 : 0.25)) * span)
+  const known =
+    before?.from === from &&
+    before.to === to &&
+    before.width === width &&
+    before.rows.length === traces.length
+      ? before
+      : undefined
+  const time = known
+    ? known.drawn[0]
+    : new Float64Array(2 * width).map((_, k) => from + (Math.floor(k / 2) + (k % 2 ? 0.75 : 0.25)) * span)
   const rows: number[] = []
   const ends: number[] = []
   const columns = traces.map(({ time: at, values }, trace) => {
-    const column = known ? (known.drawn[trace + 1] as (number | undefined)[]) : Array.from({ length: 2 * width }, (): number | undefined => undefined)
+    const column = known
+      ? (known.drawn[trace + 1] as (number | undefined)[])
+      : Array.from({ length: 2 * width }, (): number | undefined => undefined)
     // One sample beyond each side, so that a line leaves the window where it should.
     let row = known ? known.rows[trace]! : Math.max(firstAfter(at, from) - 1, 0)
     let begin = row
@@ -103,7 +119,11 @@ export function extremes(traces: { time: Float64Array; values: Float64Array }[],
 }
 
 /** Samples of a trace in a window of time, as they were recorded, with one beyond each side. */
-export function within({ time, values }: { time: Float64Array; values: Float64Array }, from: number, to: number) {
+export function within(
+  { time, values }: { time: Float64Array; values: Float64Array },
+  from: number,
+  to: number,
+) {
   const begin = Math.max(firstAfter(time, from) - 1, 0)
   const end = Math.min(firstAfter(time, to) + 1, time.length)
   return { time: time.subarray(begin, end), values: values.subarray(begin, end) }

@@ -52,5 +52,7 @@ export function pan(by: number): void {
 /** Two cursors, at a third and two thirds of what is shown; or none. */
 export function toggleCursors(): void {
   const [from, to] = shownWindow()
-  useWindow.setState((s) => ({ cursors: s.cursors ? null : [from + (to - from) / 3, from + (2 * (to - from)) / 3] }))
+  useWindow.setState((s) => ({
+    cursors: s.cursors ? null : [from + (to - from) / 3, from + (2 * (to - from)) / 3],
+  }))
 }

@@ -24,9 +24,17 @@ function figureOf([across, up]: Trace[], title: string, width: number, height: n
   // Of a long run every k-th point is drawn, and the last.
   const stride = Math.max(1, Math.ceil(x.length / MOST_POINTS))
   const count = Math.ceil(x.length / stride)
-  const pick = (values: Float64Array, factor: number) => Float64Array.from({ length: count }, (_, k) => values[k === count - 1 ? values.length - 1 : k * stride]! * factor)
+  const pick = (values: Float64Array, factor: number) =>
+    Float64Array.from(
+      { length: count },
+      (_, k) => values[k === count - 1 ? values.length - 1 : k * stride]! * factor,
+    )
   const [xs, ys] = [pick(x, readX.factor), pick(y, readY.factor)]
-  const range = (values: Float64Array) => aired(values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity))
+  const range = (values: Float64Array) =>
+    aired(
+      values.reduce((a, b) => Math.min(a, b), Infinity),
+      values.reduce((a, b) => Math.max(a, b), -Infinity),
+    )
   const axis = (values: Float64Array, trace: Trace | undefined, unit: string) => {
     const [min, max] = range(values)
     return { min, max, label: [trace?.label, unit].filter(Boolean).join(', ') }
@@ -44,7 +52,15 @@ function figureOf([across, up]: Trace[], title: string, width: number, height: n
   }
 }
 
-export function XyPlot({ traces, title, handle }: { traces: Trace[]; title: string; handle: React.RefObject<PlotHandle | null> }) {
+export function XyPlot({
+  traces,
+  title,
+  handle,
+}: {
+  traces: Trace[]
+  title: string
+  handle: React.RefObject<PlotHandle | null>
+}) {
   const canvas = useRef<HTMLCanvasElement>(null)
   const scheme = useComputedColorScheme('light')
   useEffect(() => {
@@ -76,7 +92,11 @@ export function XyPlot({ traces, title, handle }: { traces: Trace[]; title: stri
     }
   }, [traces, title, scheme, handle])
   return (
-    <div className="plot xy" role="img" aria-label={`${title}: ${traces.map(({ label }) => label).join(' and ')}`}>
+    <div
+      className="plot xy"
+      role="img"
+      aria-label={`${title}: ${traces.map(({ label }) => label).join(' and ')}`}
+    >
       <canvas ref={canvas} />
     </div>
   )

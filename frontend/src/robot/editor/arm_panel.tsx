@@ -59,7 +59,9 @@ export default function ArmPanel() {
   const drawing = useCallback(async () => {
     const { joints } = useDesk.getState()
     const theme = document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light'
-    return current ? ask<string>({ kind: 'robot_picture', robot: current, q: joints[current]?.q ?? [], theme }) : undefined
+    return current
+      ? ask<string>({ kind: 'robot_picture', robot: current, q: joints[current]?.q ?? [], theme })
+      : undefined
   }, [current])
   if (!scene) return <p className="empty">Loading the robot …</p>
   return <Stage key={current} scene={scene} poses={posesNow} state={state} drawing={drawing} drawn={state} />

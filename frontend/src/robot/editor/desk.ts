@@ -60,7 +60,8 @@ export function robotOpened(opening: Opening): void {
   const first = opening.robots[0]
   if (!first) return
   useDesk.setState({ current: first.robot, opening, readings: null })
-  if (!useDesk.getState().tables) void ask<RobotTables>({ kind: 'robot_form' }).then((tables) => tables && useDesk.setState({ tables }))
+  if (!useDesk.getState().tables)
+    void ask<RobotTables>({ kind: 'robot_form' }).then((tables) => tables && useDesk.setState({ tables }))
   readSoon()
 }
 
@@ -184,7 +185,9 @@ async function readOn(): Promise<void> {
 
 /** Whether a column of a joint that turns or slides holds an angle. */
 export function isAngle(column: CellColumn, turns: boolean): boolean {
-  return column.quantity === 'angle' || (turns && (column.quantity === 'coordinate' || column.quantity === 'rate'))
+  return (
+    column.quantity === 'angle' || (turns && (column.quantity === 'coordinate' || column.quantity === 'rate'))
+  )
 }
 
 /** The unit of a cell as it is shown. */
@@ -208,7 +211,12 @@ export function cellText(value: number | string | null | undefined, angle: boole
   if (angles === 'deg') return plain(Number(((value * 180) / Math.PI).toPrecision(12)))
   for (const part of PARTS) {
     const times: number = (value / Math.PI) * part
-    if (times !== 0 && Math.abs(times) <= 24 && Math.abs(times - Math.round(times)) < 1e-12 && value === (Math.round(times) * Math.PI) / part) {
+    if (
+      times !== 0 &&
+      Math.abs(times) <= 24 &&
+      Math.abs(times - Math.round(times)) < 1e-12 &&
+      value === (Math.round(times) * Math.PI) / part
+    ) {
       const top = Math.abs(Math.round(times)) === 1 ? 'pi' : `${Math.abs(Math.round(times))}*pi`
       return `${times < 0 ? '-' : ''}${top}${part === 1 ? '' : `/${part}`}`
     }

@@ -23,7 +23,13 @@ export function JointsPanel() {
   return (
     <div className="joints-panel">
       <div className="panel-bar">
-        <SegmentedControl size="xs" data={KINDS} value={kind} onChange={(value) => setKind(value as keyof Joints)} aria-label="What the sliders set" />
+        <SegmentedControl
+          size="xs"
+          data={KINDS}
+          value={kind}
+          onChange={(value) => setKind(value as keyof Joints)}
+          aria-label="What the sliders set"
+        />
         <Button size="compact-xs" variant="default" onClick={() => setJoints(atRest(shown))}>
           Home
         </Button>
@@ -70,7 +76,11 @@ function JointSlider({ link, kind, value, onValue }: JointSliderProps) {
         onChange={onValue}
         marks={low < 0 && high > 0 ? [{ value: 0 }] : []}
       />
-      <NumberField label={`${kind} of ${link.name} as a number`} text={cellText(Number((value * factor).toFixed(4)), false, angles)} onNumber={(typed) => onValue(typed / factor)} />
+      <NumberField
+        label={`${kind} of ${link.name} as a number`}
+        text={cellText(Number((value * factor).toFixed(4)), false, angles)}
+        onNumber={(typed) => onValue(typed / factor)}
+      />
       <span className="unit">
         {unit}
         {per}
@@ -79,7 +89,15 @@ function JointSlider({ link, kind, value, onValue }: JointSliderProps) {
   )
 }
 
-function NumberField({ label, text, onNumber }: { label: string; text: string; onNumber: (value: number) => void }) {
+function NumberField({
+  label,
+  text,
+  onNumber,
+}: {
+  label: string
+  text: string
+  onNumber: (value: number) => void
+}) {
   const [typed, setTyped] = useState<string | null>(null)
   return (
     <input
@@ -107,4 +125,3 @@ function range(link: LinkRow, kind: keyof Joints): [number, number] {
   if (typeof lowest === 'number' && typeof highest === 'number' && lowest < highest) return [lowest, highest]
   return link.turns ? [-WHOLE_TURN, WHOLE_TURN] : [-WITHOUT_RANGE, WITHOUT_RANGE]
 }
-

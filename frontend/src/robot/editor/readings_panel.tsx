@@ -14,7 +14,8 @@ export function ReadingsPanel() {
   if (!names.length) return <p className="empty">No joint moves: there is nothing to read.</p>
   if (!readings) return <p className="empty">Compiling the arm …</p>
   const { pose, position, rpy, jacobian, gravload, torque, manipulability, singular, limits } = readings
-  const angle = (value: number) => (angles === 'deg' ? `${shortNumber((value * 180) / Math.PI, 3)}°` : `${shortNumber(value)} rad`)
+  const angle = (value: number) =>
+    angles === 'deg' ? `${shortNumber((value * 180) / Math.PI, 3)}°` : `${shortNumber(value)} rad`
   const warnings = [...(singular ? [singular] : []), ...limits.map((words) => `${words}.`)]
   return (
     <div className="readings" role="group" aria-label="Read-outs" tabIndex={0}>
@@ -78,7 +79,17 @@ export function ReadingsPanel() {
   )
 }
 
-function Matrix({ label, rows, heads, columns }: { label: string; rows: number[][]; heads?: string[]; columns?: string[] }) {
+function Matrix({
+  label,
+  rows,
+  heads,
+  columns,
+}: {
+  label: string
+  rows: number[][]
+  heads?: string[]
+  columns?: string[]
+}) {
   return (
     <div className="scrolled">
       <table className="matrix numbers" aria-label={label}>

@@ -1,6 +1,23 @@
 import '../../mantine_later.css'
-import { ActionIcon, Alert, Button, Menu, SegmentedControl, Text, Tooltip, useComputedColorScheme } from '@mantine/core'
-import { IconAlertTriangle, IconArrowBackUp, IconArrowForwardUp, IconArrowLeft, IconChevronDown, IconDeviceFloppy, IconPlus } from '@tabler/icons-react'
+import {
+  ActionIcon,
+  Alert,
+  Button,
+  Menu,
+  SegmentedControl,
+  Text,
+  Tooltip,
+  useComputedColorScheme,
+} from '@mantine/core'
+import {
+  IconAlertTriangle,
+  IconArrowBackUp,
+  IconArrowForwardUp,
+  IconArrowLeft,
+  IconChevronDown,
+  IconDeviceFloppy,
+  IconPlus,
+} from '@tabler/icons-react'
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
 import { show } from '../../dialogs'
@@ -38,17 +55,41 @@ function Tab({ api }: IDockviewPanelHeaderProps) {
 function arrange({ api }: DockviewReadyEvent): void {
   const tall = innerHeight > TALL
   api.addPanel({ id: 'arm', component: 'arm', title: 'Arm' })
-  api.addPanel({ id: 'readings', component: 'readings', title: 'Read-outs', position: { referencePanel: 'arm', direction: 'right' } })
-  api.addPanel({ id: 'joints', component: 'joints', title: 'Joints', position: { referencePanel: 'arm', direction: 'right' } })
-  api.addPanel({ id: 'kinematics', component: 'kinematics', title: 'Kinematics', position: { direction: 'below' }, initialHeight: tall ? 0.26 * innerHeight : Math.max(250, 0.37 * innerHeight) })
+  api.addPanel({
+    id: 'readings',
+    component: 'readings',
+    title: 'Read-outs',
+    position: { referencePanel: 'arm', direction: 'right' },
+  })
+  api.addPanel({
+    id: 'joints',
+    component: 'joints',
+    title: 'Joints',
+    position: { referencePanel: 'arm', direction: 'right' },
+  })
+  api.addPanel({
+    id: 'kinematics',
+    component: 'kinematics',
+    title: 'Kinematics',
+    position: { direction: 'below' },
+    initialHeight: tall ? 0.26 * innerHeight : Math.max(250, 0.37 * innerHeight),
+  })
   api.addPanel({
     id: 'dynamics',
     component: 'dynamics',
     title: 'Dynamics',
     inactive: true,
-    ...(tall ? { position: { referencePanel: 'kinematics', direction: 'below' }, initialHeight: 0.24 * innerHeight } : { position: { referencePanel: 'kinematics' } }),
+    ...(tall
+      ? { position: { referencePanel: 'kinematics', direction: 'below' }, initialHeight: 0.24 * innerHeight }
+      : { position: { referencePanel: 'kinematics' } }),
   })
-  api.addPanel({ id: 'robot', component: 'robot', title: 'Robot, base, tool', inactive: true, position: { referencePanel: tall ? 'dynamics' : 'kinematics' } })
+  api.addPanel({
+    id: 'robot',
+    component: 'robot',
+    title: 'Robot, base, tool',
+    inactive: true,
+    position: { referencePanel: tall ? 'dynamics' : 'kinematics' },
+  })
   // Sizes last, from the left and from above: a group that is set takes from those behind it.
   const width = (least: number, share: number) => Math.min(Math.max(least, share * innerWidth), 1.5 * least)
   const [joints, readings] = [width(300, 0.2), width(376, 0.26)]
@@ -96,7 +137,12 @@ export default function RobotEditor() {
       <Bar shown={shown} />
       <Notes />
       <div className="robot-dock">
-        <DockviewReact className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'} components={panels} defaultTabComponent={Tab} onReady={arrange} />
+        <DockviewReact
+          className={scheme === 'dark' ? 'dockview-theme-dark' : 'dockview-theme-light'}
+          components={panels}
+          defaultTabComponent={Tab}
+          onReady={arrange}
+        />
       </div>
       <SaveDialog />
     </div>
@@ -125,12 +171,24 @@ function Bar({ shown }: { shown: RobotShown }) {
   const last = shown.links.at(-1)!
   return (
     <header className="top-bar">
-      <Button size="compact-sm" variant="default" leftSection={<IconArrowLeft size={14} />} onClick={leaveEditor}>
+      <Button
+        size="compact-sm"
+        variant="default"
+        leftSection={<IconArrowLeft size={14} />}
+        onClick={leaveEditor}
+      >
         {model ?? 'Diagram'}
       </Button>
       <Menu position="bottom-start" shadow="md">
         <Menu.Target>
-          <Button size="compact-sm" variant="subtle" color="gray" rightSection={<IconChevronDown size={13} />} className="title" aria-label={`Robot ${shown.name}: other robots`}>
+          <Button
+            size="compact-sm"
+            variant="subtle"
+            color="gray"
+            rightSection={<IconChevronDown size={13} />}
+            className="title"
+            aria-label={`Robot ${shown.name}: other robots`}
+          >
             {shown.name}
             {shown.dirty && <span aria-label="changed">&nbsp;•</span>}
           </Button>
@@ -148,10 +206,24 @@ function Bar({ shown }: { shown: RobotShown }) {
       <Text size="xs" c="dimmed" className="file">
         {shown.path ?? (shown.shipped ? `a copy of ${shown.shipped}` : 'not saved yet')}
       </Text>
-      <Tool label={shown.undo ? `Undo ${shown.undo} (Ctrl+Z)` : 'Nothing to undo'} icon={IconArrowBackUp} disabled={!shown.undo} onClick={() => undo(shown.robot)} />
-      <Tool label={shown.redo ? `Redo ${shown.redo} (Ctrl+Y)` : 'Nothing to redo'} icon={IconArrowForwardUp} disabled={!shown.redo} onClick={() => redo(shown.robot)} />
+      <Tool
+        label={shown.undo ? `Undo ${shown.undo} (Ctrl+Z)` : 'Nothing to undo'}
+        icon={IconArrowBackUp}
+        disabled={!shown.undo}
+        onClick={() => undo(shown.robot)}
+      />
+      <Tool
+        label={shown.redo ? `Redo ${shown.redo} (Ctrl+Y)` : 'Nothing to redo'}
+        icon={IconArrowForwardUp}
+        disabled={!shown.redo}
+        onClick={() => redo(shown.robot)}
+      />
       <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} onClick={() => saveRobot()} />
-      <Tool label="Add a joint at the end" icon={IconPlus} onClick={() => void edit({ kind: 'add', after: last.name })} />
+      <Tool
+        label="Add a joint at the end"
+        icon={IconPlus}
+        onClick={() => void edit({ kind: 'add', after: last.name })}
+      />
       <span className="spring" />
       <Findings shown={shown} />
       <Convention shown={shown} />
@@ -169,7 +241,17 @@ function Bar({ shown }: { shown: RobotShown }) {
   )
 }
 
-function Tool({ label, icon: Icon, disabled = false, onClick }: { label: string; icon: React.ComponentType<{ size: number }>; disabled?: boolean; onClick: () => void }) {
+function Tool({
+  label,
+  icon: Icon,
+  disabled = false,
+  onClick,
+}: {
+  label: string
+  icon: React.ComponentType<{ size: number }>
+  disabled?: boolean
+  onClick: () => void
+}) {
   return (
     <Tooltip label={label} openDelay={400}>
       <ActionIcon variant="subtle" color="gray" aria-label={label} disabled={disabled} onClick={onClick}>
@@ -201,7 +283,14 @@ function Findings({ shown }: { shown: RobotShown }) {
   return (
     <Menu position="bottom-end" shadow="md" width={380}>
       <Menu.Target>
-        <Button size="compact-sm" variant="default" c="var(--warning)" bg="var(--warning-wash)" leftSection={<IconAlertTriangle size={13} />} className="findings">
+        <Button
+          size="compact-sm"
+          variant="default"
+          c="var(--warning)"
+          bg="var(--warning-wash)"
+          leftSection={<IconAlertTriangle size={13} />}
+          className="findings"
+        >
           {count === 1 ? '1 warning' : `${count} warnings`}
         </Button>
       </Menu.Target>
@@ -224,7 +313,12 @@ function Convention({ shown }: { shown: RobotShown }) {
   return (
     <Menu position="bottom-end" shadow="md" width={330}>
       <Menu.Target>
-        <Button size="compact-sm" variant="default" rightSection={<IconChevronDown size={13} />} disabled={!shown.chain}>
+        <Button
+          size="compact-sm"
+          variant="default"
+          rightSection={<IconChevronDown size={13} />}
+          disabled={!shown.chain}
+        >
           {shown.convention} D-H
         </Button>
       </Menu.Target>
@@ -251,7 +345,15 @@ function Notes() {
   const opening = useDesk((s) => s.opening)
   if (!opening?.notes.length) return null
   return (
-    <Alert color="yellow" variant="light" p="xs" withCloseButton closeButtonLabel="Close the notes" onClose={() => useDesk.setState({ opening: null })} icon={<IconAlertTriangle size={16} />}>
+    <Alert
+      color="yellow"
+      variant="light"
+      p="xs"
+      withCloseButton
+      closeButtonLabel="Close the notes"
+      onClose={() => useDesk.setState({ opening: null })}
+      icon={<IconAlertTriangle size={16} />}
+    >
       {opening.notes.map((note) => (
         <Text size="xs" key={note}>
           {note}

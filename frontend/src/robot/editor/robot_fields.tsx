@@ -16,9 +16,16 @@ export function RobotFields({ shown, columns }: { shown: RobotShown; columns: Ce
             .map((column) => (
               <label key={column.name} title={column.doc}>
                 <span>
-                  {column.title} {unitOf(column, angles) && <span className="unit">{unitOf(column, angles)}</span>}
+                  {column.title}{' '}
+                  {unitOf(column, angles) && <span className="unit">{unitOf(column, angles)}</span>}
                 </span>
-                <Cell owner="" turns={false} value={shown.fields[column.name] ?? null} column={column} angles={angles} />
+                <Cell
+                  owner=""
+                  turns={false}
+                  value={shown.fields[column.name] ?? null}
+                  column={column}
+                  angles={angles}
+                />
               </label>
             ))}
         </fieldset>

@@ -23,7 +23,11 @@ export function saveRobot(): void {
 
 /** Ask for a name, and save under that. */
 export function saveRobotAs({ robot, name, path }: Pick<RobotShown, 'robot' | 'name' | 'path'>): void {
-  useSaving.setState({ robot, path: path ?? `${name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`, refused: '' })
+  useSaving.setState({
+    robot,
+    path: path ?? `${name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`,
+    refused: '',
+  })
 }
 
 async function write(robot: string, path: string, overwrite: boolean): Promise<void> {

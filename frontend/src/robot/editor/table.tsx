@@ -11,7 +11,15 @@ interface Fault {
 }
 
 /** One of the two tables: a row for each link, a column for each thing that can be typed. */
-export function LinkTable({ shown, columns, actions }: { shown: RobotShown; columns: CellColumn[]; actions: boolean }) {
+export function LinkTable({
+  shown,
+  columns,
+  actions,
+}: {
+  shown: RobotShown
+  columns: CellColumn[]
+  actions: boolean
+}) {
   const angles = useDesk((s) => s.angles)
   const groups = grouped(columns)
   return (
@@ -31,7 +39,13 @@ export function LinkTable({ shown, columns, actions }: { shown: RobotShown; colu
           </tr>
           <tr>
             {columns.map((column, k) => (
-              <th key={column.name} scope="col" title={column.doc} className={startsGroup(columns, k) ? 'first' : undefined} style={{ minWidth: widest(shown.links, column, angles) }}>
+              <th
+                key={column.name}
+                scope="col"
+                title={column.doc}
+                className={startsGroup(columns, k) ? 'first' : undefined}
+                style={{ minWidth: widest(shown.links, column, angles) }}
+              >
                 {column.title} <span className="unit">{unitOf(column, angles, oneKind(shown.links))}</span>
               </th>
             ))}
@@ -41,7 +55,10 @@ export function LinkTable({ shown, columns, actions }: { shown: RobotShown; colu
           {shown.links.map((link, row) => (
             <tr key={row}>
               <th scope="row" className="row-name">
-                <NameCell link={link} findings={shown.findings.filter((finding) => finding.link === link.name)} />
+                <NameCell
+                  link={link}
+                  findings={shown.findings.filter((finding) => finding.link === link.name)}
+                />
               </th>
               {columns.map((column, k) => (
                 <td key={column.name} className={startsGroup(columns, k) ? 'first' : undefined}>
@@ -53,7 +70,9 @@ export function LinkTable({ shown, columns, actions }: { shown: RobotShown; colu
                     angles={angles}
                     locked={link.locked[column.name]}
                     place={column.name === link.variable ? `q${row + 1}` : ''}
-                    finding={shown.findings.find((finding) => finding.link === link.name && finding.columns.includes(column.name))}
+                    finding={shown.findings.find(
+                      (finding) => finding.link === link.name && finding.columns.includes(column.name),
+                    )}
                   />
                 </td>
               ))}
@@ -87,7 +106,9 @@ const AROUND_PX = 4
 
 /** What the longest text of a column takes, px (the padding of the header comes to it). */
 function widest(links: LinkRow[], column: CellColumn, angles: Angles): number {
-  const longest = Math.max(...links.map(({ cells, turns }) => cellText(cells[column.name], isAngle(column, turns), angles).length))
+  const longest = Math.max(
+    ...links.map(({ cells, turns }) => cellText(cells[column.name], isAngle(column, turns), angles).length),
+  )
   return Math.round(longest * LETTER_PX + AROUND_PX)
 }
 
@@ -103,7 +124,8 @@ function walk(event: React.KeyboardEvent): void {
   const field = event.target
   if (!step || !(field instanceof HTMLInputElement)) return
   const row = field.closest('tr')
-  const next = (step > 0 ? row?.nextElementSibling : row?.previousElementSibling) as HTMLTableRowElement | null | undefined
+  const next = (step > 0 ? row?.nextElementSibling : row?.previousElementSibling) as
+    HTMLTableRowElement | null | undefined
   const at = field.closest<HTMLTableCellElement>('td, th')?.cellIndex
   const target = at === undefined ? undefined : next?.cells[at]?.querySelector('input')
   event.preventDefault()
@@ -115,7 +137,12 @@ function NameCell({ link, findings }: { link: LinkRow; findings: RobotFinding[] 
   const words = findings.map(({ what, fix }) => `${what} ${fix}`).join('\n')
   return (
     <span className="name-cell">
-      <TextCell label={`name of ${link.name}`} text={link.name} send={(name) => edit({ kind: 'rename', link: link.name, name })} onlyAtTheEnd />
+      <TextCell
+        label={`name of ${link.name}`}
+        text={link.name}
+        send={(name) => edit({ kind: 'rename', link: link.name, name })}
+        onlyAtTheEnd
+      />
       {words && (
         <Tooltip label={words} multiline w={320}>
           <IconAlertTriangle size={14} className="warn" role="img" aria-label={words} tabIndex={0} />
@@ -138,7 +165,16 @@ interface CellProps {
 }
 
 /** One cell: typing changes the arm at once, and what cannot be is said here. */
-export const Cell = memo(function Cell({ owner, turns, value, column, angles, locked, place = '', finding }: CellProps) {
+export const Cell = memo(function Cell({
+  owner,
+  turns,
+  value,
+  column,
+  angles,
+  locked,
+  place = '',
+  finding,
+}: CellProps) {
   const label = `${column.title} of ${owner || column.group || 'the robot'}`
   if (locked)
     return (
@@ -151,10 +187,16 @@ export const Cell = memo(function Cell({ owner, turns, value, column, angles, lo
         )}
       </span>
     )
-  const send = (text: string, gesture: string) => edit({ kind: 'cell', link: owner, column: column.name, text, angles }, gesture)
+  const send = (text: string, gesture: string) =>
+    edit({ kind: 'cell', link: owner, column: column.name, text, angles }, gesture)
   if (column.quantity === 'choice')
     return (
-      <select className="cell choice" aria-label={label} value={String(value)} onChange={(event) => void send(event.currentTarget.value, '')}>
+      <select
+        className="cell choice"
+        aria-label={label}
+        value={String(value)}
+        onChange={(event) => void send(event.currentTarget.value, '')}
+      >
         {column.choices.map((choice) => (
           <option key={choice}>{choice}</option>
         ))}
@@ -202,9 +244,21 @@ function TextCell({ label, text, doc, send, marked, wide, onlyAtTheEnd }: TextCe
     const good = (onlyAtTheEnd && typed !== text) || fault ? await say(typed) : true
     if (good) setTyped(null)
   }
-  const tip = fault ? `${fault.what}${fault.fix ? `. ${fault.fix}` : ''}` : marked ? `${marked.what} ${marked.fix}` : ''
+  const tip = fault
+    ? `${fault.what}${fault.fix ? `. ${fault.fix}` : ''}`
+    : marked
+      ? `${marked.what} ${marked.fix}`
+      : ''
   return (
-    <Tooltip label={tip} opened={Boolean(tip) && focused} multiline w={280} position="bottom" {...(fault ? { color: 'red.9' } : {})} withArrow>
+    <Tooltip
+      label={tip}
+      opened={Boolean(tip) && focused}
+      multiline
+      w={280}
+      position="bottom"
+      {...(fault ? { color: 'red.9' } : {})}
+      withArrow
+    >
       <input
         className={`cell${wide ? ' wide' : ''}${fault ? ' wrong' : marked ? ' marked' : ''}`}
         aria-label={label}
@@ -250,15 +304,29 @@ function RowMenu({ link, row, shown }: { link: LinkRow; row: number; shown: Robo
         </button>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Item onClick={() => void edit({ kind: 'add', after: link.name })}>Add a joint behind it</Menu.Item>
-        {row === 0 && <Menu.Item onClick={() => void edit({ kind: 'add', after: '' })}>Add a joint before it</Menu.Item>}
-        <Menu.Item disabled={!shown.chain || row === 0} onClick={() => void edit({ kind: 'move', link: link.name, by: -1 })}>
+        <Menu.Item onClick={() => void edit({ kind: 'add', after: link.name })}>
+          Add a joint behind it
+        </Menu.Item>
+        {row === 0 && (
+          <Menu.Item onClick={() => void edit({ kind: 'add', after: '' })}>Add a joint before it</Menu.Item>
+        )}
+        <Menu.Item
+          disabled={!shown.chain || row === 0}
+          onClick={() => void edit({ kind: 'move', link: link.name, by: -1 })}
+        >
           Move towards the base
         </Menu.Item>
-        <Menu.Item disabled={!shown.chain || row === shown.links.length - 1} onClick={() => void edit({ kind: 'move', link: link.name, by: 1 })}>
+        <Menu.Item
+          disabled={!shown.chain || row === shown.links.length - 1}
+          onClick={() => void edit({ kind: 'move', link: link.name, by: 1 })}
+        >
           Move towards the tool
         </Menu.Item>
-        <Menu.Item color="red" disabled={shown.links.length === 1} onClick={() => void edit({ kind: 'remove', link: link.name })}>
+        <Menu.Item
+          color="red"
+          disabled={shown.links.length === 1}
+          onClick={() => void edit({ kind: 'remove', link: link.name })}
+        >
           Take it out
         </Menu.Item>
       </Menu.Dropdown>
