@@ -25,11 +25,13 @@ from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend/build_page.py")
 FRONTEND = ROOT / "frontend"
+WEB_TOOLS = FRONTEND / "node_modules" / ".bin"
 
 STEPS: dict[str, tuple[str | object, ...]] = {
     "page": (PYTHON, "frontend/build_page.py"),
     "web types": (PYTHON, "scripts/studio_types.py", "--check"),
-    "web lint": (FRONTEND / "node_modules" / ".bin" / "oxlint", "src"),
+    "web lint": (WEB_TOOLS / "oxlint", "src"),
+    "web format": (WEB_TOOLS / "prettier", "--check", "src/**/*.{ts,tsx}", "*.ts"),
     "lint": (BINARIES / "ruff", "check", *SOURCES),
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),
     "types": (BINARIES / "pyright", "--warnings"),
@@ -37,11 +39,11 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "docs": (PYTHON, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"),
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
-FOLDERS = {"web lint": FRONTEND}
+FOLDERS = {"web lint": FRONTEND, "web format": FRONTEND}
 """Where a step runs, if not in the folder of the project."""
 BEFORE_ALL = ("page",)
 """Steps whose result the others need."""
-STAGES = ((("types",), ("web types", "web lint", "lint", "format", "layers", "docs")), (("tests",),))
+STAGES = ((("types",), ("web types", "web lint", "web format", "lint", "format", "layers", "docs")), (("tests",),))
 """Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.
 The tests have the machine for themselves: journeys in a browser need it."""
 GLANCE_SECONDS = 0.1
@@ -151,7 +153,7 @@ def main() -> int:
     say("== summary")
     for step in done:
         verdict = "passed" if step.code == 0 else f"FAILED (exit code {step.code})"
-        say(f"   {step.name:<9} {verdict:<24} {step.seconds:6.1f} s")
+        say(f"   {step.name:<10} {verdict:<24} {step.seconds:6.1f} s")
     say(f"   all together {time.perf_counter() - start:31.1f} s")
     return 1 if any(step.code != 0 for step in done) else 0
 
