@@ -43,7 +43,10 @@ FOLDERS = {"web lint": FRONTEND, "web format": FRONTEND}
 """Where a step runs, if not in the folder of the project."""
 BEFORE_ALL = ("page",)
 """Steps whose result the others need."""
-STAGES = ((("types",), ("web types", "web lint", "web format", "lint", "format", "layers", "docs")), (("tests",),))
+STAGES = (
+    (("types",), ("web types", "web lint", "web format", "lint", "format", "layers", "docs")),
+    (("tests",),),
+)
 """Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.
 The tests have the machine for themselves: journeys in a browser need it."""
 GLANCE_SECONDS = 0.1
