@@ -92,7 +92,7 @@ def _create() -> None:
         )
 
 
-PIPS_STEPS = ("Collecting", "Downloading", "Building", "Installing", "Successfully")
+PIPS_STEPS = ("Downloading", "Using cached", "Installing collected packages")
 """How the lines of pip begin that tell how far it is."""
 
 
@@ -124,9 +124,7 @@ def _pip_install(*what: str) -> int:
         for line in pip.stdout:
             step = line.strip()
             if step.startswith(PIPS_STEPS):
-                say(
-                    f"   {time.monotonic() - start:4.0f} s  {step if len(step) <= 100 else step[:97] + '...'}"
-                )
+                say(f"   {time.monotonic() - start:4.0f} s  {step.partition(':')[0]}")
     return pip.returncode
 
 
