@@ -15,6 +15,8 @@ import sys
 import time
 from pathlib import Path
 
+from notices import write_notices
+
 FRONTEND = Path(__file__).resolve().parent
 ROOT = FRONTEND.parent
 WEB = ROOT / "src" / "armblocks" / "studio" / "web"
@@ -25,6 +27,9 @@ OLDEST_NODE = (20, 19)
 SOURCES = (
     "src",
     "public",
+    "licences",
+    "notices.py",
+    "bundled_packages.ts",
     "index.html",
     "package.json",
     "package-lock.json",
@@ -61,6 +66,7 @@ def build() -> None:
         _call("fetch the libraries of the page", [*npm, "ci", "--no-audit", "--no-fund"])
         held.write_text(wanted, encoding="utf-8")
     _call("build the page", [*npm, "run", "build"])
+    write_notices(WEB)
     STAMP.write_text(digest(), encoding="utf-8")
 
 

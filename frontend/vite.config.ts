@@ -2,6 +2,8 @@ import react from '@vitejs/plugin-react'
 import subsetFont from 'subset-font'
 import { defineConfig, type Plugin, type UserConfig } from 'vite'
 
+import { bundledPackages } from './bundled_packages'
+
 /** Themes of the dock layout that the page does not offer: they are most of its styles. */
 const OTHER_THEME = /\.dockview-theme-(?!(light|dark)(?![\w-]))/
 /** A font for browsers that are too old for the page anyway. */
@@ -59,7 +61,7 @@ function lighterSans(): Plugin {
 
 export default defineConfig({
   base: './',
-  plugins: [react(), lighterSans()],
+  plugins: [react(), lighterSans(), bundledPackages()],
   css: { postcss: { plugins: unseen } },
   build: {
     outDir: process.env['ARMBLOCKS_OUT'] ?? '../src/armblocks/studio/web',

@@ -1,9 +1,11 @@
 import react from '@vitejs/plugin-react'
 import { defineConfig } from 'vite'
 
+import { bundledPackages } from './bundled_packages'
+
 /** The views that a notebook shows, as one script and one style sheet: `studio/notebook.py` puts them into a frame. */
 export default defineConfig({
-  plugins: [react()],
+  plugins: [react(), bundledPackages()],
   define: { 'process.env.NODE_ENV': '"production"' },
   publicDir: false,
   build: {

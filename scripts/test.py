@@ -23,7 +23,7 @@ from threading import Event
 
 from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
 
-SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend/build_page.py")
+SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend")
 FRONTEND = ROOT / "frontend"
 WEB_TOOLS = FRONTEND / "node_modules" / ".bin"
 

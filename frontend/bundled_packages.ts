@@ -1,0 +1,25 @@
+import type { Plugin } from 'vite'
+
+/** The folder of the package that a module belongs to, from the last `node_modules` of its path on. */
+const PACKAGE = /^.*?\/frontend\/(.*node_modules\/(?:@[^/]+\/)?[^/]+)\//
+
+/**
+ * Writes the list of the packages whose code, styles or fonts are in the bundle: `build_page.py` makes the
+ * third-party notices of it. Of code only what is left after tree shaking counts.
+ */
+export function bundledPackages(): Plugin {
+  return {
+    name: 'bundled-packages',
+    apply: 'build',
+    generateBundle(_, bundle) {
+      const modules = [...this.getModuleIds()].filter((id) => /\.css(\?|$)/.test(id))
+      for (const part of Object.values(bundle)) if (part.type === 'chunk') modules.push(...part.moduleIds)
+      const folders = new Set<string>()
+      for (const id of modules) {
+        const found = PACKAGE.exec(id.replaceAll('\\', '/').replace('\0', ''))
+        if (found?.[1]) folders.add(found[1])
+      }
+      this.emitFile({ type: 'asset', fileName: 'bundled-packages.json', source: JSON.stringify([...folders].sort()) })
+    },
+  }
+}

@@ -1,0 +1,67 @@
+"""The notices of the packages whose code, styles or fonts the page of the studio contains.
+
+The bundler lists the packages (``bundled_packages.ts``). Their licence texts come from their folders in
+``node_modules``, or from ``frontend/licences`` for packages that are published without one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+FRONTEND = Path(__file__).resolve().parent
+LICENCES = FRONTEND / "licences"
+"""Texts of packages that bring none, by the name of the package with ``-`` for ``/``."""
+FILE = "THIRD-PARTY-NOTICES.txt"
+LIST = "bundled-packages.json"
+LICENCE_FILES = ("licence", "license", "copying", "notice", "unlicense")
+HEAD = "The page of the armblocks studio contains the packages below, or parts of them.\n"
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package in the page, with the text of its licence."""
+
+    name: str
+    version: str
+    licence: str
+    text: str
+
+
+def write_notices(web: Path) -> None:
+    """Write the notices into the folder of the built page, and remove the lists of the bundler."""
+    lists = [web / LIST, web / "notebook" / LIST]
+    folders = {folder for path in lists for folder in json.loads(path.read_text(encoding="utf-8"))}
+    (web / FILE).write_text(notices(map(package, sorted(folders))), encoding="utf-8")
+    for path in lists:
+        path.unlink()
+
+
+def notices(packages: Iterable[Package]) -> str:
+    """The file of notices: each package once, under a rule."""
+    once = {(package.name, package.version): package for package in packages}
+    rule = "-" * 80
+    parts = [
+        f"{rule}\n{name} {version} ({package.licence})\n{rule}\n\n{package.text.strip()}\n"
+        for (name, version), package in sorted(once.items())
+    ]
+    return "\n".join([HEAD, *parts])
+
+
+def package(folder: str, root: Path = FRONTEND) -> Package:
+    """The package of a folder of ``node_modules``; exits with a message where its licence text is missing."""
+    described = json.loads((root / folder / "package.json").read_text(encoding="utf-8"))
+    name = described["name"]
+    own = LICENCES / f"{name.replace('/', '-')}.txt"
+    found = sorted(path for path in (root / folder).iterdir() if path.name.lower().startswith(LICENCE_FILES))
+    texts = [path.read_text(encoding="utf-8") for path in found if path.is_file()] or [
+        path.read_text(encoding="utf-8") for path in (own,) if path.is_file()
+    ]
+    if not texts:
+        raise SystemExit(
+            f"the package {name} is part of the page of the studio and brings no licence text:\n"
+            f"put the text of its repository into {own}"
+        )
+    return Package(name, described["version"], described.get("license", "see below"), "\n\n".join(texts))
