@@ -22,8 +22,10 @@ A message has four parts: *what* was found, *where*, what was *allowed*, and wha
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 
 def compose_message(what: str, where: str = "", allowed: str = "", fix: str = "") -> str:
@@ -107,6 +109,27 @@ def _legible(names: Sequence[str], wanted: str) -> str:
             break
         chosen.append(name)
     return f"{', '.join(sorted(chosen) or [names[0][:LONGEST_LIST]])}, and {len(names) - len(chosen)} more"
+
+
+def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, object]) -> None:
+    """Raise for arguments that the constructor of a dataclass does not have.
+
+    Its ``__new__`` calls this, so that the error names the nearest field, before ``__init__`` raises Python's
+    own. ``InputError`` where values are given without a name, ``UnknownNameError`` for another name.
+    """
+    known: Mapping[str, dataclasses.Field[Any]] = getattr(kind, "__dataclass_fields__", {})
+    if not values and named.keys() <= known.keys():
+        return
+    fields = [entry.name for entry in dataclasses.fields(kind) if entry.init and entry.repr]
+    for name in named:
+        if name not in known:
+            raise UnknownNameError("argument", name, fields, where=kind.__name__)
+    raise InputError(
+        f"{len(values)} arguments are given without their names",
+        where=kind.__name__,
+        allowed=f"arguments by name: {', '.join(fields) or 'none'}",
+        fix=f"write {kind.__name__}({fields[0]}=…)" if fields else f"write {kind.__name__}()",
+    )
 
 
 class RobotError(ArmblocksError):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import armblocks as ab
-from armblocks.errors import InputError
+from armblocks.blocks import Constant, JTraj, RobotPlot
+from armblocks.errors import ArmblocksWarning, InputError
 
 
 def test_jtraj_starts_and_ends_where_and_how_it_is_told() -> None:
@@ -37,3 +38,26 @@ def test_a_count_of_samples_means_normalised_time() -> None:
 def test_jtraj_refuses_in_words(arguments: tuple, message: str) -> None:
     with pytest.raises(InputError, match=message):
         ab.jtraj(*arguments)
+
+
+def test_a_trajectory_unpacks_as_in_the_toolbox() -> None:
+    path = ab.jtraj([0, 1], [2, -1], 5)
+    q, qd, qdd = path
+    assert q is path.q and qd is path.qd and qdd is path.qdd
+
+
+def test_angles_that_look_like_degrees_are_doubted() -> None:
+    with pytest.warns(ArmblocksWarning, match=r"jtraj, qf: an angle of 90 rad is more than two whole turns"):
+        ab.jtraj([0, 0], [90, 0], 5)
+    builder = ab.DiagramBuilder("degrees")
+    motion = builder.add("motion", JTraj(q0=[0, 0], qf=[-90, 0]))
+    builder.add("plot", RobotPlot(robot=ab.load_robot("twolink")), motion["q"])
+    with pytest.warns(
+        ArmblocksWarning, match=r"block 'motion' \(jtraj\), qf: an angle of 90 rad.*np.radians"
+    ):
+        ab.simulate(builder.build())
+    builder = ab.DiagramBuilder("degrees")
+    angles = builder.add("angles", Constant(value=[0, 45]))
+    builder.add("plot", RobotPlot(robot=ab.load_robot("twolink")), angles)
+    with pytest.warns(ArmblocksWarning, match=r"angles/y at the start: an angle of 45 rad"):
+        ab.simulate(builder.build())

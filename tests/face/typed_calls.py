@@ -28,3 +28,7 @@ ab.trim("van_der_pol_pid", max_step=0.1)
 ab.trim("van_der_pol_pid", max_stp=0.1)  # pyright: ignore[reportCallIssue]
 ab.sensitivity("van_der_pol_pid", "PID.P", "PID", atol=1e-9)
 ab.sensitivity("van_der_pol_pid", "PID.P", "PID", atoll=1e-9)  # pyright: ignore[reportCallIssue]
+
+ab.blocks.Fkine(robot=arm).robot.nofriction()
+ab.blocks.Fkine(robot=arm.robot).with_parameters(robot=arm)
+ab.blocks.Fkine(robot=3)  # pyright: ignore[reportArgumentType]

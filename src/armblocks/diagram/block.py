@@ -17,7 +17,7 @@ from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, Vie
 from armblocks.diagram.shape_rules import broadcast
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
-from armblocks.errors import UnknownNameError
+from armblocks.errors import UnknownNameError, check_arguments
 
 Shapes = Mapping[str, Shape]
 """Shapes by port name."""
@@ -90,6 +90,10 @@ class Block(ABC):
 
     formulas: tuple[tuple[str, str], ...] = field(default=(), repr=False, metadata={"formulas": True})
     """The parameters that are formulas, by name, with their texts."""
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
 
     def __post_init__(self) -> None:
         formulas, open_ones = dict(self.formulas), False

@@ -23,7 +23,7 @@ from armblocks.diagram.structure import (
     check_block_count,
 )
 from armblocks.equations import SimulationOptions
-from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.errors import DiagramError, InputError, UnknownNameError
 
 
 class BlockHandle:
@@ -128,9 +128,10 @@ class DiagramBuilder:
 
         In and Out blocks without a number get the next one.
         """
+        where = f"diagram '{self.name}'"
+        _check_block(block, where)
         if isinstance(block, Inport | Outport) and block.port == 0:
             block = dataclasses.replace(block, port=self._next_port(type(block)))
-        where = f"diagram '{self.name}'"
         check_block_name(name, where)
         other = self._taken.get(folded(name))
         if other is not None:
@@ -268,9 +269,16 @@ class DiagramBuilder:
             raise UnknownNameError("block", name, self._blocks, where=f"diagram '{self.name}'")
         return self._blocks[name]
 
-    def _resolve(self, end: Source, *, output: bool) -> PortRef:
+    def _resolve(self, end: object, *, output: bool) -> PortRef:
         """The port that is meant, checked to exist on the right side of its block."""
         side = "output" if output else "input"
+        if not isinstance(end, PortRef | BlockHandle):
+            raise InputError(
+                f"an {side} is a {type(end).__name__}",
+                where=f"diagram '{self.name}'",
+                allowed="what builder.add returns, or a port of it",
+                fix='give handle or handle["port"]; for a number, add a Constant block',
+            )
         name = end.block if isinstance(end, PortRef) else end.name
         block = self._known(name)
         ports = self._ports[name][output]
@@ -286,6 +294,16 @@ class DiagramBuilder:
                 fix='name the port: handle["port"]',
             )
         return PortRef(name, next(iter(ports)))
+
+
+def _check_block(block: object, where: str) -> None:
+    if not isinstance(block, Block):
+        raise InputError(
+            f"a {type(block).__name__} is added in the place of a block",
+            where=where,
+            allowed="blocks, such as Gain(gain=2.0)",
+            fix="make a block first, with its parameters",
+        )
 
 
 def _where(name: str, block: Block) -> str:

@@ -8,7 +8,7 @@ import numbers
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, cast
+from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 
@@ -37,6 +37,14 @@ class ParameterKind(Enum):
     DIAGRAM = "diagram"
     TABLE = "table"
     FUNCTION = "function"
+
+
+@runtime_checkable
+class RobotHolder(Protocol):
+    """What a parameter takes in the place of a robot: something that has one, such as an Arm."""
+
+    @property
+    def robot(self) -> object: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +92,7 @@ class Parameter:
             ParameterKind.INTEGER: "an integer",
             ParameterKind.STRING: "text",
             ParameterKind.BOOLEAN: "true or false",
-            ParameterKind.ROBOT: "a Robot",
+            ParameterKind.ROBOT: "a Robot, or an Arm",
             ParameterKind.DIAGRAM: "a Diagram",
             ParameterKind.TABLE: "a table of instants and values",
             ParameterKind.FUNCTION: "a Python function",
@@ -218,6 +226,10 @@ def _check_object(rule: Parameter, value: object, where: str) -> object:
     return value
 
 
+def _check_robot(rule: Parameter, value: object, where: str) -> object:
+    return _check_object(rule, value.robot if isinstance(value, RobotHolder) else value, where)
+
+
 def _check_table(rule: Parameter, value: object, where: str) -> TimeTable:
     if isinstance(value, TimeTable):
         return value
@@ -243,7 +255,7 @@ _CHECKS: dict[ParameterKind, Callable[[Parameter, object, str], Value]] = {
     ParameterKind.CHOICE: _check_choice,
     ParameterKind.STRING: _check_string,
     ParameterKind.BOOLEAN: _check_boolean,
-    ParameterKind.ROBOT: _check_object,
+    ParameterKind.ROBOT: _check_robot,
     ParameterKind.DIAGRAM: _check_object,
     ParameterKind.TABLE: _check_table,
     ParameterKind.FUNCTION: _check_function,

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
+
+from armblocks.errors import check_arguments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,3 +25,7 @@ class SimulationOptions:
     max_step: float | None = None
     rtol: float = 1e-6
     atol: float = 1e-9
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)

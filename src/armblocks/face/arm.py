@@ -17,6 +17,7 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.face.robot_html import robot_html
 from armblocks.robot import FrictionModel, Robot
+from armblocks.robot.fields import check_kind
 
 if TYPE_CHECKING:
     from armblocks.equations import TracedFunction
@@ -96,6 +97,7 @@ class Arm:
     """
 
     def __init__(self, robot: Robot) -> None:
+        check_kind(robot, Robot, where="Arm")
         self.robot = robot
         self._kernels: dict[str, Kernel] = {}
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import cast
 
-from armblocks.diagram import Diagram
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.diagram import Diagram, flat_diagram
 from armblocks.report.motion import MovingArm, moving_arms
 from armblocks.report.motion_summary import limit_findings, warn_of_limits
+from armblocks.robot.plausibility import LARGEST_ANGLE, warn_of_degrees
 from armblocks.simulation import SimulationResult
 
 _Array = NDArray[np.float64]
@@ -18,11 +21,18 @@ class LimitWatch:
 
     def __init__(self, diagram: Diagram, result: SimulationResult) -> None:
         self._arms = [(arm, *_limits(arm)) for arm in moving_arms(diagram, result)]
+        self._turning = [np.array([unit == "rad" for unit in arm[0].robot.joint_units]) for arm in self._arms]
+        _warn_of_angles(diagram)
 
     def warn(self, result: SimulationResult) -> None:
-        """Issue a ``LimitWarning`` for each limit of position, speed or torque that the run breaks."""
-        for arm, q_low, q_high, qd_most, tau_most in self._arms:
+        """Issue a ``LimitWarning`` for each limit of position, speed or torque that the run breaks.
+
+        Joint angles at the start that look like degrees give an ``ArmblocksWarning``.
+        """
+        for (arm, q_low, q_high, qd_most, tau_most), turning in zip(self._arms, self._turning):
             q = result[arm.q]
+            if np.abs(q[:1]).max(initial=0.0) > LARGEST_ANGLE:
+                warn_of_degrees(q[:1, turning], f"{arm.q} at the start")
             qd = None if arm.qd is None else result[arm.qd]
             tau = None if arm.tau is None else result[arm.tau]
             if (
@@ -40,3 +50,12 @@ def _limits(arm: MovingArm) -> tuple[_Array, _Array, _Array, _Array]:
 
 def _beyond(values: _Array, low: _Array, high: _Array) -> bool:
     return bool((values.min(axis=0) < low).any() or (values.max(axis=0) > high).any())
+
+
+def _warn_of_angles(diagram: Diagram) -> None:
+    """Warn of parameters in rad that look like degrees."""
+    for name, block in flat_diagram(diagram).blocks.items():
+        for rule in block.parameters():
+            if rule.unit == "rad":
+                where = f"block '{name}' ({block.title}), {rule.name}"
+                warn_of_degrees(cast("ArrayLike", block.parameter_value(rule.name)), where)

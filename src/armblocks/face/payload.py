@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import InputError
+from armblocks.errors import InputError, check_arguments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,8 +24,15 @@ class Payload:
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
-        vector = self.numbers
+        try:
+            vector = self.numbers
+        except (TypeError, ValueError):
+            vector = np.empty(0)
         if vector.shape != (10,) or not np.isfinite(vector).all():
             raise InputError(
                 f"payload {self} is not made of 1 + 3 + 6 finite numbers",
@@ -32,6 +40,7 @@ class Payload:
                 where="Payload",
                 fix="correct the numbers",
             )
+        object.__setattr__(self, "mass", float(vector[0]))
         if self.mass < 0:
             raise InputError(
                 f"payload mass {self.mass} kg is negative",

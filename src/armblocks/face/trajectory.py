@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.errors import InputError
+from armblocks.robot.plausibility import warn_of_degrees
 from armblocks.trajectories import Quintic
 
 
@@ -23,6 +25,10 @@ class JointTrajectory:
     def __len__(self) -> int:
         return len(self.t)
 
+    def __iter__(self) -> Iterator[NDArray[np.float64]]:
+        """``q``, ``qd``, ``qdd``, as the toolbox returns them: ``q, qd, qdd = jtraj(…)``."""
+        return iter((self.q, self.qd, self.qdd))
+
 
 def jtraj(
     q0: ArrayLike,
@@ -36,6 +42,7 @@ def jtraj(
     ``t`` is either the instants (N,) in s, the first one 0 and the last one the end of the motion, or a count
     N: then the time is the toolbox's normalised one, ``linspace(0, 1, N)``, and rates are per unit of it.
     ``qd0``, ``qd1`` (n,): speeds at the ends, zero when left out. Same polynomial as the toolbox's ``jtraj``.
+    ``q, qd, qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
     """
     start, goal = _joint_vector("q0", q0), _joint_vector("qf", qf)
     first = None if qd0 is None else _joint_vector("qd0", qd0)
@@ -48,13 +55,18 @@ def jtraj(
                 allowed=f"{start.size}, as q0",
                 fix=f"give {name} as many numbers as q0",
             )
+    for name, angles in (("q0", start), ("qf", goal)):
+        warn_of_degrees(angles, f"jtraj, {name}")
     times = _instants(t)
     motion = Quintic(q0=start, qf=goal, tmax=times[-1:], qd0=first, qd1=last).at(times)
     return JointTrajectory(t=times, q=motion.q, qd=motion.qd, qdd=motion.qdd)
 
 
 def _joint_vector(name: str, value: ArrayLike) -> NDArray[np.float64]:
-    vector = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    try:
+        vector = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    except (TypeError, ValueError):
+        vector = np.empty((0, 0))
     if vector.ndim != 1 or not np.isfinite(vector).all():
         raise InputError(
             f"{name} = {value!r}",

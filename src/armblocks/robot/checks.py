@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 
 from armblocks.errors import ArmblocksWarning, RobotError
+from armblocks.robot.fields import check_kind
 from armblocks.robot.joints import Joint
 from armblocks.robot.link import Link, Motor
 from armblocks.spatial import Transform, Vector3
@@ -18,6 +19,8 @@ MOST_LINKS = 1000
 def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform], gravity: Vector3) -> None:
     """Raise RobotError at the first contradiction; warn (ArmblocksWarning) of friction that drives."""
     robot = f"robot '{name}'"
+    for k, link in enumerate(links):
+        check_kind(link, Link, where=f"{robot}, link number {k + 1}")
     _check_tree(robot, links)
     for frame, transform in frames.items():
         _check_finite(robot, ((frame, number) for number in _numbers(transform)))

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Self
 
-from armblocks.errors import RobotError
+from armblocks.errors import RobotError, check_arguments
+from armblocks.robot.fields import number
 from armblocks.robot.joints import Joint, JointLimits, Prismatic, Revolute
 from armblocks.spatial import Transform, transl, trotx, trotz
 
@@ -38,9 +40,13 @@ class DhRow:
     offset: float = 0.0
     convention: DhConvention = DhConvention.STANDARD
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         for name in ("alpha", "a", "d", "theta", "offset"):
-            object.__setattr__(self, name, float(getattr(self, name)) + 0.0)
+            object.__setattr__(self, name, number(getattr(self, name), where=f"{name} of a D-H row") + 0.0)
         if self.sigma not in (0, 1):
             raise RobotError(
                 f"sigma of a D-H row is {self.sigma}",

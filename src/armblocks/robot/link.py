@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.errors import RobotError
+from armblocks.errors import RobotError, check_arguments
 from armblocks.robot.dh_row import DhRow
+from armblocks.robot.fields import check_kind, number, numbers, pose
 from armblocks.robot.joints import Joint, Revolute
 from armblocks.robot.shapes import Shape
 from armblocks.spatial import Matrix3, Transform, Vector3, matrix3, vector3
@@ -30,10 +32,14 @@ class Motor:
     viscous_friction: float = 0.0
     coulomb_friction: tuple[float, float] = (0.0, 0.0)
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         for name in ("inertia", "gear_ratio", "viscous_friction"):
-            object.__setattr__(self, name, float(getattr(self, name)))
-        Tc = np.atleast_1d(np.asarray(self.coulomb_friction, dtype=np.float64)).ravel()
+            object.__setattr__(self, name, number(getattr(self, name), where=f"{name} of a motor"))
+        Tc = np.atleast_1d(numbers(self.coulomb_friction, where="coulomb_friction of a motor")).ravel()
         if Tc.size not in (1, 2):
             raise RobotError(
                 f"the Coulomb friction of a motor has {Tc.size} numbers",
@@ -79,9 +85,21 @@ class Link:
     motor: Motor | None = None
     geometry: tuple[Shape, ...] | None = None
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
-        object.__setattr__(self, "mass", float(self.mass))
-        where = f"centre_of_mass of link '{self.name}'"
+        link = f"link '{self.name}'"
+        check_kind(self.joint, Joint, where=f"joint of {link}")
+        if self.motor is not None:
+            check_kind(self.motor, Motor, where=f"motor of {link}")
+        if self.dh is not None:
+            check_kind(self.dh, DhRow, where=f"dh of {link}")
+        for frame in ("before", "after"):
+            object.__setattr__(self, frame, pose(getattr(self, frame), where=f"{frame} of {link}"))
+        object.__setattr__(self, "mass", number(self.mass, where=f"mass of {link}"))
+        where = f"centre_of_mass of {link}"
         object.__setattr__(self, "centre_of_mass", vector3(self.centre_of_mass, where=where))
         object.__setattr__(self, "inertia", inertia_matrix(self.inertia, link=self.name))
         if self.geometry is not None:
@@ -108,22 +126,22 @@ def inertia_matrix(value: ArrayLike, *, link: str = "") -> Matrix3:
     Raises RobotError, naming ``link``, for another shape or an asymmetric matrix.
     """
     where = f"inertia of link '{link}'" if link else "inertia"
-    numbers = np.asarray(value, dtype=np.float64)
-    if numbers.shape == (3, 3):
-        if not np.allclose(numbers, numbers.T, rtol=1e-9, atol=0.0, equal_nan=True):
+    entries = numbers(value, where=where)
+    if entries.shape == (3, 3):
+        if not np.allclose(entries, entries.T, rtol=1e-9, atol=0.0, equal_nan=True):
             raise RobotError(
                 "the matrix is not symmetric",
                 where=where,
                 allowed="Ixy = Iyx, Iyz = Izy, Ixz = Izx",
                 fix="make both halves the same",
             )
-        return matrix3((numbers + numbers.T) / 2, where=where)
-    flat = [float(number) + 0.0 for number in numbers.ravel()]
+        return matrix3((entries + entries.T) / 2, where=where)
+    flat = [float(entry) + 0.0 for entry in entries.ravel()]
     if len(flat) == 3:
         flat += [0.0, 0.0, 0.0]
     if len(flat) != 6:
         raise RobotError(
-            f"the shape is {numbers.shape}",
+            f"the shape is {entries.shape}",
             where=where,
             allowed="(3, 3), or 3 numbers Ixx Iyy Izz, or 6 numbers Ixx Iyy Izz Ixy Iyz Ixz",
             fix="give the inertia in one of these forms",

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from armblocks.errors import ArmblocksWarning
 from armblocks.robot.link import Link
@@ -15,6 +16,8 @@ from armblocks.robot.robot import Robot
 
 WHOLE_TURN = 2 * math.pi * (1 + 1e-6)
 """rad, and a little for limits written with six digits."""
+LARGEST_ANGLE = 4 * math.pi
+"""rad; what begins or ends a motion beyond two whole turns is more often a number of degrees."""
 LONGEST_REACH = 20.0
 """m; the largest arms of industry reach 5 m."""
 LARGEST_GYRATION = 3.0
@@ -42,6 +45,19 @@ def doubts(robot: Robot) -> tuple[Doubt, ...]:
     too great for the robot's size (millimetres?), gravity that points up.
     """
     return tuple(_doubts(robot))
+
+
+def warn_of_degrees(angles: ArrayLike, where: str) -> None:
+    """Warn (ArmblocksWarning) where one of the angles, given in rad, is large enough to be degrees."""
+    values = np.abs(np.asarray(angles, dtype=np.float64)).ravel()
+    beyond = values[np.isfinite(values) & (values > LARGEST_ANGLE)]
+    if beyond.size:
+        warnings.warn(
+            f"{where}: an angle of {beyond[0]:g} rad is more than two whole turns. Is this in degrees? "
+            "It is used as given; np.radians makes rad of degrees.",
+            ArmblocksWarning,
+            stacklevel=3,
+        )
 
 
 def warn_of_doubts(robot: Robot) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.errors import UnknownNameError
+from armblocks.errors import UnknownNameError, check_arguments
 from armblocks.robot.checks import check_robot
+from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
 from armblocks.robot.joints import Joint
 from armblocks.robot.link import Link, Motor
@@ -23,9 +25,10 @@ class Robot:
     """Links that form a chain or a tree on one base.
 
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
-    the last link; ``gravity`` m/s2 in the world frame, the acceleration of a falling body (toolbox files say
-    the opposite sign); ``friction_model`` see :class:`FrictionModel`. The joint coordinates q stand in the
-    order of the links that move. A link's joint is called by the link's name.
+    the last link; a (4, 4) matrix is taken for either. ``gravity`` m/s2 in the world frame, the acceleration
+    of a falling body (toolbox files say the opposite sign); ``friction_model`` see :class:`FrictionModel`.
+    The joint coordinates q stand in the order of the links that move. A link's joint is called by the link's
+    name.
 
     A value: two robots are equal, and hash alike, where all their numbers and names are. ``source`` (where
     the numbers come from) is not compared.
@@ -47,8 +50,15 @@ class Robot:
     friction_model: FrictionModel = FrictionModel.SQUARED_GEAR
     source: str = field(default="", compare=False)
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "links", tuple(self.links))
+        for frame in ("base", "tool"):
+            place = f"{frame} of robot '{self.name}'"
+            object.__setattr__(self, frame, pose(getattr(self, frame), where=place))
         object.__setattr__(self, "gravity", vector3(self.gravity, where=f"gravity of robot '{self.name}'"))
         check_robot(
             self.name,

@@ -14,6 +14,7 @@ from casadi import SX, dot, fmax, fmin, if_else, logic_and, logic_not, logic_or,
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.robots.ports import check_joint_values, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.blocks.switching import JUST
 from armblocks.diagram import (
     Block,
@@ -66,7 +67,7 @@ class ArmPlant(Block):
         shown=("q", "qd", "friction"),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     q0: ArrayLike = parameter(
         0.0,
         kind=ParameterKind.ARRAY,

@@ -13,6 +13,7 @@ from casadi import SX, mtimes
 from armblocks import dynamics
 from armblocks.blocks.elimination import solve
 from armblocks.blocks.robots.ports import apply_traced, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -94,7 +95,7 @@ class Manipulability(Block):
         inputs={"q": made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -129,7 +130,7 @@ class RobotEnergy(Block):
         stop_time=5.0,
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return q_port(self.robot), qd_port(self.robot)
@@ -165,7 +166,7 @@ class LoadedRne(Block):
         shown=("q", "tau"),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         motion = (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))

@@ -22,6 +22,7 @@ from armblocks.blocks.robots.ports import (
     qdd_port,
     tau_port,
 )
+from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -102,7 +103,7 @@ class Fkine(Block):
         up=position_of("T")[2],
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -124,7 +125,7 @@ class Jacob0(Block):
         shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -146,7 +147,7 @@ class Jacobe(Block):
         shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -174,7 +175,7 @@ class Rne(Block):
         shown=("q", "tau"),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
@@ -195,7 +196,7 @@ class Gravload(Block):
         shows="The torques that hold the arm against gravity, on its way up.",
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -220,7 +221,7 @@ class Inertia(Block):
         inputs={"q": made("JTraj", q0=(0.0, 0.0), qf=(0.0, 2.5), tmax=8.0).named("motion")},
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)
@@ -242,7 +243,7 @@ class Coriolis(Block):
         shown=("qd", "C"),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot), qd_port(self.robot))
@@ -274,7 +275,7 @@ class ForwardDynamics(Block):
     )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     q0: ArrayLike = parameter(
         0.0,
         kind=ParameterKind.ARRAY,
@@ -324,7 +325,7 @@ class RobotPlot(Block):
         shows="The arm at six moments of its motion, with the path of the tool.",
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (q_port(self.robot),)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from armblocks import dynamics
 from armblocks.blocks.robots.ports import apply_traced, q_port, qd_port, qdd_port, tau_port
+from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -100,7 +101,7 @@ class GravityCompensation(Block):
         stop_time=5.0,
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
     Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
 
@@ -143,7 +144,7 @@ class ComputedTorque(Block):
         stop_time=5.0,
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
     Kp: ArrayLike = parameter(
         100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position", unit="1/s2"
     )
@@ -188,7 +189,7 @@ class FeedForward(Block):
         stop_time=5.0,
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
     Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
     Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
 

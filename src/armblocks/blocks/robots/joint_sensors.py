@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.random_streams import SEED_BITS, draw, normal_quantile, stream_start, stream_states
 from armblocks.blocks.robots.ports import check_joint_values, q_port, qd_port
+from armblocks.blocks.robots.robot_field import RobotField
 from armblocks.diagram import (
     Block,
     ParameterKind,
@@ -52,7 +53,7 @@ class JointSensor(Block):
         shown=("q",),
     )
 
-    robot: Robot = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
+    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
     q_deviation: ArrayLike = parameter(
         1e-4,
         kind=ParameterKind.ARRAY,

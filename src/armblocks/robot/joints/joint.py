@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
-from armblocks.errors import RobotError
+import numpy as np
+
+from armblocks.errors import RobotError, check_arguments
+from armblocks.robot.fields import check_kind, number, numbers
 from armblocks.rounded_functions import hypot
 from armblocks.spatial import Transform, Vector3, rotation_about, vector3
 
@@ -24,9 +27,14 @@ class JointLimits:
     speed: float | None = None
     torque: float | None = None
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         if self.position is not None:
-            position = tuple(float(limit) for limit in self.position)
+            ends = np.atleast_1d(numbers(self.position, where="position limits of a joint"))
+            position = tuple(ends.ravel().tolist())
             if len(position) != 2:
                 raise RobotError(
                     f"the position limits are {len(position)} numbers",
@@ -38,7 +46,7 @@ class JointLimits:
         for name in ("speed", "torque"):
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, float(value))
+                object.__setattr__(self, name, number(value, where=f"{name} limit of a joint"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +67,10 @@ class Joint(ABC):
     unit: ClassVar[str] = ""
     """SI unit of the joint coordinate."""
 
+    def __new__(cls, *values: object, **named: object) -> Self:
+        check_arguments(cls, values, named)
+        return super().__new__(cls)
+
     def __post_init__(self) -> None:
         axis = vector3(self.axis, where="axis of a joint")
         length = hypot(*axis)
@@ -66,7 +78,8 @@ class Joint(ABC):
         if length > 0 and abs(length - 1) > 1e-15 and math.isfinite(length):
             axis = (axis[0] / length, axis[1] / length, axis[2] / length)
         object.__setattr__(self, "axis", axis)
-        object.__setattr__(self, "offset", float(self.offset))
+        object.__setattr__(self, "offset", number(self.offset, where="offset of a joint"))
+        check_kind(self.limits, JointLimits, where="limits of a joint")
 
     @property
     @abstractmethod

@@ -1,0 +1,60 @@
+"""Values of the fields of a robot description in their canonical form, or an error that names the field."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from armblocks.errors import InputError, RobotError
+from armblocks.spatial import Transform
+
+
+def number(value: object, *, where: str) -> float:
+    """A number as a float. Raises ``RobotError``."""
+    try:
+        return float(cast("float", value))
+    except (TypeError, ValueError):
+        raise RobotError(
+            f"{value!r} is not a number", where=where, allowed="a number", fix="give one number"
+        ) from None
+
+
+def numbers(value: ArrayLike, *, where: str) -> NDArray[np.float64]:
+    """An array of floats. Raises ``RobotError``."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RobotError(
+            f"{value!r} is not an array of numbers", where=where, allowed="numbers", fix="give numbers"
+        ) from None
+
+
+def pose(value: object, *, where: str) -> Transform:
+    """A Transform, also from a homogeneous (4, 4) matrix. Raises ``RobotError``."""
+    if isinstance(value, Transform):
+        return value
+    try:
+        return Transform.from_matrix(cast("ArrayLike", value))
+    except InputError as error:
+        what = f"the pose is no Transform and no (4, 4) matrix: {error.what}"
+        raise RobotError(what, where=where, allowed=error.allowed, fix=error.fix) from None
+    except (TypeError, ValueError):
+        raise RobotError(
+            f"the pose is a {type(value).__name__}",
+            where=where,
+            allowed="a Transform, or a homogeneous (4, 4) matrix",
+            fix="give Transform(rotation=…, translation=…), or a matrix",
+        ) from None
+
+
+def check_kind(value: object, kind: type, *, where: str) -> None:
+    """Raise ``RobotError`` unless a value is of a class of the description."""
+    if not isinstance(value, kind):
+        raise RobotError(
+            f"it is of type {type(value).__name__}",
+            where=where,
+            allowed=f"a {kind.__name__}",
+            fix=f"give a {kind.__name__}",
+        )
