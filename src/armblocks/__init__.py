@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         load_library,
         save_diagram,
         save_library,
+        to_python,
     )
     from armblocks.face.linearizing import frequency_response, linearize
     from armblocks.face.model import CompiledDiagram, begin, compile_diagram, simulate
@@ -107,6 +108,7 @@ else:
             "sensitivity": "armblocks.face.sensitivity",
             "simulate": "armblocks.face.model",
             "standard_dh": "armblocks.robot",
+            "to_python": "armblocks.face.diagrams",
             "trim": "armblocks.face.trimming",
             "write_files": "armblocks.face.reporting",
             "write_report": "armblocks.face.reporting",
@@ -165,6 +167,7 @@ __all__ = [
     "sensitivity",
     "simulate",
     "standard_dh",
+    "to_python",
     "trim",
     "write_files",
     "write_report",

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from armblocks.cli import bench, blocks, diagram, diff, linearize, listing, run, show, studio, trim
+from armblocks.cli import bench, blocks, convert, diagram, diff, linearize, listing, run, show, studio, trim
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
@@ -53,6 +53,7 @@ app.command("linearize")(linearize.linearize)
 app.command("trim")(trim.trim)
 app.command("diff")(diff.diff)
 app.command("diagram")(diagram.diagram)
+app.command("convert")(convert.convert)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)

@@ -25,6 +25,15 @@ def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
     return formats.write_diagram(path, diagram)
 
 
+def to_python(diagram: Diagram) -> str:
+    """The Python program that builds a diagram, as ``diagram``, and runs it, as ``result``.
+
+    What is drawn only (layout, notes, description) is left out. Raises ``FormatError`` where a block has a
+    robot that is neither shipped nor from a file, or a Python function.
+    """
+    return formats.diagram_to_python(diagram)
+
+
 def load_library(name_or_path: str | PathLike[str], *, trust: bool = False) -> Mapping[str, Subsystem]:
     """The blocks of a library of subsystems by name, linked to it: a shipped name, or a file's path.
 

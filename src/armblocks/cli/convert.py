@@ -1,0 +1,68 @@
+"""``armblocks convert``: a robot, diagram or library in another file format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from armblocks.cli.completion import complete_anything
+from armblocks.cli.terminal import results_console
+from armblocks.errors import FormatError
+
+
+def convert(
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="A shipped name, or the path of a robot, diagram or library file.",
+            autocompletion=complete_anything,
+        ),
+    ],
+    target: Annotated[
+        Path, typer.Argument(help="The file to write: .json, or .py for a diagram as a Python program.")
+    ],
+    name: Annotated[
+        str | None, typer.Option("--name", help="Which robot of a script that makes several.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagram names.")] = False,
+) -> None:
+    """Write a robot, diagram or library in another format: .m or .json to .json, a diagram to .py."""
+    import armblocks as ab
+    from armblocks.files import write_atomically
+    from armblocks.formats import DocumentKind, kind_of_document
+
+    if Path(source).suffix.lower() == ".py":
+        raise FormatError(
+            "a Python program is not converted, because it would have to be run",
+            where=source,
+            allowed="robots (.json, .m), diagrams and libraries (.json), shipped names",
+            fix='run it, and let it call ab.save_diagram(diagram, "model.json")',
+        )
+    kind = kind_of_document(source)
+    suffixes = (".json", ".py") if kind is DocumentKind.DIAGRAM else (".json",)
+    if target.suffix.lower() not in suffixes:
+        raise FormatError(
+            f"a {kind.value} cannot be written as '{target.suffix or target.name}'",
+            where=str(target),
+            allowed=", ".join(suffixes),
+            fix="give the target another suffix",
+        )
+    if target.exists() and not force:
+        raise FormatError(
+            "the file exists already",
+            where=str(target),
+            allowed="a new file",
+            fix="choose another name, or replace the file with --force",
+        )
+    if kind is DocumentKind.ROBOT:
+        ab.save_robot(ab.load_robot(source, name=name), target)
+    elif kind is DocumentKind.LIBRARY:
+        ab.save_library(ab.load_library(source, trust=trust), target)
+    elif target.suffix.lower() == ".py":
+        write_atomically(target, ab.to_python(ab.load_diagram(source, trust=trust)).encode())
+    else:
+        ab.save_diagram(ab.load_diagram(source, trust=trust), target)
+    results_console().print(f"wrote {target}", soft_wrap=True)

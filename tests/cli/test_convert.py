@@ -1,0 +1,52 @@
+"""``armblocks convert``: files in other formats, none replaced unasked."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from typer.testing import Result
+
+import armblocks as ab
+
+Invoke = Callable[..., Result]
+SCRIPT = "L1 = link([0 1 0 0 0], 'standard');\nL{1} = L1;\narm = robot(L, 'one');\n"
+
+
+def test_diagrams_robots_and_libraries_are_converted(invoke: Invoke, tmp_path: Path) -> None:
+    result = invoke("convert", "van_der_pol_pid", "model.json")
+    assert result.exit_code == 0, result.output
+    assert result.stdout == "wrote model.json\n"
+    diagram = ab.load_diagram(tmp_path / "model.json")
+    assert diagram == ab.load_diagram("van_der_pol_pid")
+    assert invoke("convert", "model.json", "model.py").exit_code == 0
+    assert (tmp_path / "model.py").read_text(encoding="utf-8") == ab.to_python(diagram)
+    assert invoke("convert", "joint_servos", "servos.json").exit_code == 0
+    assert ab.load_library(tmp_path / "servos.json").keys() == ab.load_library("joint_servos").keys()
+    (tmp_path / "arm.m").write_text(SCRIPT, encoding="utf-8")
+    result = invoke("convert", "arm.m", "arm.json")
+    assert result.exit_code == 0, result.output
+    assert ab.load_robot(tmp_path / "arm.json").robot == ab.load_robot(tmp_path / "arm.m").robot
+
+
+def test_a_file_is_replaced_with_force_only(invoke: Invoke, tmp_path: Path) -> None:
+    (tmp_path / "model.py").write_text("mine", encoding="utf-8")
+    result = invoke("convert", "kr180model", "model.py")
+    assert result.exit_code == 2
+    assert "the file exists already" in result.stderr
+    assert (tmp_path / "model.py").read_text(encoding="utf-8") == "mine"
+    assert invoke("convert", "kr180model", "model.py", "--force").exit_code == 0
+    assert "import armblocks" in (tmp_path / "model.py").read_text(encoding="utf-8")
+
+
+def test_what_cannot_be_converted_is_refused(invoke: Invoke, tmp_path: Path) -> None:
+    refused = {
+        ("kr180", "arm.py"): "a robot cannot be written as '.py'",
+        ("kr180model", "model.txt"): "a diagram cannot be written as '.txt'",
+        ("model.py", "model.json"): "a Python program is not converted, because it would have to be run",
+        ("falling_pendulum", "model.py"): "neither a shipped one nor that of a file",
+        ("kr181", "arm.json"): "no shipped robot, diagram or library named 'kr181'",
+    }
+    for arguments, words in refused.items():
+        result = invoke("convert", *arguments)
+        assert result.exit_code == 2
+        assert words in result.stderr
+    assert not list(tmp_path.iterdir())
