@@ -50,8 +50,8 @@ def test_show_prints_the_table_of_the_toolbox(invoke: Invoke) -> None:
     text = invoke("show", "kr180").stdout
     assert "KR180 (4 axis, RRRR, stdDH)" in text
     assert " KUKA Robotics; params of 8/95;" in text
-    assert "| j |     theta |         d |         a |     alpha |    offset |" in text
-    assert "|  1|         q1|       0.75|       0.35|      1.571|          0|" in text
+    assert "| joint |    theta |        d |        a |    alpha |   offset |" in text
+    assert "| link1 |         q|      0.75|      0.35|     1.571|         0|" in text
 
 
 def test_show_names_the_links_whose_inertia_no_body_has(invoke: Invoke) -> None:

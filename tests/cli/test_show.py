@@ -6,8 +6,9 @@ import math
 import pytest
 from rich.console import Console
 
-from armblocks.cli.show import dh_lines, print_robot
+from armblocks.cli.show import print_robot
 from armblocks.robot import Fixed, JointLimits, Link, Prismatic, Revolute, Robot, modified_dh, standard_dh
+from armblocks.robot.dh_table import dh_table, kinematics_text
 from armblocks.spatial import transl
 
 
@@ -40,6 +41,12 @@ def test_a_tree_is_printed_by_parents_and_axes(tree: Robot) -> None:
     assert "hand right fixed 0, 0, 0" in lines
 
 
+def test_a_tree_as_text_has_a_line_for_each_link(tree: Robot) -> None:
+    lines = [" ".join(line.split()) for line in kinematics_text(tree).splitlines()]
+    assert lines[0] == "link parent joint axis at q = 0: x, y, z m"
+    assert "right trunk revolute 0 1 0 0, -0.2, 0" in lines
+
+
 def test_a_sliding_joint_has_limits_in_metres(tree: Robot) -> None:
     lines = [" ".join(line.split()) for line in printed(tree).splitlines()]
     assert "trunk -0.5 m 1.25 m 2 m/s 300 N" in lines
@@ -53,8 +60,8 @@ def test_a_base_that_is_not_the_identity_is_printed(tree: Robot) -> None:
 
 def test_the_joint_variable_of_a_sliding_joint_stands_under_d() -> None:
     slide = standard_dh("slide", theta=math.pi / 2, a=0.25, sigma=1, offset=0.125)
-    lines = dh_lines(Robot(name="slider", links=(slide,)))
-    assert lines[3] == "|  1|      1.571|         q1|       0.25|          0|      0.125|"
+    lines = dh_table(Robot(name="slider", links=(slide,)))
+    assert lines[3] == "| slide |     1.571|         q|      0.25|         0|     0.125|"
 
 
 def test_modified_rows_are_named() -> None:
@@ -70,5 +77,5 @@ def test_many_links_are_split_to_the_width(width: int) -> None:
         standard_dh(f"link{k}", a=0.1, mass=1.0 + k, parent=f"link{k - 1}" if k else None) for k in range(20)
     )
     text = printed(Robot(name="snake", links=links), width)
-    assert max(len(line.rstrip()) for line in text.splitlines()) <= max(width, 66)  # the D-H table is 66 wide
+    assert max(len(line.rstrip()) for line in text.splitlines()) <= max(width, 66)  # the D-H table of these names is 65 wide
     assert all(f"link{k}" in text for k in range(20))

@@ -142,6 +142,7 @@ def test_payload_refuses_what_is_no_body() -> None:
 
 def test_an_arm_shows_itself(puma: ab.Arm) -> None:
     assert "6 joints RRRRRR" in repr(puma)
+    assert "| link1 |         q|    0.6718|" in str(puma)
     html = puma._repr_html_()
     assert html.count("<tr>") >= 7
     assert "<svg" in html

@@ -80,27 +80,12 @@ def _print_heading(robot: Robot, console: Console) -> None:
 
 def _print_kinematics(robot: Robot, console: Console) -> None:
     """The toolbox's own table where every moving link has a D-H row, else parents, axes and poses."""
-    if any(link.dh is None for link in robot.links):
+    from armblocks.robot.dh_table import dh_table, kinematics_text
+
+    if dh_table(robot):
+        console.print(kinematics_text(robot), soft_wrap=True)
+    else:
         _print_tree(robot, console)
-        return
-    console.print("\n".join(dh_lines(robot)), soft_wrap=True)
-    console.print("theta and alpha in rad, d and a in m")
-
-
-def dh_lines(robot: Robot) -> list[str]:
-    """The D-H table as releases 9 and 10 of the toolbox print it, line by line."""
-    rule = "+---+" + "-----------+" * 5
-    heading = "| j |" + "".join(f"{name:>10} |" for name in ("theta", "d", "a", "alpha", "offset"))
-    lines = [rule, heading, rule]
-    for index, link in enumerate(robot.moving_links, start=1):
-        row = link.dh
-        if row is None:
-            continue
-        variable = f"q{index}"
-        theta, d = (f"{row.theta:.4g}", variable) if row.sigma else (variable, f"{row.d:.4g}")
-        cells = (theta, d, f"{row.a:.4g}", f"{row.alpha:.4g}", f"{row.offset:.4g}")
-        lines.append(f"|{index:3d}|" + "".join(f"{cell:>11}|" for cell in cells))
-    return [*lines, rule]
 
 
 def _print_tree(robot: Robot, console: Console) -> None:

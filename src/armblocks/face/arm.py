@@ -17,6 +17,7 @@ from armblocks.errors import InputError, UnknownNameError
 from armblocks.face.payload import Payload, payload_numbers
 from armblocks.face.robot_html import robot_html
 from armblocks.robot import FrictionModel, Robot
+from armblocks.robot.dh_table import kinematics_text
 from armblocks.robot.fields import check_kind
 
 if TYPE_CHECKING:
@@ -265,6 +266,10 @@ class Arm:
 
     def __repr__(self) -> str:
         return f"<Arm {self.name}: {self.n} joints {self.robot.joint_letters}>"
+
+    def __str__(self) -> str:
+        """What ``print`` shows: the D-H table, or the links and joints of a robot without one."""
+        return f"{self!r}\n{kinematics_text(self.robot)}"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the arm with all joints at zero, and its table."""

@@ -1,0 +1,52 @@
+"""The kinematics of a robot as a table of plain text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from armblocks.robot.link import Link
+from armblocks.robot.robot import Robot
+
+_HEADING = ("theta", "d", "a", "alpha", "offset")
+_WIDTH = 10
+
+
+def dh_table(robot: Robot) -> list[str]:
+    """The D-H table as releases 9 and 10 of the toolbox print it, but with the names of the joints.
+
+    Empty where a link has no D-H row. ``q`` stands in the place of the joint variable; theta, alpha
+    and the offset of a revolute joint in rad, the rest in m.
+    """
+    if any(link.dh is None for link in robot.links):
+        return []
+    first = max(len("joint"), *map(len, robot.joint_names)) + 2
+    rule = "+" + "-" * first + "+" + ("-" * _WIDTH + "+") * len(_HEADING)
+    heading = f"| {'joint':<{first - 1}}|" + "".join(f"{name:>{_WIDTH - 1}} |" for name in _HEADING)
+    rows = [
+        f"| {link.name:<{first - 1}}|" + "".join(f"{cell:>{_WIDTH}}|" for cell in _cells(link))
+        for link in robot.moving_links
+    ]
+    return [rule, heading, rule, *rows, rule]
+
+
+def _cells(link: Link) -> Sequence[str]:
+    row = link.dh
+    if row is None:
+        return [""] * len(_HEADING)
+    theta, d = (f"{row.theta:.4g}", "q") if row.sigma else ("q", f"{row.d:.4g}")
+    return [theta, d, f"{row.a:.4g}", f"{row.alpha:.4g}", f"{row.offset:.4g}"]
+
+
+def kinematics_text(robot: Robot) -> str:
+    """The D-H table, or a line for each link where there is none: its parent, joint, axis and place."""
+    table = dh_table(robot)
+    if table:
+        return "\n".join([*table, "theta and alpha in rad, d and a in m"])
+    rows = [("link", "parent", "joint", "axis", "at q = 0: x, y, z m")]
+    for link in robot.links:
+        x, y, z = link.pose(0.0).translation
+        axis = " ".join(f"{part:.3g}" for part in link.joint.axis) if link.joint.moves else ""
+        kind = type(link.joint).__name__.lower()
+        rows.append((link.name, link.parent or "(base)", kind, axis, f"{x:.5g}, {y:.5g}, {z:.5g}"))
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return "\n".join("  ".join(c.ljust(w) for c, w in zip(row, widths)).rstrip() for row in rows)
