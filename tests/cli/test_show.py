@@ -77,5 +77,7 @@ def test_many_links_are_split_to_the_width(width: int) -> None:
         standard_dh(f"link{k}", a=0.1, mass=1.0 + k, parent=f"link{k - 1}" if k else None) for k in range(20)
     )
     text = printed(Robot(name="snake", links=links), width)
-    assert max(len(line.rstrip()) for line in text.splitlines()) <= max(width, 66)  # the D-H table of these names is 65 wide
+    assert max(len(line.rstrip()) for line in text.splitlines()) <= max(
+        width, 66
+    )  # the D-H table of these names is 65 wide
     assert all(f"link{k}" in text for k in range(20))

@@ -1,11 +1,13 @@
 """The arm that users hold: shapes, batches, options, and the words of its errors."""
 
 import pickle
+import re
 
 import numpy as np
 import pytest
 
 import armblocks as ab
+from armblocks.drawing import drawing_bytes
 from armblocks.errors import InputError, UnknownNameError
 
 METHODS_OF_Q = (
@@ -146,3 +148,18 @@ def test_an_arm_shows_itself(puma: ab.Arm) -> None:
     html = puma._repr_html_()
     assert html.count("<tr>") >= 7
     assert "<svg" in html
+
+
+def test_descriptions_show_themselves_in_notebooks(puma: ab.Arm) -> None:
+    assert puma.robot._repr_html_() == puma._repr_html_()
+    diagram = ab.load_diagram("van_der_pol_pid")
+    assert diagram._repr_svg_() == drawing_bytes(diagram, "svg").decode()
+    html = ab.jtraj([0, 1], [2, -1], 5)._repr_html_()
+    assert html.count("<figure>") == 3 and "2 joints, 5 samples to 1 s" in html
+
+
+def test_a_result_shows_angles_in_degrees() -> None:
+    html = ab.simulate("kr180model", stop_time=0.5)._repr_html_()
+    assert "<figcaption>jtraj/q <span>deg · 4</span>" in html
+    assert "<figcaption>jtraj/qd <span>deg/s · 4</span>" in html
+    assert "rad" not in re.sub(r"<style>.*?</style>", "", html)

@@ -15,6 +15,7 @@ from armblocks.diagram.parameter import Parameter, Value
 from armblocks.diagram.port import PortRef
 from armblocks.equations import SimulationOptions
 from armblocks.errors import ArmblocksError, DiagramError, UnknownNameError
+from armblocks.lazy_exports import shown_by
 
 _Kept = TypeVar("_Kept")
 
@@ -153,6 +154,8 @@ class Diagram:
         if all(name in self.mask_values and self.mask_values[name] == values[name] for name in values):
             return self
         return dataclasses.replace(self, mask_values={**self.mask_values, **cast("Any", values)})
+
+    _repr_svg_ = shown_by("armblocks.face.notebook_views", "diagram_svg")
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.blocks.items()), self.connections, self.settings))

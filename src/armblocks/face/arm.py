@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from armblocks.compiler import Kernel, OperationCount, recall
 from armblocks.compiler.arguments import check_count, in_order
 from armblocks.errors import InputError, UnknownNameError
+from armblocks.face.notebook_views import robot_view
 from armblocks.face.payload import Payload, payload_numbers
-from armblocks.face.robot_html import robot_html
 from armblocks.robot import FrictionModel, Robot
 from armblocks.robot.dh_table import kinematics_text
 from armblocks.robot.fields import check_kind
@@ -273,9 +273,7 @@ class Arm:
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the arm with all joints at zero, and its table."""
-        from armblocks.rendering import arm_picture_svg
-
-        return robot_html(self.robot, arm_picture_svg(self.robot, [0.0] * self.n))
+        return robot_view(self.robot)
 
 
 def _traces() -> Mapping[str, Callable[[Robot], TracedFunction]]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armblocks.equations import Slot
 from armblocks.errors import InputError
 from armblocks.robot.plausibility import warn_of_degrees
+from armblocks.simulation.notebook_view import STYLE, panels_html
 from armblocks.trajectories import Quintic
 
 
@@ -28,6 +30,16 @@ class JointTrajectory:
     def __iter__(self) -> Iterator[NDArray[np.float64]]:
         """``q``, ``qd``, ``qdd``, as the toolbox returns them: ``q, qd, qdd = jtraj(…)``."""
         return iter((self.q, self.qd, self.qdd))
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: q, qd and qdd over the time, in the units that they were given in."""
+        head = f"{self.q.shape[1]} joints, {len(self)} samples to {self.t[-1]:g} s"
+        shape = self.q.shape[1:]
+        rows = [(Slot(name, shape), values) for name, values in zip(("q", "qd", "qdd"), self)]
+        return (
+            f'<div class="ab-result"><style>{STYLE}</style><h3>Joint trajectory</h3><p>{head}</p>'
+            f"{panels_html(self.t, rows)}</div>"
+        )
 
 
 def jtraj(

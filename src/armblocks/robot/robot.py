@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armblocks.errors import UnknownNameError, check_arguments
+from armblocks.lazy_exports import shown_by
 from armblocks.robot.checks import check_robot
 from armblocks.robot.fields import pose
 from armblocks.robot.friction_model import FrictionModel
@@ -66,6 +67,8 @@ class Robot:
             {"base": self.base, "tool": self.tool},
             self.gravity,
         )
+
+    _repr_html_ = shown_by("armblocks.face.notebook_views", "robot_view")
 
     @cached_property
     def moving_links(self) -> tuple[Link, ...]:

@@ -7,6 +7,7 @@ Okabe and Ito (2008) that stand out on both.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -58,23 +59,26 @@ def result_html(result: RunData) -> str:
         note = f"<strong>Incomplete.</strong> {note or 'The run did not reach its stop time.'}"
     if note:
         parts.append(f'<p class="ab-note">{note}</p>')
-    slots = list(result.signals_layout)
-    parts.append('<div class="ab-panels">')
-    parts += [_panel(result.time, result[slot.name], slot) for slot in slots[:MOST_PANELS]]
-    parts.append("</div>")
-    if len(slots) > MOST_PANELS:
-        rest = ", ".join(escape(slot.name) for slot in slots[MOST_PANELS:])
-        parts.append(f"<p>Not drawn: {rest}</p>")
+    parts.append(panels_html(result.time, [(slot, result[slot.name]) for slot in result.signals_layout]))
     parts.append("</div>")
     return "".join(parts)
+
+
+def panels_html(time: Array, quantities: Sequence[tuple[Slot, Array]]) -> str:
+    """A panel for each quantity, ``(N, *shape)`` over ``time`` (N,) s; angles in degrees."""
+    panels = "".join(_panel(time, values, slot) for slot, values in quantities[:MOST_PANELS])
+    rest = ", ".join(escape(slot.name) for slot, _ in quantities[MOST_PANELS:])
+    more = f"<p>Not drawn: {rest}</p>" if rest else ""
+    return f'<div class="ab-panels">{panels}</div>{more}'
 
 
 def _panel(time: Array, values: Array, slot: Slot) -> str:
     columns = values.reshape(time.size, slot.size)
     chosen = _most_telling(columns)
-    shown = columns[:, chosen]
+    angle = slot.unit == "rad" or slot.unit.startswith("rad/")
+    unit = slot.unit.replace("rad", "deg", 1) if angle else slot.unit
+    shown = columns[:, chosen] * (180.0 / np.pi if angle else 1.0)
     low, high = (float(shown.min()), float(shown.max())) if shown.size else (0.0, 0.0)
-    unit = slot.unit or ""
     what = " · ".join(part for part in (unit, "×".join(map(str, slot.shape))) if part)
     if len(chosen) < slot.size:
         what += f" · {len(chosen)} of {slot.size} drawn"

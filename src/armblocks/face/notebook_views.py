@@ -1,0 +1,21 @@
+"""How descriptions show themselves in notebooks: what their classes name as the writer of their view."""
+
+from __future__ import annotations
+
+from armblocks.diagram import Diagram
+from armblocks.face.robot_html import robot_html
+from armblocks.robot import Robot
+
+
+def diagram_svg(diagram: Diagram) -> str:
+    """The top sheet, in the colours that the reader prefers."""
+    from armblocks.drawing import drawing_bytes
+
+    return drawing_bytes(diagram, "svg").decode()
+
+
+def robot_view(robot: Robot) -> str:
+    """The arm with all joints at zero, and its table."""
+    from armblocks.rendering import arm_picture_svg
+
+    return robot_html(robot, arm_picture_svg(robot, [0.0] * robot.n))
