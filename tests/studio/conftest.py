@@ -64,7 +64,7 @@ Shaders are compiled as always, and an error in one is reported on the console."
 PATIENCE_MS = 180_000
 """A busy machine may take long; nothing here waits when it need not."""
 expect.set_options(timeout=PATIENCE_MS)
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 class Studio:
