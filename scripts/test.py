@@ -24,14 +24,13 @@ from threading import Event
 from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend")
-FRONTEND = ROOT / "frontend"
-WEB_TOOLS = FRONTEND / "node_modules" / ".bin"
+WEB_TOOL = (PYTHON, "frontend/node.py", "exec", "--offline", "--")
 
 STEPS: dict[str, tuple[str | object, ...]] = {
     "page": (PYTHON, "frontend/build_page.py"),
     "web types": (PYTHON, "scripts/studio_types.py", "--check"),
-    "web lint": (WEB_TOOLS / "oxlint", "src"),
-    "web format": (WEB_TOOLS / "prettier", "--check", "src/**/*.{ts,tsx}", "*.ts"),
+    "web lint": (*WEB_TOOL, "oxlint", "src"),
+    "web format": (*WEB_TOOL, "prettier", "--check", "src/**/*.{ts,tsx}", "*.ts"),
     "lint": (BINARIES / "ruff", "check", *SOURCES),
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),
     "types": (BINARIES / "pyright", "--warnings"),
@@ -39,8 +38,6 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "docs": (PYTHON, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"),
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
-FOLDERS = {"web lint": FRONTEND, "web format": FRONTEND}
-"""Where a step runs, if not in the folder of the project."""
 BEFORE_ALL = ("page",)
 """Steps whose result the others need."""
 STAGES = (
@@ -74,7 +71,7 @@ class Step:
             with self._output.open("wb") as output:
                 self._process = subprocess.Popen(
                     self.command,
-                    cwd=FOLDERS.get(self.name, ROOT),
+                    cwd=ROOT,
                     env=ENVIRONMENT,
                     stdin=subprocess.DEVNULL,
                     stdout=output,

