@@ -33,12 +33,14 @@ def test_registers_are_numbered_inputs_constants_operations() -> None:
     assert str(tape) == ("inputs (2, 1)\nr3 = 2.5\nr4 = add r1 r3\nr5 = divide r4 r2\noutput 0: r5 r4")
 
 
-def test_a_product_of_one_use_is_fused_and_of_two_is_not() -> None:
+def test_a_product_of_one_use_is_fused_and_of_two_or_a_rounded_one_is_not() -> None:
     builder = TapeBuilder([4])
     a, b, c, d = (builder.input(0, place) for place in range(4))
     product = builder.add(Opcode.MULTIPLY, a, b)
     once = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]])
     assert once.operations == (Operation(Opcode.FNMA, (0, 1, 2)),)
+    rounded = builder.build([[builder.add(Opcode.SUBTRACT, c, product)]], rounded=[product])
+    assert opcodes(rounded) == [Opcode.MULTIPLY, Opcode.SUBTRACT]
     twice = builder.build([[builder.add(Opcode.ADD, product, c), builder.add(Opcode.SUBTRACT, product, d)]])
     assert opcodes(twice) == [Opcode.MULTIPLY, Opcode.ADD, Opcode.SUBTRACT]
     other = builder.add(Opcode.MULTIPLY, c, d)

@@ -358,6 +358,7 @@ class Network:
                 break
             for block in again:
                 block.restart()
+                self._begin_signs(block)
         new: list[tuple[np.ndarray, np.ndarray]] = []
         for block in self.blocks.values():
             if block.clock in self.ticking and block.on:
@@ -431,12 +432,17 @@ class Network:
             block.restart()
         return acted
 
+    def _begin_signs(self, block: Any) -> None:
+        """The guards of a block begin where they are, as at the start of a run."""
+        self._feed_all(block)
+        for guard in block.guards:
+            self.signs[block.name, guard.name] = np.sign(block.value("guard", guard.name))
+
     def end_instant(self) -> None:
         """Guards of a subsystem that was switched on are watched from now on."""
-        for name, guard in self.signs:
+        for name in {name for name, _ in self.signs}:
             if self.blocks[name].on and not self.was_on[name]:
-                self._feed_all(self.blocks[name])
-                self.signs[name, guard] = np.sign(self.blocks[name].value("guard", guard))
+                self._begin_signs(self.blocks[name])
         self.was_on = {name: self.blocks[name].on for name in self.was_on}
 
     @property

@@ -27,9 +27,11 @@ from armblocks.blocks import (
     Integrator,
     IntegratorLimited,
     IntervalTest,
+    Modulo,
     Product,
     PulseGenerator,
     Quantizer,
+    Ramp,
     RateLimiterContinuous,
     RateLimiterDynamic,
     RelationalOperator,
@@ -195,6 +197,38 @@ def test_the_chattering_block_is_named_and_not_one_that_switched_before() -> Non
     with pytest.raises(SimulationError, match="block 'relay' causes events without end") as raised:
         ab.simulate(builder.build(), stop_time=3.0)
     assert "early" not in str(raised.value)
+
+
+def test_a_quantizer_that_steps_up_and_down_within_its_hysteresis_is_named() -> None:
+    builder = DiagramBuilder("chatter")
+    place = builder.add("place", Integrator())
+    steps = builder.add("steps", Quantizer(interval=0.1), place)
+    error = builder.add("error", Sum(signs="+-"), builder.add("aim", Constant(value=0.26)), steps)
+    builder.connect(error, place["u"])
+    with pytest.raises(SimulationError, match=r"'steps' causes events without end.*100000 of 1e-08"):
+        ab.simulate(builder.build(), stop_time=100.0)
+
+
+def test_jumps_that_crowd_at_a_pole_are_named() -> None:
+    """``t mod (1 - t)`` jumps n times before t = n / (n + 1): infinitely often before 1 s."""
+    builder = DiagramBuilder("pole")
+    builder.add(
+        "rest", Modulo(), builder.add("time", Ramp()), builder.add("left", Ramp(slope=-1.0, initial=1.0))
+    )
+    with pytest.raises(SimulationError, match=r"'rest' causes events without end at 0\.9"):
+        ab.simulate(builder.build(), stop_time=2.0)
+
+
+@pytest.mark.parametrize("switch", [Sign(), CompareToZero(relation="~=")], ids=["Sign", "CompareToZero"])
+def test_a_difference_of_recorded_values_that_is_0_counts_as_0(switch: Block) -> None:
+    """The quantizer's product is rounded before it is subtracted, in modes and in records alike."""
+    builder = DiagramBuilder("tie")
+    value = builder.add("value", Constant(value=-1.0))
+    error = builder.add("error", Sum(signs="+-"), value, builder.add("steps", Quantizer(interval=0.1), value))
+    builder.add("switch", switch, error)
+    result = ab.simulate(builder.build(), stop_time=0.1)
+    assert not result["error/y"].any()
+    assert not result["switch/y"].any()
 
 
 def test_modes_without_a_consistent_choice_are_named() -> None:

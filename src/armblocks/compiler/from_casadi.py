@@ -75,15 +75,16 @@ def tape_from(traced: TracedFunction) -> Tape:
 
     Raises :class:`CompileError` naming the operation, if the graph has one that tapes do not know.
     """
-    function = traced.casadi_function()
+    function = Function("f", list(traced.arguments), [*traced.results, traced.rounded], {"cse": True})
     builder = TapeBuilder([slot.size for slot in traced.inputs])
     inputs = [[builder.input(k, place) for place in range(slot.size)] for k, slot in enumerate(traced.inputs)]
     outputs = [[builder.constant(0.0)] * slot.size for slot in traced.outputs]
     places = [function.sparsity_out(k).row() for k in range(len(outputs))]
-    for slot, entries in enumerate(_inlined(builder, function, inputs, traced.name)):
+    *found, rounded = _inlined(builder, function, inputs, traced.name)
+    for slot, entries in enumerate(found):
         for place, handle in zip(places[slot], entries):
             outputs[slot][place] = handle
-    return with_matrix_products(builder.build(outputs))
+    return with_matrix_products(builder.build(outputs, rounded))
 
 
 def _inlined(

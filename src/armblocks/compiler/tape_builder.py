@@ -2,7 +2,7 @@
 
 Only rewritings that give the same bits for every input (but the sign of a NaN) are made, with one exception
 that is made here once and for all machines: ``a b + c`` becomes one fused multiply-add where the product has
-no other use.
+no other use and is not one that the traced function rounds.
 """
 
 from __future__ import annotations
@@ -162,9 +162,12 @@ class TapeBuilder:
             return self.add(Opcode.SELECT, inverse[0], no, yes)
         return None
 
-    def build(self, outputs: Sequence[Sequence[int]]) -> Tape:
-        """The tape that gives these handles, one sequence per output slot."""
-        nodes = self._fuse(outputs)
+    def build(self, outputs: Sequence[Sequence[int]], rounded: Sequence[int] = ()) -> Tape:
+        """The tape that gives these handles, one sequence per output slot.
+
+        ``rounded``: products that are not fused with a sum.
+        """
+        nodes = self._fuse(outputs, frozenset(rounded))
         needed = _reachable(nodes, [handle for slot in outputs for handle in slot])
         constants = [handle for handle in needed if isinstance(nodes[handle], float)]
         computed = [handle for handle in needed if isinstance(nodes[handle], tuple)]
@@ -184,8 +187,8 @@ class TapeBuilder:
             outputs=tuple(tuple(register[handle] for handle in slot) for slot in outputs),
         )
 
-    def _fuse(self, outputs: Sequence[Sequence[int]]) -> list[_Node | float | None]:
-        """Join each product of a single use with the sum that uses it."""
+    def _fuse(self, outputs: Sequence[Sequence[int]], rounded: frozenset[int]) -> list[_Node | float | None]:
+        """Join each product of a single use with the sum that uses it, but for those that are rounded."""
         nodes = list(self._nodes)
         wanted = [handle for slot in outputs for handle in slot]
         uses = [0] * len(nodes)
@@ -198,8 +201,9 @@ class TapeBuilder:
 
         def product(handle: int) -> tuple[int, ...] | None:
             node = nodes[handle]
-            single = uses[handle] == 1 and isinstance(node, tuple) and node[0] is Opcode.MULTIPLY
-            return node[1] if single and isinstance(node, tuple) else None
+            if uses[handle] > 1 or handle in rounded:
+                return None
+            return node[1] if isinstance(node, tuple) and node[0] is Opcode.MULTIPLY else None
 
         for handle, node in enumerate(nodes):
             if not isinstance(node, tuple) or node[0] not in (Opcode.ADD, Opcode.SUBTRACT):

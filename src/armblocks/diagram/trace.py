@@ -82,10 +82,16 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
-    def function(name: str, ends: Mapping[str, SX], **results: Sequence[SX]) -> TracedFunction:
-        return _flat_function(name, ends, {key: loops.solved(parts) for key, parts in results.items()})
+    products, updated, updated_products = loops.solved(flow.products), *_updated(model, symbols, flow, loops)
+
+    def function(name: str, inputs: Mapping[str, SX], **results: Sequence[SX]) -> TracedFunction:
+        rounded = products if inputs.keys() >= ends.keys() else SX(0, 1)
+        return _flat_function(
+            name, inputs, {key: loops.solved(parts) for key, parts in results.items()}, rounded
+        )
 
     residual = function("residual", ends, r=[loops.residual])
+    update = function("update", ends | m, z=[updated])
     return HybridSystem(
         name=diagram.name,
         states=signature(*symbols.state_slots),
@@ -101,7 +107,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         residual_jacobian=_by_unknowns(residual, loops.w),
         captures=_keeps_left_limits(model),
         called=tuple(name for name, block in diagram.blocks.items() if block.called),
-        update=function("update", ends | m, z=_updated(model, symbols, flow, loops)),
+        update=dataclasses.replace(update, rounded=vertcat(products, loops.solved([updated_products]))),
         guards=function("guards", ends, g=[value for _, _, value in guards]),
         guard_directions=tuple(guard.direction for _, guard in entries),
         guard_names=tuple(name for name, _ in entries),
@@ -115,17 +121,9 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         initial_states=function("initial_states", p, x0=_initial_values(model, symbols)),
         initial_discrete=function("initial_discrete", p, z0=_initial_discrete(model, symbols)),
         initial_algebraic=function("initial_algebraic", p, w0=[loops.guesses]),
-        breakpoints=function(
-            "breakpoints",
-            p,
-            times=[
-                SX(time)
-                for name, block in diagram.blocks.items()
-                for time in block.breakpoints(symbols.parameters_of(name))
-            ],
-        ),
+        breakpoints=function("breakpoints", p, times=_breakpoints(diagram, symbols)),
         aliases=_aliases(form, layout),
-        delays=_delays(model, symbols, flow, loops, ends),
+        delays=_delays(model, symbols, flow, loops, ends, products),
         loops=_linear_loops(loops, ends),
     )
 
@@ -137,12 +135,12 @@ def _linear_loops(loops: Implicit, ends: Mapping[str, SX]) -> LinearLoops | None
     matrices = loops.solved([flatten(matrix, matrix.shape) for _, matrix in loops.linear])
     return LinearLoops(
         signals=tuple(names for names, _ in loops.linear),
-        matrices=_flat_function("loop_matrices", ends, {"A": matrices}),
+        matrices=_flat_function("loop_matrices", ends, {"A": matrices}, SX(0, 1)),
     )
 
 
-def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> list[SX]:
-    """All discrete variables after a tick.
+def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> tuple[SX, SX]:
+    """All discrete variables after a tick, and the signals that are products.
 
     Raises ``DiagramError`` where a loop that is not linear hangs on what is sampled at the same instant.
     """
@@ -157,9 +155,9 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
                 if slot.kind in (SlotKind.OUTPUT, SlotKind.UPDATE):
                     value = tick.value(Value(Node(name, index, 0), slot.kind, slot.name))
                     discrete[f"{name}/{slot.name}"] = value
-    updated = vertcat(*discrete.values(), SX(0, 1))
+    updated, products = vertcat(*discrete.values(), SX(0, 1)), vertcat(*tick.products, SX(0, 1))
     if not tick.unknowns:
-        return [updated]
+        return updated, products
     cuts = vertcat(*tick.unknowns.values())
     residual = tick.residuals()
     solution, remaining, _ = solve_affine(cuts, residual)
@@ -176,7 +174,7 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
         # The same equations as those of the flow, perhaps cut elsewhere: their values are known from there.
         known = loops.solved([flow.value(_same(model.flow, value)) for value in tick.unknowns])
         solution = substitute(solution, cuts[remaining], known[remaining])
-    return [substituted(updated, cuts, solution)]
+    return substituted(updated, cuts, solution), substituted(products, cuts, solution)
 
 
 def _keeps_left_limits(model: Model) -> bool:
@@ -197,6 +195,15 @@ def _captured(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, SX]:
         for kind, slot in equations.group_of
         if kind is SlotKind.CAPTURE
     }
+
+
+def _breakpoints(diagram: Diagram, symbols: Symbols) -> list[SX]:
+    """The times at which sources jump."""
+    return [
+        SX(time)
+        for name, block in diagram.blocks.items()
+        for time in block.breakpoints(symbols.parameters_of(name))
+    ]
 
 
 def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
@@ -279,7 +286,7 @@ def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
 
 
 def _delays(
-    model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, ends: Mapping[str, SX]
+    model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, ends: Mapping[str, SX], products: SX
 ) -> Delays | None:
     """What is delayed, and how long. Raises ``DiagramError`` where a delay hangs on what it decides."""
     places = signature(*symbols.discrete_slots).ranges
@@ -316,10 +323,10 @@ def _delays(
             fix="pass the delay time through a lag or a sampled block first",
         )
 
-    def function(title: str, ends: Mapping[str, SX], *keys: str) -> TracedFunction:
-        return _flat_function(
-            title, ends, {"d": loops.solved([part for key in keys for part in columns[key]])}
-        )
+    def function(title: str, inputs: Mapping[str, SX], *keys: str) -> TracedFunction:
+        rounded = products if inputs.keys() >= ends.keys() else SX(0, 1)
+        column = loops.solved([part for key in keys for part in columns[key]])
+        return _flat_function(title, inputs, {"d": column}, rounded)
 
     return Delays(
         values=tuple(values),
@@ -352,12 +359,15 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
     return {"x": list(states.values()), "z": list(discrete.values())}
 
 
-def _flat_function(name: str, inputs: Mapping[str, SX], outputs: Mapping[str, SX]) -> TracedFunction:
+def _flat_function(
+    name: str, inputs: Mapping[str, SX], outputs: Mapping[str, SX], rounded: SX
+) -> TracedFunction:
     def ends(columns: Mapping[str, SX]) -> Signature:
         shapes = {letter: () if letter == "t" else (column.numel(),) for letter, column in columns.items()}
         return Signature(tuple(Slot(letter, shape) for letter, shape in shapes.items()))
 
-    return TracedFunction(name, ends(inputs), ends(outputs), tuple(inputs.values()), tuple(outputs.values()))
+    arguments, results = tuple(inputs.values()), tuple(outputs.values())
+    return TracedFunction(name, ends(inputs), ends(outputs), arguments, results, rounded)
 
 
 def _signal_values(

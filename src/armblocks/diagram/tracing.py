@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
+import casadi
 import numpy as np
 from casadi import (
     SX,
@@ -91,6 +92,8 @@ class Tracing:
         self._clock_of = clock_of or {}
         self._values: dict[Node, dict[tuple[SlotKind, str], SX]] = {}
         self._left_over: dict[Value, SX] = {}
+        self.products: list[SX] = []
+        """The signals that are products of two numbers."""
         self.unknowns: dict[Value, SX] = {}
         """What stands for values that were needed before they were worked out, the cuts of the loops, and for
         outputs that are implicit."""
@@ -122,6 +125,9 @@ class Tracing:
         arguments = [symbols.t, symbols.parameters[node.block], *columns]
         flat = group.value(node.order, arguments)
         parts = _split(flat, [slot.size for slot in group.slots])
+        for slot, part in zip(group.slots, parts):
+            if slot.kind is SlotKind.OUTPUT:
+                self.products += _products(part)
         self._values[node] = {(slot.kind, slot.name): part for slot, part in zip(group.slots, parts)}
         for name in self.network.diagram.blocks[node.block].implicit_outputs:
             if (SlotKind.OUTPUT, name) in self._values[node]:
@@ -253,6 +259,13 @@ def _split(column: SX, sizes: Sequence[int]) -> list[SX]:
     if len(sizes) == 1:
         return [column]
     return vertsplit(column, [0, *np.cumsum(sizes).tolist()]) if sizes else []
+
+
+def _products(column: SX) -> list[SX]:
+    """The elements that are products, or what an element is the negative of."""
+    entries = [entry for entry in column.nonzeros() if not entry.is_leaf()]
+    plain = [entry.dep(0) if entry.op() == casadi.OP_NEG else entry for entry in entries]
+    return [entry for entry in plain if not entry.is_leaf() and entry.op() in (casadi.OP_MUL, casadi.OP_SQ)]
 
 
 def _named_symbols(letter: str, slots: Sequence[Slot]) -> tuple[SX, dict[str, SX]]:

@@ -49,11 +49,17 @@ def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...
             return traced
         place = traced.inputs.names.index("p")
         given = [whole if k == place else symbol for k, symbol in enumerate(traced.arguments)]
-        results = Function("f", list(traced.arguments), list(traced.results)).call(given, True, False)
+        *results, rounded = Function("f", list(traced.arguments), [*traced.results, traced.rounded]).call(
+            given, True, False
+        )
         slots = [Slot("p", (layout.size,)) if k == place else slot for k, slot in enumerate(traced.inputs)]
         arguments = tuple(p if k == place else symbol for k, symbol in enumerate(traced.arguments))
         return dataclasses.replace(
-            traced, inputs=Signature(tuple(slots)), arguments=arguments, results=tuple(results)
+            traced,
+            inputs=Signature(tuple(slots)),
+            arguments=arguments,
+            results=tuple(results),
+            rounded=rounded,
         )
 
     delays = system.delays

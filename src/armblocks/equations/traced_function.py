@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from casadi import SX, Function
+from casadi import SX, Function, vertcat
 from numpy.typing import ArrayLike, NDArray
 
 from armblocks.equations.signatures import Signature
@@ -21,6 +21,10 @@ class TracedFunction:
 
     ``arguments[i]`` is the flat column of symbols of input slot ``i`` and ``results[j]`` the flat dense
     column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signatures`).
+
+    ``rounded``: products among the expressions that are numbers of their own, such as signals. Numerics round
+    them, also where a sum follows that could be fused with them. A signal then has the same bits in every
+    function of a system, and a sum of signals is that of the numbers that are recorded.
     """
 
     name: str
@@ -28,6 +32,7 @@ class TracedFunction:
     outputs: Signature
     arguments: tuple[SX, ...]
     results: tuple[SX, ...]
+    rounded: SX = field(default_factory=lambda: SX(0, 1))
 
     @classmethod
     def trace(
@@ -54,7 +59,7 @@ class TracedFunction:
 
     def joined(self, other: TracedFunction) -> TracedFunction:
         """This map with the results of another one of the same inputs behind its own."""
-        more = Function("f", list(other.arguments), list(other.results)).call(
+        *more, rounded = Function("f", list(other.arguments), [*other.results, other.rounded]).call(
             list(self.arguments), True, False
         )
         return TracedFunction(
@@ -63,6 +68,7 @@ class TracedFunction:
             outputs=Signature((*self.outputs.slots, *other.outputs.slots)),
             arguments=self.arguments,
             results=(*self.results, *more),
+            rounded=vertcat(self.rounded, rounded),
         )
 
     def casadi_function(self) -> Function:

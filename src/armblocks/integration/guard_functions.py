@@ -13,6 +13,9 @@ MOST_AT_ONCE = 1000
 """Events that may follow one another closely, at distances that do not shrink."""
 CLOSE = 1e-12
 """Events nearer than this, beside the time, follow one another closely."""
+MOST_CROWDED, CROWD = 100_000, 1e-8
+"""So many events in a row, each nearer than this to the one before, beside the time, are taken for endless
+at any distances: a run goes on by less than a thousandth of its time meanwhile."""
 SHRINKING, SHRUNK = 10, 2.0**-46
 """So many events of a guard in a row, each sooner than the one before, down to this distance beside the
 time, some 100 units in its last place, are taken for the first of infinitely many."""
@@ -250,13 +253,15 @@ class GuardFunctions:
 
         Events follow closely where less than ``CLOSE`` of the time lies between them. A series whose
         distances shrink, as those of a bouncing ball, may come to an end by itself: it has none only where
-        the distances become as short as the rounding of the time.
+        the distances become as short as the rounding of the time, or where ``MOST_CROWDED`` events come in a
+        row.
         """
         places = self.places
         bound = r.real(float("inf"))
         scale = maximum(t, 1e-6 * reals[Scalar.SPAN])
         shrunk = SHRUNK * scale
-        close = t - reals[Scalar.LAST_EVENT] <= CLOSE * scale
+        since_last = t - reals[Scalar.LAST_EVENT]
+        close, crowd = since_last <= CLOSE * scale, since_last <= CROWD * scale
         reals[Scalar.LAST_EVENT] = t
         fired_one, ending, endless = r.boolean(False), r.boolean(True), r.boolean(False)
         fired, repeats, last, gap, shrinking = (
@@ -286,7 +291,9 @@ class GuardFunctions:
         further = counts[Count.CLOSE] + (first & ~shrinks).count()
         in_a_row = select(close, further, 0)
         counts[Count.CLOSE] = in_a_row
-        without_end = endless.value | (in_a_row > MOST_AT_ONCE)
+        crowded = select(crowd, counts[Count.CROWDED] + first.count(), 0)
+        counts[Count.CROWDED] = crowded
+        without_end = endless.value | (in_a_row > MOST_AT_ONCE) | (crowded > MOST_CROWDED)
         return select(without_end, -1.0, bound.value)
 
 

@@ -105,7 +105,9 @@ class Count(IntEnum):
     """Rows that there is room for."""
     SHORT = 21
     """Checks that found a step short without need, less some for every check that did not."""
-    END = 22
+    CROWDED = 22
+    """Events in a row of which each comes soon after the one before."""
+    END = 23
 
 
 class Stage(IntEnum):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from armblocks.equations import Signature
 from armblocks.errors import SimulationError
-from armblocks.integration.guard_functions import MOST_AT_ONCE
+from armblocks.integration.guard_functions import CLOSE, CROWD, MOST_AT_ONCE, MOST_CROWDED
 from armblocks.integration.native_integrator import Integration
 from armblocks.integration.system import CompiledSystem
 from armblocks.integration.workspace import Status
@@ -140,7 +140,7 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
         "all: they follow one another at ever shorter distances, or at one instant (Zeno behaviour or "
         "chattering)",
         where=system.name,
-        allowed=f"at most {MOST_AT_ONCE} events as good as at one instant",
+        allowed=f"{MOST_AT_ONCE} events in a row at distances of {CLOSE:g} t, {MOST_CROWDED} of {CROWD:g} t",
         fix=f"give '{blocks[0]}' a hysteresis, a dead band or a state of rest (no bounce below some speed), "
         "or stop the run before",
     )
