@@ -435,8 +435,9 @@ class Network:
     def _begin_signs(self, block: Any) -> None:
         """The guards of a block begin where they are, as at the start of a run."""
         self._feed_all(block)
-        for guard in block.guards:
-            self.signs[block.name, guard.name] = np.sign(block.value("guard", guard.name))
+        for name, guard in self.signs:
+            if name == block.name:
+                self.signs[name, guard] = np.sign(block.value("guard", guard))
 
     def end_instant(self) -> None:
         """Guards of a subsystem that was switched on are watched from now on."""
