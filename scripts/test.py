@@ -29,8 +29,9 @@ WEB_TOOL = (PYTHON, "frontend/node.py", "exec", "--offline", "--")
 STEPS: dict[str, tuple[str | object, ...]] = {
     "page": (PYTHON, "frontend/build_page.py"),
     "web types": (PYTHON, "scripts/studio_types.py", "--check"),
-    "web lint": (*WEB_TOOL, "oxlint", "src"),
-    "web format": (*WEB_TOOL, "prettier", "--check", "src/**/*.{ts,tsx}", "*.ts"),
+    "web lint": (*WEB_TOOL, "oxlint", "src", "tests"),
+    "web format": (*WEB_TOOL, "prettier", "--check", "{src,tests}/**/*.{ts,tsx}", "*.ts"),
+    "web tests": (*WEB_TOOL, "vitest", "run"),
     "lint": (BINARIES / "ruff", "check", *SOURCES),
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),
     "types": (BINARIES / "pyright", "--warnings"),
@@ -41,7 +42,7 @@ STEPS: dict[str, tuple[str | object, ...]] = {
 BEFORE_ALL = ("page",)
 """Steps whose result the others need."""
 STAGES = (
-    (("types",), ("web types", "web lint", "web format", "lint", "format", "layers", "docs")),
+    (("types",), ("web types", "web lint", "web format", "web tests", "lint", "format", "layers", "docs")),
     (("tests",),),
 )
 """Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.

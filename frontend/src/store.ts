@@ -105,7 +105,10 @@ useStudio.subscribe(viewsChanged)
 
 /** The line to the server; `events.ts` says what happens when the server tells something. */
 export const line = new Connection(
-  (frame) => samples.receive(frame),
+  (frame) => {
+    samples.receive(frame)
+    viewsChanged()
+  },
   (state) => useStudio.setState({ line: state }),
   (reason) => refuse(reason),
 )

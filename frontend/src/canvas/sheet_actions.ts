@@ -1,7 +1,7 @@
 import type { Place, SheetBlock, SheetNote, Wire } from '../protocol'
 import { change, look, useStudio } from '../store'
 import { writeNote } from './note_node'
-import type { Places } from './sheet_layout'
+import type { Places } from '../model/wires'
 
 /** What commands do with the sheet on the screen; `null` while there is none. */
 export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = {

@@ -1,10 +1,11 @@
 import type { NodeHandle } from '@xyflow/react'
 import type { Finding, PortSpot, SheetBlock, SheetNote, Wire, WireKind } from '../protocol'
 import type { BlockNodeType } from './block_node'
-import { wholeWay } from './bends'
+import { wholeWay } from '../model/bends'
 import type { NoteNodeType } from './note_node'
-import type { Point, RoutedNet } from './router'
-import { blockOf, PORT, portOf, side, wireKey, type Places } from './sheet_layout'
+import type { Point, RoutedNet } from '../model/router'
+import { blockOf, portOf, wireKey, type Places } from '../model/wires'
+import { PORT, side } from './sheet_layout'
 import type { WireEdgeType } from './wire_edge'
 
 export type SheetNode = BlockNodeType | NoteNodeType

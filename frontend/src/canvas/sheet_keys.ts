@@ -7,7 +7,8 @@ import { chosenBlocks } from './arranging'
 import { editNote } from './note_node'
 import { addNote, move, openBlock, sheetView } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
-import { FIT, wireKey, type Places } from './sheet_layout'
+import { FIT } from './sheet_layout'
+import { wireKey, type Places } from '../model/wires'
 import type { WireEdgeType } from './wire_edge'
 
 const NUDGE = 5

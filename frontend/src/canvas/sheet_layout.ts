@@ -1,6 +1,7 @@
 import { Position, type FitViewOptions } from '@xyflow/react'
 import type { PortSpot, SheetBlock, Wire } from '../protocol'
-import { route, type Net, type Obstacle, type RoutedNet, type WireEnd } from './router'
+import { blockOf, portOf, wireKey, type Places } from '../model/wires'
+import { route, type Net, type Obstacle, type RoutedNet, type WireEnd } from '../model/router'
 
 const NAME_SIZE = 11
 const NAME_FONT = `${NAME_SIZE}px 'Inter Variable', sans-serif`
@@ -9,10 +10,6 @@ const NAME_ROOM = 20
 export const WIDEST_NAME = 168
 /** px: a port is so wide and high. */
 export const PORT = 9
-
-export const wireKey = (wire: Wire): string => `${wire.source} -> ${wire.target}`
-export const blockOf = (port: string): string => port.slice(0, port.lastIndexOf('/'))
-export const portOf = (port: string): string => port.slice(port.lastIndexOf('/') + 1)
 
 /** The side of a block at which a port is. */
 export function side({ dx, dy }: PortSpot, output: boolean): Position {
@@ -35,9 +32,6 @@ export function nameWidth(name: string): number {
   if (document.fonts.check(NAME_FONT)) widths.set(name, width)
   return width
 }
-
-/** Blocks by name, at the places where they are drawn now (which a drag may have changed). */
-export type Places = Record<string, { x: number; y: number; flipped?: boolean }>
 
 /** Where a block's name stands: where no wire leaves, as in the drawings of reports. */
 export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'beside' | 'above' {

@@ -3,9 +3,9 @@ import { memo } from 'react'
 import { create } from 'zustand'
 import type { Wire } from '../protocol'
 import { change } from '../store'
-import { dragged, isFlat } from './bends'
+import { dragged, isFlat } from '../model/bends'
 import { GRID } from './insert'
-import { svgPath, type Point } from './router'
+import { svgPath, type Point } from '../model/router'
 
 export type WireEdgeType = Edge<
   {

@@ -2,7 +2,8 @@ import { create } from 'zustand'
 import { changed } from '../frames'
 import type { EventOf } from '../messages'
 import type { ViewOf } from '../protocol'
-import { RunSamples, samples, showSamples } from '../samples'
+import { RunSamples } from '../model/run_samples'
+import { samples, showSamples } from '../samples'
 
 /** A parameter that got another value while a run went on. */
 export interface Tuning {
@@ -102,6 +103,7 @@ export function tuned({ run, time, parameter, value }: EventOf<'run_tuned'>): vo
 
 export function rewound({ run, time, count }: EventOf<'run_rewound'>): void {
   if (samples.run === run) samples.truncate(count)
+  changed()
   // What was tuned later holds from the instant to which the run has returned.
   update(run, ({ tunings }) => ({
     tunings: tunings.map((one) => ({ ...one, time: Math.min(one.time, time) })),

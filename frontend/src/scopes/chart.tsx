@@ -5,7 +5,7 @@ import { useRuns } from '../run/runs'
 import { saveCsv, savePng, saveSvg } from './export'
 import { MeasureTable } from './measure_table'
 import { Plot, type PlotHandle, type Values } from './plot'
-import type { Trace } from './trace'
+import type { Trace } from '../model/trace'
 import { useWindow } from './window'
 import { XyPlot } from './xy_plot'
 

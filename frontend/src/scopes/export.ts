@@ -1,5 +1,5 @@
 import { paint, svgOf, type Figure } from './figure'
-import type { Trace } from './trace'
+import type { Trace } from '../model/trace'
 
 const PNG_SCALE = 2
 

@@ -7,10 +7,10 @@ import { valueText } from '../inspector/value_text'
 import { useRuns, type KeptRun } from '../run/runs'
 import { useStudio } from '../store'
 import { Chart } from './chart'
-import { difference, farthest } from './difference'
+import { difference, farthest } from '../model/difference'
 import { spoken } from './quantity'
 import { PlotTools } from './scopes'
-import { DASHES, MOST_TRACES, tracesOf, type Trace } from './trace'
+import { DASHES, MOST_TRACES, tracesOf, type Trace } from '../model/trace'
 
 interface Inspector {
   signals: ReadonlySet<string>

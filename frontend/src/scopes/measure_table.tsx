@@ -1,9 +1,9 @@
 import { useEffect, useRef, useState } from 'react'
 import { shownTime, useCursor } from '../run/cursor'
 import { samples } from '../samples'
-import { measures, type Measures } from './measures'
+import { measures, type Measures } from '../model/measures'
 import { digits, reading, spoken } from './quantity'
-import { valueAt, type Trace } from './trace'
+import { valueAt, type Trace } from '../model/trace'
 import { shownWindow, useWindow } from './window'
 
 const REFRESH_MS = 200

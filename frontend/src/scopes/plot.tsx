@@ -9,9 +9,9 @@ import { useRuns } from '../run/runs'
 import { samples } from '../samples'
 import { useStudio } from '../store'
 import { aired, type Figure } from './figure'
-import { Growing } from './growing'
+import { Growing } from '../model/growing'
 import { digits, reading, useUnits, type Reading } from './quantity'
-import { extremes, within, type Drawn, type Extremes, type Trace } from './trace'
+import { extremes, within, type Drawn, type Extremes, type Trace } from '../model/trace'
 import { pan, shownWindow, useWindow, zoomBy, zoomTo } from './window'
 
 const FONT = '11px "Inter Variable", system-ui, sans-serif'
@@ -235,7 +235,7 @@ export function Plot({ traces, hidden, title, handle, band, values, onValues }: 
       const grown =
         fits && marks === lines && found.factor === factor && Boolean(made.extremes) === Boolean(before)
       if (grown && made.ends) {
-        growing.grow(drawn, factor, made.ends)
+        growing.grow(drawn, factor, made.ends, devicePixelRatio)
         return
       }
       range = fits ? range : live && same && found.factor === factor ? withRoom(needed, range) : needed

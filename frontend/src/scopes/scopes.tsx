@@ -14,7 +14,7 @@ import { samples } from '../samples'
 import { useStudio } from '../store'
 import { Chart } from './chart'
 import { useUnits } from './quantity'
-import { tracesOf } from './trace'
+import { tracesOf } from '../model/trace'
 import { toggleCursors, useWindow, zoomBy } from './window'
 
 /** Every Scope and XY Graph of the run and every logged signal, side by side. */

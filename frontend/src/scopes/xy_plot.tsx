@@ -8,7 +8,7 @@ import { useStudio } from '../store'
 import { aired, paint, type Figure } from './figure'
 import { reading, useUnits } from './quantity'
 import type { PlotHandle } from './plot'
-import type { Trace } from './trace'
+import type { Trace } from '../model/trace'
 
 const MOST_POINTS = 20_000
 

@@ -1,4 +1,4 @@
-import type { RunSamples, Signal } from '../samples'
+import type { RunSamples, Signal } from './run_samples'
 import { valueAt } from './trace'
 
 /** How far one run is from another in one element of a signal. */

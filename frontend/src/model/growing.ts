@@ -1,10 +1,16 @@
-import type uPlot from 'uplot'
 import type { Drawn } from './trace'
 
 /** How a trace is drawn: the colour as the canvas wants it, and CSS px. */
 export interface Stroke {
   colour: string
   dash: number[]
+}
+
+/** A plot that is drawn already: its canvas, where on it the lines lie, and where a value is there (device px). */
+export interface Surface {
+  ctx: CanvasRenderingContext2D
+  bbox: { left: number; top: number; width: number; height: number }
+  valToPos: (value: number, scale: string, onCanvas: boolean) => number
 }
 
 const WIDTH = 1.5
@@ -19,7 +25,7 @@ export class Growing {
   private lengths: number[] = []
 
   constructor(
-    private readonly plot: uPlot,
+    private readonly plot: Surface,
     private readonly strokes: Stroke[],
   ) {}
 
@@ -29,10 +35,10 @@ export class Growing {
     this.lengths = columns.map(() => 0)
   }
 
-  /** Draw what came after; `ends` are the rows from which on nothing is certain yet. */
-  grow([time, ...columns]: Drawn, factor: number, ends: number[]): void {
+  /** Draw what came after; `ends` are the rows from which on nothing is certain yet, `ratio` device px per CSS px. */
+  grow([time, ...columns]: Drawn, factor: number, ends: number[], ratio: number): void {
     const { ctx, bbox } = this.plot
-    const width = WIDTH * devicePixelRatio
+    const width = WIDTH * ratio
     ctx.save()
     ctx.beginPath()
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)

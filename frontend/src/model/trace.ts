@@ -1,4 +1,5 @@
-import { firstAfter, type RunSamples } from '../samples'
+import { firstAfter } from './instants'
+import type { RunSamples } from './run_samples'
 
 /** One line of a plot. The arrays are asked for at each frame, because a run that goes on has longer ones. */
 export interface Trace {

@@ -1,4 +1,4 @@
-import { firstAfter } from '../samples'
+import { firstAfter } from './instants'
 import { valueAt } from './trace'
 
 /** What is measured of one trace in a window of time. `NaN`: it makes no sense there. */

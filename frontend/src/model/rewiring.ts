@@ -1,6 +1,6 @@
 import type { SheetBlock, Wire } from '../protocol'
-import { blockOf, wireKey, type Places } from './sheet_layout'
-import type { WireEdgeType } from './wire_edge'
+import { blockOf, wireKey, type Places } from './wires'
+import type { Point } from './router'
 
 /** Blocks taken out of their wires and put into others: what becomes of the wires of a sheet. */
 
@@ -64,10 +64,20 @@ interface Piece {
   flipped: boolean
 }
 
+/** A wire as it is drawn: its ends by block and port, and its corner points. */
+interface DrawnWire {
+  id: string
+  source: string
+  sourceHandle?: string | null
+  target: string
+  targetHandle?: string | null
+  data?: { path: readonly Point[] }
+}
+
 /** The level piece that passes under a point, of the wires that are on the sheet already. */
 export function wireAt(
   at: { x: number; y: number },
-  edges: WireEdgeType[],
+  edges: readonly DrawnWire[],
   wires: Wire[],
 ): Piece | undefined {
   const present = new Set(wires.map(wireKey))

@@ -1,0 +1,11 @@
+/** Index of the first of `count` increasing times that is later than a time; `count` if none is. */
+export function firstAfter(times: Float64Array, time: number, count = times.length): number {
+  let low = 0
+  let high = count
+  while (low < high) {
+    const middle = (low + high) >> 1
+    if ((times[middle] ?? Infinity) <= time) low = middle + 1
+    else high = middle
+  }
+  return low
+}

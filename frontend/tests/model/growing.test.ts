@@ -1,0 +1,124 @@
+import { expect, test } from 'vitest'
+import { Growing, type Surface } from '../../src/model/growing'
+import { RunSamples } from '../../src/model/run_samples'
+import { extremes, tracesOf, type Drawn } from '../../src/model/trace'
+import type { Channel } from '../../src/protocol'
+
+const TIME = Float64Array.from({ length: 5000 }, (_, k) => k / 1000)
+const VALUES = TIME.map((t) => Math.sin(40 * t) + 0.2 * Math.sin(911 * t))
+const until = (count: number) => ({ time: TIME.subarray(0, count), values: VALUES.subarray(0, count) })
+
+test('extremes that grow with a run are those of the whole run', () => {
+  let grown = extremes([until(1)], 0, 5, 300)
+  for (const count of [7, 8, 900, 901, 3333, 5000]) {
+    grown = extremes([until(count)], 0, 5, 300, grown)
+    expect(grown.drawn).toEqual(extremes([until(count)], 0, 5, 300).drawn)
+  }
+})
+
+test('no peak is lost, and each stretch has two points at most', () => {
+  const { drawn } = extremes([until(5000)], 0, 5, 50)
+  const shown = (drawn[1] as (number | undefined)[]).filter((value) => value !== undefined)
+  expect(shown.length).toBeLessThanOrEqual(100)
+  expect([Math.min(...shown), Math.max(...shown)]).toEqual([Math.min(...VALUES), Math.max(...VALUES)])
+})
+
+/** A canvas that notes the lines drawn onto it, and the dash with which each begins. */
+function surface() {
+  const strokes: { points: [number, number][]; offset: number }[] = []
+  const ctx: CanvasRenderingContext2D = {
+    lineDashOffset: 0,
+    beginPath: () => strokes.push({ points: [], offset: NaN }),
+    moveTo: (x: number, y: number) => strokes.at(-1)!.points.push([x, y]),
+    lineTo: (x: number, y: number) => strokes.at(-1)!.points.push([x, y]),
+    stroke: () => {
+      strokes.at(-1)!.offset = ctx.lineDashOffset
+    },
+    ...Object.fromEntries(
+      ['save', 'restore', 'rect', 'clip', 'translate', 'setLineDash'].map((name) => [name, () => {}]),
+    ),
+  } as unknown as CanvasRenderingContext2D
+  const plot: Surface = {
+    ctx,
+    bbox: { left: 0, top: 0, width: 500, height: 100 },
+    valToPos: (value, scale) => (scale === 'x' ? 100 * value : 50 - 40 * value),
+  }
+  return { plot, drawn: () => strokes.filter(({ points }) => points.length > 0) }
+}
+
+const nothing = (made: { drawn: Drawn }): Drawn => [made.drawn[0], made.drawn[0].map(() => NaN)]
+
+test('what is drawn piece by piece is the line that is drawn at once, dashes too', () => {
+  const strokes = [{ colour: 'black', dash: [7, 3] }]
+  const whole = surface()
+  const all = extremes([until(5000)], 0, 5, 300)
+  const once = new Growing(whole.plot, strokes)
+  once.shows(nothing(all), [0])
+  once.grow(all.drawn, 1, all.ends, 1)
+
+  const parts = surface()
+  const growing = new Growing(parts.plot, strokes)
+  growing.shows(nothing(all), [0])
+  let made = extremes([until(1)], 0, 5, 300)
+  for (const count of [400, 401, 2600, 5000]) {
+    made = extremes([until(count)], 0, 5, 300, made)
+    growing.grow(made.drawn, 1, made.ends, 1)
+  }
+  const pieces = parts.drawn()
+  expect(pieces.length).toBeGreaterThan(1)
+  pieces.slice(1).forEach(({ points }, k) => expect(points[0]).toEqual(pieces[k]!.points.at(-1)))
+  const joined = pieces.flatMap(({ points }, k) => (k ? points.slice(1) : points))
+  expect(joined).toEqual(whole.drawn()[0]!.points)
+  const length = (points: [number, number][]) =>
+    points.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot(x - points[k]![0], y - points[k]![1]), 0)
+  let before = 0
+  for (const { points, offset } of pieces) {
+    expect(offset, 'the dashes go on where they ended').toBeCloseTo(before, 9)
+    before += length(points)
+  }
+})
+
+/** A frame of samples as the server sends it: a header, the instants, the columns. */
+function frame(run: string, first: number, time: number[], columns: number[][]): ArrayBuffer {
+  const header = JSON.stringify({ run, first, count: time.length })
+  const text = new TextEncoder().encode(header.padEnd(Math.ceil((header.length + 4) / 8) * 8 - 4))
+  const made = new ArrayBuffer(4 + text.length + 8 * time.length * (1 + columns.length))
+  new DataView(made).setUint32(0, text.length, true)
+  new Uint8Array(made, 4).set(text)
+  new Float64Array(made, 4 + text.length).set([...time, ...columns.flat()])
+  return made
+}
+
+test('samples of a run come in frames, go back with it, and are found by name', () => {
+  const channel = (name: string, shape: number[]): Channel => ({ name, shape, unit: 'rad' })
+  const run = new RunSamples('r', [channel('arm/q', [2]), channel('clock/y', [])], { arm: 'arm/q' })
+  run.receive(
+    frame(
+      'r',
+      0,
+      [0, 1],
+      [
+        [1, 2],
+        [3, 4],
+        [5, 6],
+      ],
+    ),
+  )
+  run.receive(frame('other', 0, [9], [[9], [9], [9]]))
+  run.receive(frame('r', 2, [2], [[7], [8], [9]]))
+  expect([...run.signal('arm')!.columns[1]!]).toEqual([3, 4, 8])
+  expect([run.indexAt(-1), run.indexAt(1.5), run.indexAt(7)]).toEqual([-1, 1, 2])
+  expect(run.title('arm/q')).toBe('arm')
+  run.truncate(2)
+  expect([...run.signal('clock/y')!.time]).toEqual([0, 1])
+  const traces = tracesOf(run, [
+    { path: 'arm/q', label: '' },
+    { path: 'clock/y', label: 't' },
+    { path: 'gone', label: '' },
+  ])
+  expect(traces.map(({ label, tone, dash }) => [label, tone, dash])).toEqual([
+    ['arm 1', 'trace-0', []],
+    ['arm 2', 'trace-1', []],
+    ['t', 'trace-0', [7, 3]],
+  ])
+})

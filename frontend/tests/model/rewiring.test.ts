@@ -1,0 +1,115 @@
+import { expect, test } from 'vitest'
+import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../../src/model/rewiring'
+import { wireKey } from '../../src/model/wires'
+import type { PortSpot, SheetBlock, Wire } from '../../src/protocol'
+
+const port = (name: string, x: number, y: number): PortSpot => ({
+  name,
+  x,
+  y,
+  dx: 1,
+  dy: 0,
+  doc: '',
+  label: '',
+  unit: '',
+})
+
+function block(name: string, inputs = ['u'], outputs = ['y']): SheetBlock {
+  return {
+    name,
+    type: 'Gain',
+    title: name,
+    place: { x: 0, y: 0 },
+    width: 60,
+    height: 40,
+    face: '',
+    inputs: inputs.map((input, k) => port(input, 0, 20 + 10 * k)),
+    outputs: outputs.map((output, k) => port(output, 60, 20 + 10 * k)),
+    opens: false,
+    parameters: {},
+    formulas: {},
+    mask: [],
+    link: '',
+  }
+}
+
+const wire = (source: string, target: string): Wire => ({ source, target })
+const sorted = (wires: Wire[]) => wires.map(wireKey).sort()
+
+const gain = block('gain')
+const chain = [
+  wire('step/y', 'gain/u'),
+  wire('gain/y', 'plant/u'),
+  wire('gain/y', 'scope/in1'),
+  wire('clock/y', 'log/in1'),
+]
+
+test('a block that is taken out closes its wires behind it, and put back it is where it was', () => {
+  const without = takenOut([gain], chain)
+  expect(sorted(without)).toEqual(
+    sorted([wire('step/y', 'plant/u'), wire('step/y', 'scope/in1'), wire('clock/y', 'log/in1')]),
+  )
+  const single = [wire('step/y', 'gain/u'), wire('gain/y', 'plant/u')]
+  expect(sorted(putInto(gain, wire('step/y', 'plant/u'), takenOut([gain], single)))).toEqual(sorted(single))
+})
+
+test('several blocks keep the wires between them and lose all others', () => {
+  expect(takenOut([gain, block('plant')], chain)).toEqual([
+    wire('gain/y', 'plant/u'),
+    wire('clock/y', 'log/in1'),
+  ])
+})
+
+test('a block with two inputs leaves no wire behind, and goes into one by its first ends', () => {
+  const sum = block('sum', ['in1', 'in2'])
+  expect(takenOut([sum], [wire('a/y', 'sum/in1'), wire('b/y', 'sum/in2'), wire('sum/y', 'c/u')])).toEqual([])
+  expect(putInto(sum, wire('a/y', 'c/u'), [wire('a/y', 'c/u')])).toEqual([
+    wire('a/y', 'sum/in1'),
+    wire('sum/y', 'c/u'),
+  ])
+})
+
+test('an edit says which wires come and which give way, no others', () => {
+  const after = takenOut([gain], chain)
+  const { wires, instead } = rewired(chain, after)
+  const gone = new Set(instead.map(wireKey))
+  expect(sorted([...chain.filter((one) => !gone.has(wireKey(one))), ...wires])).toEqual(sorted(after))
+  expect(wires.concat(instead).map(wireKey)).not.toContain(wireKey(wire('clock/y', 'log/in1')))
+})
+
+test('only a block that can stand in a wire and has none is loose', () => {
+  expect(isLoose(gain, chain)).toBe(false)
+  expect(isLoose(block('other'), chain)).toBe(true)
+  expect(isLoose(block('source', []), chain)).toBe(false)
+})
+
+test('a dropped block finds the level piece below it and stands straight in it', () => {
+  const drawn = {
+    id: wireKey(wire('step/y', 'plant/u')),
+    source: 'step',
+    sourceHandle: 'y',
+    target: 'plant',
+    targetHandle: 'u',
+    data: {
+      path: [
+        [0, 50],
+        [100, 50],
+        [100, 90],
+        [400, 90],
+      ] as [number, number][],
+    },
+  }
+  const wires = [wire('step/y', 'plant/u')]
+  const found = wireAt({ x: 200, y: 85 }, [drawn], wires)!
+  expect(found).toMatchObject({ wire: wires[0], y: 90, left: 100, right: 400, flipped: false })
+  expect(levelled(gain, { x: 170, y: 65 }, found)).toEqual({ x: 170, y: 70, flipped: false })
+  expect(
+    levelled(gain, { x: 170, y: 65 }, { ...found, right: 200 }),
+    'in the middle of a short piece',
+  ).toMatchObject({
+    x: 120,
+  })
+  expect(wireAt({ x: 200, y: 60 }, [drawn], wires), 'too far away').toBeUndefined()
+  expect(wireAt({ x: 100, y: 70 }, [drawn], wires), 'an upright piece').toBeUndefined()
+  expect(wireAt({ x: 200, y: 85 }, [drawn], []), 'a wire that has just closed').toBeUndefined()
+})
