@@ -35,116 +35,121 @@ function checked(document: OpenDocument, event: Checked): OpenDocument {
   return { ...document, findings: event.findings, wireKinds }
 }
 
+/** What each event of the server changes. */
+const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } = {
+  welcome,
+  documents: ({ documents, recoveries }) => useStudio.setState({ documents, recoveries }),
+  opened,
+  changed: documentChanged,
+  checked: documentChecked,
+  run_started: runStarted,
+  run_tuned: runs.tuned,
+  run_rewound: runs.rewound,
+  run_progress: runProgressed,
+  robot: robotShown,
+  robot_opened: ({ opening }) => robotOpened(opening),
+  reply: () => {},
+}
+
 /** What the page shows after the server has told something. */
-export function receive(event: ServerEvent): void {
+export function receive<Kind extends ServerEvent['kind']>(event: EventOf<Kind> & { kind: Kind }): void {
+  HEARD[event.kind](event)
+}
+
+function welcome(event: EventOf<'welcome'>): void {
+  useStudio.setState({
+    welcome: event,
+    library: new Map(event.library.map((kind) => [kind.type, kind])),
+    documents: event.documents,
+  })
+  void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
+}
+
+function opened(event: EventOf<'opened'>): void {
   const { document, run } = useStudio.getState()
-  switch (event.kind) {
-    case 'welcome': {
-      useStudio.setState({
-        welcome: event,
-        library: new Map(event.library.map((kind) => [kind.type, kind])),
-        documents: event.documents,
-      })
-      void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
-      break
-    }
-    case 'documents':
-      useStudio.setState({ documents: event.documents, recoveries: event.recoveries })
-      break
-    case 'opened': {
-      const { state, sheet, inside } = event
-      const same = document?.state.document === state.document
-      const moved = same && document.inside.join('/') !== inside.join('/')
-      if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
-      if (same && run && (run.state === 'running' || run.state === 'paused') && event.run !== run.run)
-        useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
-      useStudio.setState({
-        document: {
-          state,
-          inside,
-          ...sheet,
-          findings: same ? document.findings : [],
-          wireKinds: same ? document.wireKinds : {},
-        },
-        ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
-      })
-      if (!same) {
-        runs.forget()
-        leaveEditor()
-      }
-      remember(state, inside)
-      break
-    }
-    case 'changed':
-      if (document?.state.document !== event.state.document) break
-      if (event.before !== document.state.version && event.state.version !== document.state.version)
-        void ask({ kind: 'look', document: event.state.document, inside: document.inside })
-      else {
-        useStudio.setState({ document: changed(document, event) })
-        remember(event.state, document.inside)
-      }
-      break
-    case 'checked':
-      if (document?.state.document === event.document)
-        useStudio.setState({ document: checked(document, event) })
-      break
-    case 'run_started':
-      if (run?.run === event.run) break // told again after the line was down: its samples are the same
-      runs.began(event)
-      useStudio.setState({
-        run: {
-          run: event.run,
-          state: 'running',
-          time: 0,
-          stopTime: event.stop_time,
-          realTimeFactor: 0,
-          message: '',
-          fault: null,
-          solver: '',
-          reason: '',
-          channels: event.channels,
-          views: event.views,
-          aliases: event.aliases,
-          tunables: event.tunables,
-        },
-      })
-      break
-    case 'run_tuned':
-      runs.tuned(event)
-      break
-    case 'run_rewound':
-      runs.rewound(event)
-      break
-    case 'run_progress':
-      runs.progressed(event)
-      // How far a run that goes on has come may wait; what else is told of it may not.
-      if (
-        run?.run === event.run &&
-        (event.state !== 'running' || run.state !== 'running' || isFree(performance.now()))
-      )
-        useStudio.setState({
-          run: {
-            ...run,
-            state: event.state,
-            time: event.time,
-            realTimeFactor: event.real_time_factor,
-            message: event.message,
-            fault: event.fault ?? null,
-            solver: event.solver ?? '',
-            reason: event.reason ?? '',
-          },
-        })
-      if (event.fault) refuse(event.fault)
-      break
-    case 'robot':
-      robotShown(event)
-      break
-    case 'robot_opened':
-      robotOpened(event.opening)
-      break
-    case 'reply':
-      break
+  const { state, sheet, inside } = event
+  const same = document?.state.document === state.document
+  const moved = same && document.inside.join('/') !== inside.join('/')
+  if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
+  if (same && run && (run.state === 'running' || run.state === 'paused') && event.run !== run.run)
+    useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
+  useStudio.setState({
+    document: {
+      state,
+      inside,
+      ...sheet,
+      findings: same ? document.findings : [],
+      wireKinds: same ? document.wireKinds : {},
+    },
+    ...(same ? {} : { run: null, selection: new Set<string>(), editing: null }),
+  })
+  if (!same) {
+    runs.forget()
+    leaveEditor()
   }
+  remember(state, inside)
+}
+
+function documentChanged(event: EventOf<'changed'>): void {
+  const { document } = useStudio.getState()
+  if (document?.state.document !== event.state.document) return
+  if (event.before !== document.state.version && event.state.version !== document.state.version)
+    void ask({ kind: 'look', document: event.state.document, inside: document.inside })
+  else {
+    useStudio.setState({ document: changed(document, event) })
+    remember(event.state, document.inside)
+  }
+}
+
+function documentChecked(event: EventOf<'checked'>): void {
+  const { document } = useStudio.getState()
+  if (document?.state.document === event.document) useStudio.setState({ document: checked(document, event) })
+}
+
+function runStarted(event: EventOf<'run_started'>): void {
+  // Told again after the line was down: its samples are the same.
+  if (useStudio.getState().run?.run === event.run) return
+  runs.began(event)
+  useStudio.setState({
+    run: {
+      run: event.run,
+      state: 'running',
+      time: 0,
+      stopTime: event.stop_time,
+      realTimeFactor: 0,
+      message: '',
+      fault: null,
+      solver: '',
+      reason: '',
+      channels: event.channels,
+      views: event.views,
+      aliases: event.aliases,
+      tunables: event.tunables,
+    },
+  })
+}
+
+function runProgressed(event: EventOf<'run_progress'>): void {
+  const { run } = useStudio.getState()
+  runs.progressed(event)
+  // How far a run that goes on has come may wait; what else is told of it may not.
+  if (
+    run?.run === event.run &&
+    (event.state !== 'running' || run.state !== 'running' || isFree(performance.now()))
+  )
+    useStudio.setState({
+      run: {
+        ...run,
+        state: event.state,
+        time: event.time,
+        realTimeFactor: event.real_time_factor,
+        message: event.message,
+        fault: event.fault ?? null,
+        solver: event.solver ?? '',
+        reason: event.reason ?? '',
+      },
+    })
+  if (event.fault) refuse(event.fault)
 }
 
 /** Show the document that this page showed before, or else what its address names; then let requests flow. */

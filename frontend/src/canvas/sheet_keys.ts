@@ -19,6 +19,16 @@ function typedSoFar(): string {
   return open === 'insert' ? typed : ''
 }
 
+/** Remove the chosen blocks, notes and wires. */
+function removeChosen(chosenWires: ReadonlySet<string>): void {
+  const { document, selection, select } = useStudio.getState()
+  const wires = (document?.wires ?? []).filter((wire) => chosenWires.has(wireKey(wire)))
+  const blocks = [...selection].filter((name) => document?.blocks[name])
+  const notes = [...selection].filter((name) => document?.notes[name])
+  if (blocks.length || wires.length || notes.length) void change({ kind: 'remove', blocks, wires, notes })
+  select([])
+}
+
 /** The keys of the sheet: they are its own while it has the focus, and while nothing has it. */
 export function useSheetKeys(
   sheet: RefObject<HTMLDivElement | null>,
@@ -27,12 +37,7 @@ export function useSheetKeys(
   chooseWires: (keys: ReadonlySet<string>) => void,
 ): void {
   const remove = () => {
-    const { document, selection, select } = useStudio.getState()
-    const wires = (document?.wires ?? []).filter((wire) => chosenWires.has(wireKey(wire)))
-    const blocks = [...selection].filter((name) => document?.blocks[name])
-    const notes = [...selection].filter((name) => document?.notes[name])
-    if (blocks.length || wires.length || notes.length) void change({ kind: 'remove', blocks, wires, notes })
-    select([])
+    removeChosen(chosenWires)
     chooseWires(new Set())
   }
 

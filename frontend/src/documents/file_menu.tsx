@@ -19,12 +19,9 @@ const MOST_FILES = 12
 /** The menu of documents: new, open, save, what is open, what can be recovered, and the examples. */
 export function FileMenu() {
   const welcome = useStudio((s) => s.welcome)
-  const documents = useStudio((s) => s.documents)
   const recoveries = useStudio((s) => s.recoveries)
-  const document = useStudio((s) => s.document?.state)
-  const robots = Object.values(useDesk((s) => s.robots))
+  const known = useStudio((s) => s.document !== null)
   const files = (welcome?.files ?? []).slice(0, MOST_FILES)
-  const others = documents.filter((entry) => entry.document !== document?.document)
   return (
     <Menu position="bottom-start" shadow="md" width={340}>
       <Menu.Target>
@@ -49,7 +46,7 @@ export function FileMenu() {
         <Menu.Item
           leftSection={<IconDeviceFloppy size={15} />}
           rightSection={<Kbd size="xs">Ctrl+S</Kbd>}
-          disabled={!document}
+          disabled={!known}
           onClick={() => void save()}
         >
           Save
@@ -57,7 +54,7 @@ export function FileMenu() {
         <Menu.Item
           leftSection={<IconDeviceFloppy size={15} />}
           rightSection={<Kbd size="xs">Ctrl+Shift+S</Kbd>}
-          disabled={!document}
+          disabled={!known}
           onClick={() => show('save_as')}
         >
           Save as …
@@ -71,39 +68,8 @@ export function FileMenu() {
             Recover …
           </Menu.Item>
         )}
-        {others.length > 0 && <Menu.Label>Open now</Menu.Label>}
-        {others.map((entry) => (
-          <Menu.Item
-            key={entry.document}
-            leftSection={<IconPencil size={15} />}
-            rightSection={
-              entry.dirty ? (
-                <Text size="xs" c="dimmed">
-                  not saved
-                </Text>
-              ) : (
-                <IconX
-                  size={14}
-                  role="img"
-                  aria-label={`Close ${entry.title}`}
-                  onClick={(event) => {
-                    event.stopPropagation()
-                    void ask({ kind: 'close', document: entry.document })
-                  }}
-                />
-              )
-            }
-            onClick={() => void ask({ kind: 'attach', document: entry.document })}
-          >
-            {entry.path ?? entry.title}
-          </Menu.Item>
-        ))}
-        {robots.length > 0 && <Menu.Label>Open robots</Menu.Label>}
-        {robots.map(({ robot, name, path }) => (
-          <Menu.Item key={robot} onClick={() => void showRobot(robot)}>
-            {name} <span className="unit">{path ?? 'not saved'}</span>
-          </Menu.Item>
-        ))}
+        <OpenDocuments />
+        <OpenRobots />
         {files.length > 0 && <Menu.Label>Files of this folder</Menu.Label>}
         {files.map((path) => (
           <Menu.Item key={path} onClick={() => void ask({ kind: 'open', path })}>
@@ -127,5 +93,56 @@ export function FileMenu() {
         ))}
       </Menu.Dropdown>
     </Menu>
+  )
+}
+
+function OpenDocuments() {
+  const documents = useStudio((s) => s.documents)
+  const here = useStudio((s) => s.document?.state.document)
+  const others = documents.filter((entry) => entry.document !== here)
+  return (
+    <>
+      {others.length > 0 && <Menu.Label>Open now</Menu.Label>}
+      {others.map((entry) => (
+        <Menu.Item
+          key={entry.document}
+          leftSection={<IconPencil size={15} />}
+          rightSection={
+            entry.dirty ? (
+              <Text size="xs" c="dimmed">
+                not saved
+              </Text>
+            ) : (
+              <IconX
+                size={14}
+                role="img"
+                aria-label={`Close ${entry.title}`}
+                onClick={(event) => {
+                  event.stopPropagation()
+                  void ask({ kind: 'close', document: entry.document })
+                }}
+              />
+            )
+          }
+          onClick={() => void ask({ kind: 'attach', document: entry.document })}
+        >
+          {entry.path ?? entry.title}
+        </Menu.Item>
+      ))}
+    </>
+  )
+}
+
+function OpenRobots() {
+  const robots = Object.values(useDesk((s) => s.robots))
+  return (
+    <>
+      {robots.length > 0 && <Menu.Label>Open robots</Menu.Label>}
+      {robots.map(({ robot, name, path }) => (
+        <Menu.Item key={robot} onClick={() => void showRobot(robot)}>
+          {name} <span className="unit">{path ?? 'not saved'}</span>
+        </Menu.Item>
+      ))}
+    </>
   )
 }

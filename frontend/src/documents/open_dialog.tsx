@@ -69,24 +69,12 @@ function Choice() {
         </Part>
         <Part title="Used last">
           {recent.map((path) => (
-            <NavLink
-              key={path}
-              component="button"
-              leftSection={<IconHistory size={15} />}
-              label={path}
-              onClick={() => go({ kind: 'open', path })}
-            />
+            <FileLink key={path} icon={IconHistory} path={path} go={go} />
           ))}
         </Part>
         <Part title="Files of this folder">
           {files.map((path) => (
-            <NavLink
-              key={path}
-              component="button"
-              leftSection={<IconFile size={15} />}
-              label={path}
-              onClick={() => go({ kind: 'open', path })}
-            />
+            <FileLink key={path} icon={IconFile} path={path} go={go} />
           ))}
         </Part>
         {found && !open.length && !recent.length && !files.length && (
@@ -98,6 +86,25 @@ function Choice() {
         )}
       </div>
     </Stack>
+  )
+}
+
+function FileLink({
+  icon: Icon,
+  path,
+  go,
+}: {
+  icon: typeof IconFile
+  path: string
+  go: (request: Request) => void
+}) {
+  return (
+    <NavLink
+      component="button"
+      leftSection={<Icon size={15} />}
+      label={path}
+      onClick={() => go({ kind: 'open', path })}
+    />
   )
 }
 

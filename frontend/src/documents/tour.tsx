@@ -80,25 +80,7 @@ export function Tour() {
   }, [stop])
   if (!here) {
     if (asked || !offered) return null
-    const done = () => {
-      localStorage.setItem(SEEN, 'yes')
-      setAsked(true)
-    }
-    return (
-      <Paper className="tour offer" withBorder shadow="md" p="sm" role="dialog" aria-label="A first look">
-        <Text size="sm" fw={600}>
-          New here? Two minutes show you around.
-        </Text>
-        <Group gap="xs" mt={8}>
-          <Button size="compact-sm" onClick={() => (done(), openTour())}>
-            Take the tour
-          </Button>
-          <Button size="compact-sm" variant="default" onClick={done}>
-            Not now
-          </Button>
-        </Group>
-      </Paper>
-    )
+    return <Offer done={() => setAsked(true)} />
   }
   const last = stop === STOPS.length - 1
   return (
@@ -152,6 +134,29 @@ export function Tour() {
         </Group>
       </Paper>
     </>
+  )
+}
+
+/** Asks at the first visit whether somebody wants to see the tour. */
+function Offer({ done }: { done: () => void }) {
+  const answered = () => {
+    localStorage.setItem(SEEN, 'yes')
+    done()
+  }
+  return (
+    <Paper className="tour offer" withBorder shadow="md" p="sm" role="dialog" aria-label="A first look">
+      <Text size="sm" fw={600}>
+        New here? Two minutes show you around.
+      </Text>
+      <Group gap="xs" mt={8}>
+        <Button size="compact-sm" onClick={() => (answered(), openTour())}>
+          Take the tour
+        </Button>
+        <Button size="compact-sm" variant="default" onClick={answered}>
+          Not now
+        </Button>
+      </Group>
+    </Paper>
   )
 }
 

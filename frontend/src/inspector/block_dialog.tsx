@@ -70,16 +70,7 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
       >
         <Stack gap="sm">
           <Text size="sm">{summary}</Text>
-          {rest.length > 0 && (
-            <details className="more">
-              <summary>More</summary>
-              {rest.map((paragraph) => (
-                <Text key={paragraph} size="sm" className="paragraph">
-                  {paragraph}
-                </Text>
-              ))}
-            </details>
-          )}
+          <More paragraphs={rest} />
           {rules.map((rule, index) => (
             <Field
               key={rule.name}
@@ -94,39 +85,64 @@ function Dialog({ block, onClose }: { block: SheetBlock; onClose: () => void }) 
             />
           ))}
           {rules.length === 0 && <Text size="sm">This block has no parameters.</Text>}
-          <Group justify="flex-end" gap="xs" className="dialog-actions">
-            {block.opens && (
-              <Group gap={0} mr="auto">
-                <Button
-                  variant="subtle"
-                  px="xs"
-                  onClick={() => (
-                    onClose(),
-                    look([...(useStudio.getState().document?.inside ?? []), block.name])
-                  )}
-                >
-                  Look under the mask
-                </Button>
-                {!block.link && (
-                  <Button variant="subtle" px="xs" onClick={() => (onClose(), openMask(block.name))}>
-                    Edit the mask
-                  </Button>
-                )}
-              </Group>
-            )}
-            <Button variant="default" onClick={onClose}>
-              Cancel
-            </Button>
-            <Button variant="default" disabled={wrong || !changed.length} onClick={() => void apply()}>
-              Apply
-            </Button>
-            <Button type="submit" disabled={wrong}>
-              OK
-            </Button>
-          </Group>
+          <Actions block={block} wrong={wrong} changed={changed.length > 0} apply={apply} onClose={onClose} />
         </Stack>
       </form>
     </Modal>
+  )
+}
+
+function More({ paragraphs }: { paragraphs: string[] }) {
+  if (!paragraphs.length) return null
+  return (
+    <details className="more">
+      <summary>More</summary>
+      {paragraphs.map((paragraph) => (
+        <Text key={paragraph} size="sm" className="paragraph">
+          {paragraph}
+        </Text>
+      ))}
+    </details>
+  )
+}
+
+interface ActionsProps {
+  block: SheetBlock
+  wrong: boolean
+  changed: boolean
+  apply: () => Promise<boolean>
+  onClose: () => void
+}
+
+function Actions({ block, wrong, changed, apply, onClose }: ActionsProps) {
+  return (
+    <Group justify="flex-end" gap="xs" className="dialog-actions">
+      {block.opens && (
+        <Group gap={0} mr="auto">
+          <Button
+            variant="subtle"
+            px="xs"
+            onClick={() => (onClose(), look([...(useStudio.getState().document?.inside ?? []), block.name]))}
+          >
+            Look under the mask
+          </Button>
+          {!block.link && (
+            <Button variant="subtle" px="xs" onClick={() => (onClose(), openMask(block.name))}>
+              Edit the mask
+            </Button>
+          )}
+        </Group>
+      )}
+      <Button variant="default" onClick={onClose}>
+        Cancel
+      </Button>
+      <Button variant="default" disabled={wrong || !changed} onClick={() => void apply()}>
+        Apply
+      </Button>
+      <Button type="submit" disabled={wrong}>
+        OK
+      </Button>
+    </Group>
   )
 }
 

@@ -31,11 +31,12 @@ interface Row {
   doc: string
 }
 
+const close = () => show(null)
+
 /** The parameters of a subsystem or of the model: declared, renamed, ordered. Blocks inside may have formulas over them. */
 export function MaskDialog() {
   const opened = useDialogs((s) => s.open === 'mask')
   const block = useDialogs((s) => s.of)
-  const close = () => show(null)
   return (
     <Modal
       opened={opened}
@@ -64,27 +65,9 @@ function Mask({ onClose }: { onClose: () => void }) {
         setFace(found.name ?? '')
       },
     )
-    // eslint-disable-next-line react-hooks/exhaustive-deps
-  }, [])
+  }, [inside, block, onClose])
   if (!rows) return null
   const readable = rows.every(isReadable)
-  const put = (key: string, change: Partial<Row>) =>
-    setRows(rows.map((row) => (row.key === key ? { ...row, ...change } : row)))
-  const swap = (k: number, by: number) => {
-    const next = [...rows]
-    ;[next[k], next[k + by]] = [next[k + by]!, next[k]!]
-    setRows(next)
-  }
-  const add = () => {
-    const name = freeName(
-      'k',
-      rows.map((row) => row.name),
-    ).replace(' ', '')
-    setRows([
-      ...rows,
-      { key: newKey(), was: '', name, kind: 'number', value: '1', unit: '', range: '', doc: '' },
-    ])
-  }
   const apply = async () => {
     try {
       await attempt({ kind: 'mask', block, name: face.trim(), parameters: rows.map(declared) }, inside)
@@ -119,55 +102,14 @@ function Mask({ onClose }: { onClose: () => void }) {
             onChange={(event) => setFace(event.currentTarget.value)}
           />
         )}
-        {rows.length > 0 && (
-          <div className="mask-rows" role="table" aria-label="Parameters">
-            <div role="row" className="head">
-              {COLUMNS.map((title) => (
-                <span key={title} role="columnheader">
-                  {title}
-                </span>
-              ))}
-              <span role="columnheader" aria-label="Order" />
-            </div>
-            {rows.map((row, k) => (
-              <RowFields
-                key={row.key}
-                row={row}
-                put={(change) => put(row.key, change)}
-                first={k === 0}
-                last={k === rows.length - 1}
-                swap={(by) => swap(k, by)}
-                remove={() => setRows(rows.filter((one) => one !== row))}
-              />
-            ))}
-          </div>
-        )}
+        <Rows rows={rows} setRows={setRows} />
         {rows.length === 0 && (
           <Text size="sm" c="dimmed">
             It has no parameters yet.
           </Text>
         )}
-        <Button
-          variant="default"
-          size="xs"
-          leftSection={<IconPlus size={14} />}
-          style={{ alignSelf: 'start' }}
-          onClick={add}
-          data-autofocus={rows.length === 0 || undefined}
-        >
-          Add a parameter
-        </Button>
-        {fault && (
-          <Alert color="red" title={fault.what} role="alert">
-            {[
-              fault.where && `${fault.where}.`,
-              fault.allowed && `Allowed: ${fault.allowed}.`,
-              fault.fix && `To do: ${fault.fix}.`,
-            ]
-              .filter(Boolean)
-              .join(' ')}
-          </Alert>
-        )}
+        <AddRow rows={rows} setRows={setRows} />
+        {fault && <Why fault={fault} />}
         <Group justify="flex-end" gap="xs">
           <Button variant="default" onClick={onClose}>
             Cancel
@@ -181,6 +123,79 @@ function Mask({ onClose }: { onClose: () => void }) {
         </Group>
       </Stack>
     </form>
+  )
+}
+
+function Why({ fault }: { fault: Refusal }) {
+  return (
+    <Alert color="red" title={fault.what} role="alert">
+      {[
+        fault.where && `${fault.where}.`,
+        fault.allowed && `Allowed: ${fault.allowed}.`,
+        fault.fix && `To do: ${fault.fix}.`,
+      ]
+        .filter(Boolean)
+        .join(' ')}
+    </Alert>
+  )
+}
+
+function Rows({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void }) {
+  const put = (key: string, change: Partial<Row>) =>
+    setRows(rows.map((row) => (row.key === key ? { ...row, ...change } : row)))
+  const swap = (k: number, by: number) => {
+    const next = [...rows]
+    ;[next[k], next[k + by]] = [next[k + by]!, next[k]!]
+    setRows(next)
+  }
+  if (!rows.length) return null
+  return (
+    <div className="mask-rows" role="table" aria-label="Parameters">
+      <div role="row" className="head">
+        {COLUMNS.map((title) => (
+          <span key={title} role="columnheader">
+            {title}
+          </span>
+        ))}
+        <span role="columnheader" aria-label="Order" />
+      </div>
+      {rows.map((row, k) => (
+        <RowFields
+          key={row.key}
+          row={row}
+          put={(change) => put(row.key, change)}
+          first={k === 0}
+          last={k === rows.length - 1}
+          swap={(by) => swap(k, by)}
+          remove={() => setRows(rows.filter((one) => one !== row))}
+        />
+      ))}
+    </div>
+  )
+}
+
+function AddRow({ rows, setRows }: { rows: Row[]; setRows: (rows: Row[]) => void }) {
+  const add = () => {
+    const name = freeName(
+      'k',
+      rows.map((row) => row.name),
+    ).replace(' ', '')
+    setRows([
+      ...rows,
+      { key: newKey(), was: '', name, kind: 'number', value: '1', unit: '', range: '', doc: '' },
+    ])
+  }
+  return (
+    <Button
+      variant="default"
+      size="xs"
+      leftSection={<IconPlus size={14} />}
+      style={{ alignSelf: 'start' }}
+      onClick={add}
+      data-autofocus={rows.length === 0 || undefined}
+    >
+      Add a parameter
+    </Button>
   )
 }
 
@@ -261,38 +276,40 @@ function RowFields({ row, put, first, last, swap, remove }: RowProps) {
         <span role="cell" />
       )}
       {field('Description', 'doc')}
-      <span role="cell" className="order">
-        <ActionIcon
-          size="sm"
-          variant="subtle"
-          color="gray"
-          aria-label={`Move ${row.name} up`}
-          disabled={first}
-          onClick={() => swap(-1)}
-        >
-          <IconArrowUp size={14} />
-        </ActionIcon>
-        <ActionIcon
-          size="sm"
-          variant="subtle"
-          color="gray"
-          aria-label={`Move ${row.name} down`}
-          disabled={last}
-          onClick={() => swap(1)}
-        >
-          <IconArrowDown size={14} />
-        </ActionIcon>
-        <ActionIcon
-          size="sm"
-          variant="subtle"
-          color="gray"
-          aria-label={`Remove ${row.name}`}
-          onClick={remove}
-        >
-          <IconTrash size={14} />
-        </ActionIcon>
-      </span>
+      <Order name={row.name} first={first} last={last} swap={swap} remove={remove} />
     </div>
+  )
+}
+
+type OrderProps = Pick<RowProps, 'first' | 'last' | 'swap' | 'remove'> & { name: string }
+
+function Order({ name, first, last, swap, remove }: OrderProps) {
+  return (
+    <span role="cell" className="order">
+      <ActionIcon
+        size="sm"
+        variant="subtle"
+        color="gray"
+        aria-label={`Move ${name} up`}
+        disabled={first}
+        onClick={() => swap(-1)}
+      >
+        <IconArrowUp size={14} />
+      </ActionIcon>
+      <ActionIcon
+        size="sm"
+        variant="subtle"
+        color="gray"
+        aria-label={`Move ${name} down`}
+        disabled={last}
+        onClick={() => swap(1)}
+      >
+        <IconArrowDown size={14} />
+      </ActionIcon>
+      <ActionIcon size="sm" variant="subtle" color="gray" aria-label={`Remove ${name}`} onClick={remove}>
+        <IconTrash size={14} />
+      </ActionIcon>
+    </span>
   )
 }
 

@@ -42,6 +42,67 @@ function cornersOf(arm: Object3D): Vector3[] {
   return corners
 }
 
+/** Corners of all that is to be seen: the arm, the places that a run reaches, the floor below the base. */
+function seenCorners(arm: Object3D, floor: number, extent: CameraProps['extent'], thick: number): Vector3[] {
+  const corners = cornersOf(arm)
+  for (const [x, y, z] of extent?.() ?? [])
+    corners.push(new Vector3(x, y, z + thick), new Vector3(x, y, z - thick))
+  corners.push(new Vector3(0, 0, floor))
+  return corners
+}
+
+/** Where an eye stands that looks at `centre` from a direction and sees all corners, no nearer than `nearest`. */
+function eyeOf(
+  corners: Vector3[],
+  centre: Vector3,
+  direction: Vector3,
+  camera: PerspectiveCamera,
+  nearest: number,
+): Vector3 {
+  const d = direction.clone().normalize()
+  const right = new Vector3(0, 0, 1).cross(d)
+  if (right.lengthSq() < 1e-6) right.set(0, 1, 0)
+  right.normalize()
+  const up = d.clone().cross(right)
+  const tall = Math.tan(((camera.fov / 2) * Math.PI) / 180) / MARGIN
+  const wide = tall * camera.aspect
+  let distance = nearest
+  for (const corner of corners) {
+    const p = corner.sub(centre)
+    distance = Math.max(
+      distance,
+      p.dot(d) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall),
+    )
+  }
+  return centre.clone().addScaledVector(d, distance)
+}
+
+/** What each frame computes with, made once. */
+const newScratch = () => ({
+  matrix: new Matrix4(),
+  tool: new Vector3(),
+  last: new Vector3(),
+  eye: new Vector3(),
+  to: new Vector3(),
+})
+type Scratch = ReturnType<typeof newScratch>
+
+function standBehindTool(now: CameraControls, { matrix, eye, to }: Scratch, reach: number): void {
+  // A hand camera: behind the tool and a little above, looking where the tool points.
+  eye.set(-0.16 * reach, 0, -0.3 * reach).applyMatrix4(matrix)
+  to.set(0, 0, 0.35 * reach).applyMatrix4(matrix)
+  void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
+}
+
+function goWithTool(now: CameraControls, { tool, last, eye, to }: Scratch): void {
+  const shift = tool.clone().sub(last)
+  last.copy(tool)
+  if (shift.lengthSq() === 0) return
+  now.getPosition(eye).add(shift)
+  now.getTarget(to).add(shift)
+  void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
+}
+
 interface CameraProps {
   scene: RobotScene
   poses: () => Poses | undefined
@@ -51,66 +112,18 @@ interface CameraProps {
   handle: React.RefObject<CameraHandle | null>
 }
 
-export function ViewCamera({ scene, poses, floor, extent, whole, handle }: CameraProps) {
-  const controls = useRef<CameraControls>(null)
-  const mounted = useRef(false)
-  const touched = useRef(false)
-  const invalidate = useThree((s) => s.invalidate)
-  const world = useThree((s) => s.scene)
-  const camera = useThree((s) => s.camera) as PerspectiveCamera
-  const follow = useViewOptions((s) => s.follow)
-  const scratch = useMemo(
-    () => ({
-      matrix: new Matrix4(),
-      tool: new Vector3(),
-      last: new Vector3(),
-      eye: new Vector3(),
-      to: new Vector3(),
-    }),
-    [],
-  )
+interface View {
+  controls: React.RefObject<CameraControls | null>
+  mounted: React.RefObject<boolean>
+  touched: React.RefObject<boolean>
+  camera: PerspectiveCamera
+  fit: (direction: Vector3, smooth: boolean) => void
+  invalidate: () => void
+}
 
-  const toolAt = (into: Vector3): boolean => {
-    const now = poses()
-    if (!now) return false
-    into.setFromMatrixPosition(matrixAt(now, scene.rows - 1, scratch.matrix))
-    return true
-  }
-
-  const fit = (direction: Vector3, smooth: boolean) => {
-    const arm = world.getObjectByName('arm')
-    if (!arm || !controls.current) return
-    world.updateMatrixWorld(true)
-    const corners = cornersOf(arm)
-    const box = new Box3()
-    const thick = 0.05 * scene.reach
-    for (const [x, y, z] of extent?.() ?? [])
-      corners.push(new Vector3(x, y, z + thick), new Vector3(x, y, z - thick))
-    corners.push(new Vector3(0, 0, floor))
-    box.setFromPoints(corners)
-    const centre = box.getCenter(new Vector3())
-    const d = direction.clone().normalize()
-    const right = new Vector3(0, 0, 1).cross(d)
-    if (right.lengthSq() < 1e-6) right.set(0, 1, 0)
-    right.normalize()
-    const up = d.clone().cross(right)
-    const tall = Math.tan(((camera.fov / 2) * Math.PI) / 180) / MARGIN
-    const wide = tall * camera.aspect
-    let distance = 0.1 * scene.reach
-    for (const corner of corners) {
-      const p = corner.sub(centre)
-      distance = Math.max(
-        distance,
-        p.dot(d) + Math.max(Math.abs(p.dot(right)) / wide, Math.abs(p.dot(up)) / tall),
-      )
-    }
-    const eye = centre.clone().addScaledVector(d, distance)
-    mounted.current = false
-    void controls.current.setLookAt(eye.x, eye.y, eye.z, centre.x, centre.y, centre.z, smooth)
-    invalidate()
-  }
-
-  handle.current = {
+/** What others do with the view. */
+function handleOf({ controls, mounted, touched, camera, fit, invalidate }: View): CameraHandle {
+  return {
     look: (preset) => {
       touched.current = true
       if (preset === 'tool') {
@@ -132,6 +145,38 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
       invalidate()
     },
   }
+}
+
+export function ViewCamera({ scene, poses, floor, extent, whole, handle }: CameraProps) {
+  const controls = useRef<CameraControls>(null)
+  const mounted = useRef(false)
+  const touched = useRef(false)
+  const invalidate = useThree((s) => s.invalidate)
+  const world = useThree((s) => s.scene)
+  const camera = useThree((s) => s.camera) as PerspectiveCamera
+  const follow = useViewOptions((s) => s.follow)
+  const scratch = useMemo(newScratch, [])
+
+  const toolAt = (into: Vector3): boolean => {
+    const now = poses()
+    if (!now) return false
+    into.setFromMatrixPosition(matrixAt(now, scene.rows - 1, scratch.matrix))
+    return true
+  }
+
+  const fit = (direction: Vector3, smooth: boolean) => {
+    const arm = world.getObjectByName('arm')
+    if (!arm || !controls.current) return
+    world.updateMatrixWorld(true)
+    const corners = seenCorners(arm, floor, extent, 0.05 * scene.reach)
+    const centre = new Box3().setFromPoints(corners).getCenter(new Vector3())
+    const eye = eyeOf(corners, centre, direction, camera, 0.1 * scene.reach)
+    mounted.current = false
+    void controls.current.setLookAt(eye.x, eye.y, eye.z, centre.x, centre.y, centre.z, smooth)
+    invalidate()
+  }
+
+  handle.current = handleOf({ controls, mounted, touched, camera, fit, invalidate })
 
   // As long as nobody has moved the view, it fits whatever size it has.
   const size = useThree((s) => s.size)
@@ -161,20 +206,8 @@ export function ViewCamera({ scene, poses, floor, extent, whole, handle }: Camer
       if (Math.max(Math.abs(x), Math.abs(y)) > 1) fit(new Vector3(...PRESETS.iso), false)
     }
     if (!now || (!follow && !mounted.current) || !toolAt(scratch.tool)) return
-    const { matrix, tool, last, eye, to } = scratch
-    if (mounted.current) {
-      // A hand camera: behind the tool and a little above, looking where the tool points.
-      eye.set(-0.16 * scene.reach, 0, -0.3 * scene.reach).applyMatrix4(matrix)
-      to.set(0, 0, 0.35 * scene.reach).applyMatrix4(matrix)
-      void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
-      return
-    }
-    const shift = tool.clone().sub(last)
-    last.copy(tool)
-    if (shift.lengthSq() === 0) return
-    now.getPosition(eye).add(shift)
-    now.getTarget(to).add(shift)
-    void now.setLookAt(eye.x, eye.y, eye.z, to.x, to.y, to.z, false)
+    if (mounted.current) standBehindTool(now, scratch, scene.reach)
+    else goWithTool(now, scratch)
   })
 
   return (

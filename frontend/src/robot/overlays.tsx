@@ -105,55 +105,72 @@ export function Limits({ scene, poses, dark }: OverlayProps) {
   ))
 }
 
-function Range({
-  joint,
-  poses,
-  dark,
-  reach,
-}: {
+interface RangeProps {
   joint: SceneJoint
   poses: () => Poses | undefined
   dark: boolean
   reach: number
-}) {
-  const colour = dark ? '#3d9fdc' : '#0072b2'
-  const hand = dark ? '#ff9a4d' : '#b04a00'
-  const inner = 1.3 * joint.radius
-  const outer = 1.95 * joint.radius
+}
+
+function Range({ joint, poses, dark, reach }: RangeProps) {
   if (!joint.limits) return null
-  const low = joint.limits[0] + joint.offset
-  const high = joint.limits[1] + joint.offset
-  if (!joint.turns)
-    return (
-      <>
-        <Riding row={joint.carrier} poses={poses}>
-          <Fixed at={joint.frame}>
-            <Line
-              toneMapped={false}
-              points={[
-                [outer, 0, low],
-                [outer, 0, high],
-              ]}
-              color={colour}
-              lineWidth={5}
-            />
-          </Fixed>
-        </Riding>
-        <Riding row={joint.row} poses={poses}>
-          <Fixed at={joint.moving}>
-            <Line
-              toneMapped={false}
-              points={[
-                [inner, 0, 0],
-                [1.2 * outer, 0, 0],
-              ]}
-              color={hand}
-              lineWidth={3}
-            />
-          </Fixed>
-        </Riding>
-      </>
-    )
+  const shown = {
+    joint,
+    poses,
+    reach,
+    colour: dark ? '#3d9fdc' : '#0072b2',
+    hand: dark ? '#ff9a4d' : '#b04a00',
+    inner: 1.3 * joint.radius,
+    outer: 1.95 * joint.radius,
+    low: joint.limits[0] + joint.offset,
+    high: joint.limits[1] + joint.offset,
+  }
+  return joint.turns ? <Arc {...shown} /> : <Bar {...shown} />
+}
+
+interface ShownRange extends Omit<RangeProps, 'dark'> {
+  colour: string
+  hand: string
+  inner: number
+  outer: number
+  low: number
+  high: number
+}
+
+function Bar({ joint, poses, colour, hand, inner, outer, low, high }: ShownRange) {
+  return (
+    <>
+      <Riding row={joint.carrier} poses={poses}>
+        <Fixed at={joint.frame}>
+          <Line
+            toneMapped={false}
+            points={[
+              [outer, 0, low],
+              [outer, 0, high],
+            ]}
+            color={colour}
+            lineWidth={5}
+          />
+        </Fixed>
+      </Riding>
+      <Riding row={joint.row} poses={poses}>
+        <Fixed at={joint.moving}>
+          <Line
+            toneMapped={false}
+            points={[
+              [inner, 0, 0],
+              [1.2 * outer, 0, 0],
+            ]}
+            color={hand}
+            lineWidth={3}
+          />
+        </Fixed>
+      </Riding>
+    </>
+  )
+}
+
+function Arc({ joint, poses, reach, colour, hand, inner, outer, low, high }: ShownRange) {
   return (
     <>
       <Riding row={joint.carrier} poses={poses}>

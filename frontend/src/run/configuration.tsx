@@ -2,6 +2,7 @@ import { Alert, Button, Group, Modal, NativeSelect, Stack, TextInput } from '@ma
 import { useEffect, useState } from 'react'
 import { show, useDialogs } from '../dialogs'
 import { valueText } from '../inspector/value_text'
+import type { SolverChoice } from '../protocol'
 import { ask, change, useStudio } from '../store'
 
 const CHECK_DELAY_MS = 200
@@ -23,18 +24,9 @@ const numberText = (value: number | string | null) =>
     ? value.toExponential()
     : valueText(value)
 
-function Form({ onClose }: { onClose: () => void }) {
-  const document = useStudio((s) => s.document?.state.document ?? '')
-  const settings = useStudio((s) => s.document?.state.settings)
-  const welcome = useStudio((s) => s.welcome)
-  const run = useStudio((s) => s.run)
-  const [start] = useState(() =>
-    Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])),
-  )
-  const [typed, setTyped] = useState<Record<string, string>>(start)
+/** What is wrong with typed settings, by their names, as the server finds it. */
+function useFaults(document: string, values: Record<string, string | null>): Record<string, string> {
   const [faults, setFaults] = useState<Record<string, string>>({})
-  const changed = Object.keys(typed).filter((name) => typed[name] !== start[name])
-  const values = Object.fromEntries(changed.map((name) => [name, typed[name]?.trim() ? typed[name] : null]))
   const asked = JSON.stringify(values)
   useEffect(() => {
     let current = true
@@ -52,19 +44,18 @@ function Form({ onClose }: { onClose: () => void }) {
       clearTimeout(timer)
     }
   }, [asked, document])
-  const wrong = changed.length > 0 && Object.keys(faults).length > 0
-  const put = (name: string) => (event: React.ChangeEvent<HTMLInputElement | HTMLSelectElement>) => {
-    const { value } = event.currentTarget
-    setTyped((now) => ({ ...now, [name]: value }))
-  }
-  const solvers = welcome?.solvers ?? []
+  return faults
+}
+
+/** All solvers, in groups. */
+function solverChoices(solvers: SolverChoice[]) {
   const group = (label: string, adaptive: boolean, stiff: boolean) => ({
     group: label,
     items: solvers
       .filter((one) => one.name !== 'auto' && one.adaptive === adaptive && one.stiff === stiff)
       .map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
   })
-  const choices = [
+  return [
     {
       group: 'Automatic',
       items: solvers
@@ -76,6 +67,26 @@ function Form({ onClose }: { onClose: () => void }) {
     group('Fixed step', false, false),
     group('Fixed step, for stiff systems', false, true),
   ]
+}
+
+function Form({ onClose }: { onClose: () => void }) {
+  const document = useStudio((s) => s.document?.state.document ?? '')
+  const settings = useStudio((s) => s.document?.state.settings)
+  const welcome = useStudio((s) => s.welcome)
+  const run = useStudio((s) => s.run)
+  const [start] = useState(() =>
+    Object.fromEntries(Object.entries(settings ?? {}).map(([name, value]) => [name, numberText(value)])),
+  )
+  const [typed, setTyped] = useState<Record<string, string>>(start)
+  const changed = Object.keys(typed).filter((name) => typed[name] !== start[name])
+  const values = Object.fromEntries(changed.map((name) => [name, typed[name]?.trim() ? typed[name] : null]))
+  const faults = useFaults(document, values)
+  const wrong = changed.length > 0 && Object.keys(faults).length > 0
+  const put = (name: string) => (event: React.ChangeEvent<HTMLInputElement | HTMLSelectElement>) => {
+    const { value } = event.currentTarget
+    setTyped((now) => ({ ...now, [name]: value }))
+  }
+  const choices = solverChoices(welcome?.solvers ?? [])
   return (
     <form
       onSubmit={(event) => {

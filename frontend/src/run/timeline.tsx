@@ -11,7 +11,6 @@ const LONG_STEP = 10
 export function Timeline({ wires = false }: { wires?: boolean }) {
   const run = useStudio((s) => s.run)
   const { time, playing, loop, rate } = useCursor()
-  const all = useValues((s) => s.all)
   const stop = run?.stopTime ?? 10
   const at = time ?? run?.time ?? 0
   const label = playing ? 'Hold the playback' : 'Play the run'
@@ -69,41 +68,54 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
         value={Math.min(at, stop)}
         onChange={(value) => useCursor.setState({ time: value, playing: false })}
       />
-      {run?.state === 'paused' && time !== null && time < run.time && (
-        <Tooltip
-          label="The run returns to this instant; what came later is forgotten, tuned values stay"
-          multiline
-          w={260}
-        >
-          <Button
-            size="compact-xs"
-            variant="default"
-            onClick={() =>
-              void ask({ kind: 'rewind', run: run.run, time }).then(() =>
-                useCursor.setState({ time: null, playing: false }),
-              )
-            }
-          >
-            Go back to here
-          </Button>
-        </Tooltip>
-      )}
-      {wires && (
-        <Tooltip label="Values on all wires" openDelay={400}>
-          <ActionIcon
-            variant={all ? 'light' : 'subtle'}
-            color={all ? 'accent' : 'gray'}
-            aria-label="Values on all wires"
-            aria-pressed={all}
-            onClick={() => useValues.setState({ all: !all })}
-          >
-            <IconTag size={15} />
-          </ActionIcon>
-        </Tooltip>
-      )}
+      <GoBack />
+      {wires && <AllValues />}
       <Text size="sm" className="numbers instant">
         {(run ? shownTime() : 0).toFixed(3)} s
       </Text>
     </footer>
+  )
+}
+
+/** Takes a paused run back to the instant that the views show. */
+function GoBack() {
+  const run = useStudio((s) => s.run)
+  const time = useCursor((s) => s.time)
+  if (run?.state !== 'paused' || time === null || time >= run.time) return null
+  return (
+    <Tooltip
+      label="The run returns to this instant; what came later is forgotten, tuned values stay"
+      multiline
+      w={260}
+    >
+      <Button
+        size="compact-xs"
+        variant="default"
+        onClick={() =>
+          void ask({ kind: 'rewind', run: run.run, time }).then(() =>
+            useCursor.setState({ time: null, playing: false }),
+          )
+        }
+      >
+        Go back to here
+      </Button>
+    </Tooltip>
+  )
+}
+
+function AllValues() {
+  const all = useValues((s) => s.all)
+  return (
+    <Tooltip label="Values on all wires" openDelay={400}>
+      <ActionIcon
+        variant={all ? 'light' : 'subtle'}
+        color={all ? 'accent' : 'gray'}
+        aria-label="Values on all wires"
+        aria-pressed={all}
+        onClick={() => useValues.setState({ all: !all })}
+      >
+        <IconTag size={15} />
+      </ActionIcon>
+    </Tooltip>
   )
 }

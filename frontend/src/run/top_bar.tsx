@@ -29,16 +29,6 @@ const SPEEDS = [
 
 export function TopBar() {
   const known = useStudio((s) => s.document !== null)
-  const state = useStudio((s) => s.run?.state)
-  const runKey = useStudio((s) => s.run?.run)
-  const speed = useRuns((s) => s.speed)
-  const busy = state === 'running' || state === 'paused'
-  const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') =>
-    runKey && void ask({ kind: 'control', run: runKey, action })
-  const goBack = () => {
-    useCursor.setState({ time: null, playing: false })
-    control('back')
-  }
 
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
@@ -72,48 +62,7 @@ export function TopBar() {
           onClick={() => alter('arrange')}
         />
       </Group>
-      <Group gap={4} role="group" aria-label="Run" className="run-controls">
-        <Button
-          size="compact-sm"
-          leftSection={<IconPlayerPlayFilled size={14} />}
-          disabled={!known || state === 'running'}
-          onClick={startOrResume}
-        >
-          {state === 'paused' ? 'Resume' : 'Run'}
-        </Button>
-        <Tool
-          label={busy ? 'Step back' : 'One instant back'}
-          icon={IconPlayerSkipBackFilled}
-          disabled={!runKey || state === 'running'}
-          onClick={() => (busy ? goBack() : stepCursor(-1))}
-        />
-        <Tool
-          label="Pause"
-          icon={IconPlayerPauseFilled}
-          disabled={state !== 'running'}
-          onClick={() => control('pause')}
-        />
-        <Tool
-          label={busy ? 'Step' : 'One instant on'}
-          icon={IconPlayerSkipForwardFilled}
-          disabled={!runKey || state === 'running'}
-          onClick={() => (busy ? control('step') : stepCursor(1))}
-        />
-        <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
-        <StopTime />
-        <NativeSelect
-          size="xs"
-          w={160}
-          aria-label="Speed"
-          data={SPEEDS}
-          value={speed ?? ''}
-          onChange={({ currentTarget }) => {
-            const chosen = currentTarget.value ? Number(currentTarget.value) : null
-            useRuns.setState({ speed: chosen })
-            if (busy && runKey) void ask({ kind: 'speed', run: runKey, speed: chosen })
-          }}
-        />
-      </Group>
+      <RunControls known={known} />
       <Tool
         label="Configuration parameters (Ctrl+E)"
         icon={IconSettings}
@@ -123,6 +72,63 @@ export function TopBar() {
       <RunState />
       <RunProgress />
     </header>
+  )
+}
+
+function RunControls({ known }: { known: boolean }) {
+  const state = useStudio((s) => s.run?.state)
+  const runKey = useStudio((s) => s.run?.run)
+  const speed = useRuns((s) => s.speed)
+  const busy = state === 'running' || state === 'paused'
+  const control = (action: 'pause' | 'resume' | 'step' | 'back' | 'stop') =>
+    runKey && void ask({ kind: 'control', run: runKey, action })
+  const goBack = () => {
+    useCursor.setState({ time: null, playing: false })
+    control('back')
+  }
+  return (
+    <Group gap={4} role="group" aria-label="Run" className="run-controls">
+      <Button
+        size="compact-sm"
+        leftSection={<IconPlayerPlayFilled size={14} />}
+        disabled={!known || state === 'running'}
+        onClick={startOrResume}
+      >
+        {state === 'paused' ? 'Resume' : 'Run'}
+      </Button>
+      <Tool
+        label={busy ? 'Step back' : 'One instant back'}
+        icon={IconPlayerSkipBackFilled}
+        disabled={!runKey || state === 'running'}
+        onClick={() => (busy ? goBack() : stepCursor(-1))}
+      />
+      <Tool
+        label="Pause"
+        icon={IconPlayerPauseFilled}
+        disabled={state !== 'running'}
+        onClick={() => control('pause')}
+      />
+      <Tool
+        label={busy ? 'Step' : 'One instant on'}
+        icon={IconPlayerSkipForwardFilled}
+        disabled={!runKey || state === 'running'}
+        onClick={() => (busy ? control('step') : stepCursor(1))}
+      />
+      <Tool label="Stop" icon={IconPlayerStopFilled} disabled={!busy} onClick={() => control('stop')} />
+      <StopTime />
+      <NativeSelect
+        size="xs"
+        w={160}
+        aria-label="Speed"
+        data={SPEEDS}
+        value={speed ?? ''}
+        onChange={({ currentTarget }) => {
+          const chosen = currentTarget.value ? Number(currentTarget.value) : null
+          useRuns.setState({ speed: chosen })
+          if (busy && runKey) void ask({ kind: 'speed', run: runKey, speed: chosen })
+        }}
+      />
+    </Group>
   )
 }
 

@@ -135,41 +135,18 @@ async function keep(): Promise<void> {
 }
 
 function TuneRow({ tunable }: { tunable: Tunable }) {
-  const { path, unit, doc, low, high } = tunable
+  const { path, unit, doc } = tunable
   const tried = useRuns((s) => s.tried)
-  const pinned = useTuning((s) => s.pinned.has(path))
-  const given = useTuning((s) => s.ranges[path])
   const changed = path in tried
   const value = changed ? tried[path] : tunable.value
   const text = valueText(value)
   const [typed, setTyped] = useState(text)
   useEffect(() => setTyped(text), [text])
   const at = path.lastIndexOf('.')
-  const model = typeof tunable.value === 'number' ? tunable.value : 0
-  const [from, to] = given ?? [
-    low ?? Math.min(2 * model, model === 0 ? -1 : 0),
-    high ?? Math.max(2 * model, model === 0 ? 1 : 0),
-  ]
   const done = () => {
     const number = Number(typed)
     if (typed.trim() && typed !== text) attempt(path, Number.isFinite(number) ? number : typed)
   }
-  const bound = (index: 0 | 1) => (
-    <input
-      key={`${from} ${to}`}
-      className="bound numbers"
-      aria-label={`${index ? 'Greatest' : 'Least'} value of the slider of ${path}`}
-      defaultValue={index ? to : from}
-      onBlur={(event) => {
-        const number = Number(event.currentTarget.value)
-        const range: [number, number] = index ? [from, number] : [number, to]
-        if (Number.isFinite(number) && range[0] < range[1])
-          useTuning.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
-        else event.currentTarget.value = String(index ? to : from)
-      }}
-      onKeyDown={(event) => event.key === 'Enter' && event.currentTarget.blur()}
-    />
-  )
   return (
     <div className={changed ? 'tune-row changed' : 'tune-row'}>
       <div className="tune-head" title={doc}>
@@ -191,22 +168,7 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
             </ActionIcon>
           </Tooltip>
         )}
-        <ActionIcon
-          size="xs"
-          variant="subtle"
-          color="gray"
-          aria-label={pinned ? `Unpin ${path}` : `Pin ${path}`}
-          aria-pressed={pinned}
-          onClick={() =>
-            useTuning.setState((s) => {
-              const next = new Set(s.pinned)
-              if (!next.delete(path)) next.add(path)
-              return { pinned: next }
-            })
-          }
-        >
-          {pinned ? <IconPinFilled size={13} /> : <IconPin size={13} />}
-        </ActionIcon>
+        <Pin path={path} />
         <TextInput
           size="xs"
           w={typeof value === 'number' ? 92 : 160}
@@ -218,23 +180,73 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
           onKeyDown={(event) => event.key === 'Enter' && done()}
         />
       </div>
-      {typeof value === 'number' && (
-        <div className="tune-slide">
-          {bound(0)}
-          <Slider
-            size="xs"
-            flex={1}
-            label={null}
-            thumbLabel={`Slider of ${path}`}
-            min={from}
-            max={to}
-            step={(to - from) / SLIDER_STEPS}
-            value={Math.min(Math.max(value, from), to)}
-            onChange={(moved) => attempt(path, Number(moved.toPrecision(6)))}
-          />
-          {bound(1)}
-        </div>
-      )}
+      {typeof value === 'number' && <Slide tunable={tunable} value={value} />}
+    </div>
+  )
+}
+
+function Pin({ path }: { path: string }) {
+  const pinned = useTuning((s) => s.pinned.has(path))
+  return (
+    <ActionIcon
+      size="xs"
+      variant="subtle"
+      color="gray"
+      aria-label={pinned ? `Unpin ${path}` : `Pin ${path}`}
+      aria-pressed={pinned}
+      onClick={() =>
+        useTuning.setState((s) => {
+          const next = new Set(s.pinned)
+          if (!next.delete(path)) next.add(path)
+          return { pinned: next }
+        })
+      }
+    >
+      {pinned ? <IconPinFilled size={13} /> : <IconPin size={13} />}
+    </ActionIcon>
+  )
+}
+
+/** A slider with its bounds, which can be typed. */
+function Slide({ tunable, value }: { tunable: Tunable; value: number }) {
+  const { path, low, high } = tunable
+  const given = useTuning((s) => s.ranges[path])
+  const model = typeof tunable.value === 'number' ? tunable.value : 0
+  const [from, to] = given ?? [
+    low ?? Math.min(2 * model, model === 0 ? -1 : 0),
+    high ?? Math.max(2 * model, model === 0 ? 1 : 0),
+  ]
+  const bound = (index: 0 | 1) => (
+    <input
+      key={`${from} ${to}`}
+      className="bound numbers"
+      aria-label={`${index ? 'Greatest' : 'Least'} value of the slider of ${path}`}
+      defaultValue={index ? to : from}
+      onBlur={(event) => {
+        const number = Number(event.currentTarget.value)
+        const range: [number, number] = index ? [from, number] : [number, to]
+        if (Number.isFinite(number) && range[0] < range[1])
+          useTuning.setState((s) => ({ ranges: { ...s.ranges, [path]: range } }))
+        else event.currentTarget.value = String(index ? to : from)
+      }}
+      onKeyDown={(event) => event.key === 'Enter' && event.currentTarget.blur()}
+    />
+  )
+  return (
+    <div className="tune-slide">
+      {bound(0)}
+      <Slider
+        size="xs"
+        flex={1}
+        label={null}
+        thumbLabel={`Slider of ${path}`}
+        min={from}
+        max={to}
+        step={(to - from) / SLIDER_STEPS}
+        value={Math.min(Math.max(value, from), to)}
+        onChange={(moved) => attempt(path, Number(moved.toPrecision(6)))}
+      />
+      {bound(1)}
     </div>
   )
 }

@@ -4,7 +4,8 @@ import { useRef, useState } from 'react'
 import { useRuns } from '../run/runs'
 import { saveCsv, savePng, saveSvg } from './export'
 import { MeasureTable } from './measure_table'
-import { Plot, type PlotHandle, type Values } from './plot'
+import { Plot, type PlotHandle } from './plot'
+import type { Values } from './plot_gestures'
 import type { Trace } from '../model/trace'
 import { useWindow } from './window'
 import { XyPlot } from './xy_plot'
@@ -27,10 +28,8 @@ export function Chart({
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set())
   const [values, setValues] = useState<Values | null>(null)
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
-  const stride = useRuns((s) => s.runs.at(-1)?.stride ?? 1)
   const handle = useRef<PlotHandle>(null)
   const { stem, names } = shortened(traces.map(({ label }) => label))
-  const figure = () => handle.current?.figure()
   const toggle = (key: string) =>
     setHidden((now) => {
       const next = new Set(now)
@@ -44,29 +43,14 @@ export function Chart({
         <span className="legend">
           {!path && stem && <span className="stem">{stem}</span>}
           {!path &&
-            traces.map(({ key, label, tone, dash }, k) => (
-              <button
-                key={key}
-                type="button"
-                className={names[k]!.length > SHORT ? 'long' : undefined}
-                aria-label={label}
-                aria-pressed={!hidden.has(key)}
-                title={hidden.has(key) ? `Show ${label}` : `Hide ${label}`}
-                onClick={() => toggle(key)}
-              >
-                <svg width="16" height="4" aria-hidden>
-                  <line
-                    x1="0"
-                    x2="16"
-                    y1="2"
-                    y2="2"
-                    stroke={`var(--${tone})`}
-                    strokeWidth="2.5"
-                    strokeDasharray={dash.join(' ')}
-                  />
-                </svg>
-                <span>{names[k]}</span>
-              </button>
+            traces.map((trace, k) => (
+              <Key
+                key={trace.key}
+                trace={trace}
+                name={names[k]!}
+                hidden={hidden.has(trace.key)}
+                toggle={() => toggle(trace.key)}
+              />
             ))}
         </span>
         {values && (
@@ -82,26 +66,7 @@ export function Chart({
             <IconArrowsVertical size={13} />
           </ActionIcon>
         )}
-        <Menu position="bottom-end" shadow="md">
-          <Menu.Target>
-            <ActionIcon
-              className="more"
-              variant="subtle"
-              color="gray"
-              size="xs"
-              aria-label={`Export ${title}`}
-            >
-              <IconDownload size={13} />
-            </ActionIcon>
-          </Menu.Target>
-          <Menu.Dropdown>
-            <Menu.Item onClick={() => saveCsv(title, traces)}>
-              {stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV'}
-            </Menu.Item>
-            <Menu.Item onClick={() => figure() && void savePng(figure()!)}>Picture as PNG</Menu.Item>
-            <Menu.Item onClick={() => figure() && saveSvg(figure()!)}>Picture as SVG</Menu.Item>
-          </Menu.Dropdown>
-        </Menu>
+        <Exports title={title} traces={traces} figure={() => handle.current?.figure()} />
       </figcaption>
       <div className="with-measures">
         {path ? (
@@ -120,6 +85,66 @@ export function Chart({
         {measured && <MeasureTable traces={traces.filter(({ key }) => !hidden.has(key))} />}
       </div>
     </figure>
+  )
+}
+
+interface KeyProps {
+  trace: Trace
+  name: string
+  hidden: boolean
+  toggle: () => void
+}
+
+/** A trace in the legend. */
+function Key({ trace: { label, tone, dash }, name, hidden, toggle }: KeyProps) {
+  return (
+    <button
+      type="button"
+      className={name.length > SHORT ? 'long' : undefined}
+      aria-label={label}
+      aria-pressed={!hidden}
+      title={hidden ? `Show ${label}` : `Hide ${label}`}
+      onClick={toggle}
+    >
+      <svg width="16" height="4" aria-hidden>
+        <line
+          x1="0"
+          x2="16"
+          y1="2"
+          y2="2"
+          stroke={`var(--${tone})`}
+          strokeWidth="2.5"
+          strokeDasharray={dash.join(' ')}
+        />
+      </svg>
+      <span>{name}</span>
+    </button>
+  )
+}
+
+interface ExportsProps {
+  title: string
+  traces: Trace[]
+  figure: () => ReturnType<PlotHandle['figure']> | undefined
+}
+
+function Exports({ title, traces, figure }: ExportsProps) {
+  const stride = useRuns((s) => s.runs.at(-1)?.stride ?? 1)
+  return (
+    <Menu position="bottom-end" shadow="md">
+      <Menu.Target>
+        <ActionIcon className="more" variant="subtle" color="gray" size="xs" aria-label={`Export ${title}`}>
+          <IconDownload size={13} />
+        </ActionIcon>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Item onClick={() => saveCsv(title, traces)}>
+          {stride > 1 ? `Extremes of every ${stride} samples as CSV` : 'Samples as CSV'}
+        </Menu.Item>
+        <Menu.Item onClick={() => figure() && void savePng(figure()!)}>Picture as PNG</Menu.Item>
+        <Menu.Item onClick={() => figure() && saveSvg(figure()!)}>Picture as SVG</Menu.Item>
+      </Menu.Dropdown>
+    </Menu>
   )
 }
 

@@ -77,47 +77,63 @@ export function MeasureTable({ traces }: { traces: Trace[] }) {
           </tr>
         </thead>
         <tbody>
-          {read.map(({ trace, data }) => {
-            const found = measuring ? measures(data, from, to) : undefined
-            const [a, b] = cursors
-              ? [valueAt(data, cursors[0]), valueAt(data, cursors[1])]
-              : [valueAt(data, Math.min(now, data.time.at(-1) ?? 0)), NaN]
-            const largest = Math.max(
-              ...[a, b, found?.least, found?.greatest]
-                .filter((v) => v !== undefined && Number.isFinite(v))
-                .map((v) => Math.abs(v!)),
-              0,
-            )
-            const { factor, unit } = reading(trace.unit, largest)
-            return (
-              <tr key={trace.key}>
-                <th scope="row">
-                  <i style={{ background: `var(--${trace.tone})` }} />
-                  {trace.label}
-                  {unit && <span className="unit"> {unit}</span>}
-                </th>
-                {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
-                  <td key={k}>{digits(value * factor)}</td>
-                ))}
-                {found &&
-                  ROWS.map(([name]) => (
-                    <td key={name}>
-                      {name === 'riseTime'
-                        ? Number.isNaN(found.riseTime)
-                          ? '–'
-                          : spoken(found.riseTime, 's')
-                        : name === 'overshoot'
-                          ? Number.isNaN(found.overshoot)
-                            ? '–'
-                            : `${digits(100 * found.overshoot, 3)} %`
-                          : digits(found[name] * factor)}
-                    </td>
-                  ))}
-              </tr>
-            )
-          })}
+          {read.map(({ trace, data }) => (
+            <Row key={trace.key} trace={trace} data={data} now={now} window={measuring ? [from, to] : null} />
+          ))}
         </tbody>
       </table>
     </div>
   )
+}
+
+interface Data {
+  time: Float64Array
+  values: Float64Array
+}
+
+/** One trace: its value at the cursors or now, and its measures over a window of time. */
+function Row({
+  trace,
+  data,
+  now,
+  window,
+}: {
+  trace: Trace
+  data: Data
+  now: number
+  window: [number, number] | null
+}) {
+  const cursors = useWindow((s) => s.cursors)
+  const found = window ? measures(data, ...window) : undefined
+  const [a, b] = cursors
+    ? [valueAt(data, cursors[0]), valueAt(data, cursors[1])]
+    : [valueAt(data, Math.min(now, data.time.at(-1) ?? 0)), NaN]
+  const largest = Math.max(
+    ...[a, b, found?.least, found?.greatest]
+      .filter((v) => v !== undefined && Number.isFinite(v))
+      .map((v) => Math.abs(v!)),
+    0,
+  )
+  const { factor, unit } = reading(trace.unit, largest)
+  return (
+    <tr>
+      <th scope="row">
+        <i style={{ background: `var(--${trace.tone})` }} />
+        {trace.label}
+        {unit && <span className="unit"> {unit}</span>}
+      </th>
+      {(cursors ? [a, b, b - a] : [a]).map((value, k) => (
+        <td key={k}>{digits(value * factor)}</td>
+      ))}
+      {found && ROWS.map(([name]) => <td key={name}>{measureText(found, name, factor)}</td>)}
+    </tr>
+  )
+}
+
+/** A measure as it is read; a dash where it makes no sense. */
+function measureText(found: Measures, name: keyof Measures, factor: number): string {
+  const value = found[name]
+  if (name === 'riseTime') return Number.isNaN(value) ? '–' : spoken(value, 's')
+  if (name === 'overshoot') return Number.isNaN(value) ? '–' : `${digits(100 * value, 3)} %`
+  return digits(value * factor)
 }

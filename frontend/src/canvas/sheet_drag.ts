@@ -1,0 +1,109 @@
+import type { ReactFlowInstance } from '@xyflow/react'
+import { useEffect, useRef, useState } from 'react'
+import { isLoose, levelled, putInto, rewired, takenOut, wireAt } from '../model/rewiring'
+import { wireKey, type Places } from '../model/wires'
+import type { SheetBlock, SheetNote, Wire } from '../protocol'
+import { BLOCK_TYPE, insertBlock } from './insert'
+import { move } from './sheet_actions'
+import type { SheetNode } from './sheet_graph'
+import type { WireEdgeType } from './wire_edge'
+
+/** What the mouse holds: blocks that it takes out of their wires, and one without wires, which goes into a wire that it is dropped on. */
+const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
+
+/** What the mouse does on a sheet: how far it has moved blocks, what it holds, and the wire that a block would go into. */
+export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<string, SheetNote>) {
+  const [drag, setDrag] = useState<Places>({})
+  const [{ freed, loose }, setHeld] = useState(NOTHING_HELD)
+  /** What is held, also before the next drawing knows of it. */
+  const held = useRef(NOTHING_HELD)
+  /** The wire that a dragged block would go into. */
+  const [into, setInto] = useState<string | null>(null)
+  // A place that the server has taken over needs no memory of the drag any more.
+  useEffect(() => setDrag((now) => (Object.keys(now).length ? {} : now)), [blocks, notes])
+  return { drag, setDrag, freed, loose, held, setHeld, into, setInto }
+}
+
+export type SheetDrag = ReturnType<typeof useSheetDrag>
+
+/** What blocks do that are dragged on the sheet. */
+export function dragHandlers(
+  { held, setHeld, setInto }: SheetDrag,
+  blocks: Record<string, SheetBlock>,
+  wires: Wire[],
+  edges: WireEdgeType[],
+) {
+  const takeHold = (event: MouseEvent | TouchEvent | React.MouseEvent, _: SheetNode, nodes: SheetNode[]) => {
+    const taken = present(
+      blocks,
+      nodes.map(({ id }) => id),
+    )
+    const freed = event.shiftKey || event.altKey ? taken.map(({ name }) => name) : []
+    const [one] = taken
+    const alone = taken.length === 1 && one && isLoose(one, freed.length ? takenOut(taken, wires) : wires)
+    if (freed.length || alone) setHeld((held.current = { freed, loose: alone ? one.name : null }))
+  }
+  const carry = (_: unknown, node: SheetNode) => {
+    const block = node.id === held.current.loose ? blocks[node.id] : undefined
+    if (block) setInto(keyOf(wireAt(middleOf(block, node.position), edges, wires)?.wire))
+  }
+  const letGo = (_: unknown, node: SheetNode, moved: SheetNode[]) => {
+    const to: Places = Object.fromEntries(moved.map(({ id, position }) => [id, position]))
+    const { freed, loose } = held.current
+    held.current = NOTHING_HELD
+    const left = freed.length ? takenOut(present(blocks, freed), wires) : wires
+    const block = loose === null ? undefined : blocks[loose]
+    const found = block && wireAt(middleOf(block, node.position), edges, wires)
+    if (found) to[block.name] = levelled(block, node.position, found)
+    const after = found ? putInto(block, found.wire, left) : left
+    // The wires stay as they are drawn until the server has them so.
+    void move(to, freed.length || found ? rewired(wires, after) : undefined).finally(() =>
+      setHeld((now) => (now === held.current ? now : NOTHING_HELD)),
+    )
+    setInto(null)
+  }
+  return { onNodeDragStart: takeHold, onNodeDrag: carry, onNodeDragStop: letGo }
+}
+
+/** What a block type does that is dragged from the library onto the sheet. */
+export function dropHandlers(
+  setInto: SheetDrag['setInto'],
+  flow: ReactFlowInstance<SheetNode, WireEdgeType>,
+  wires: Wire[],
+  edges: WireEdgeType[],
+) {
+  const drop = (event: React.DragEvent) => {
+    const type = event.dataTransfer.getData(BLOCK_TYPE)
+    if (!type) return
+    event.preventDefault()
+    const at = flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false })
+    const found = wireAt(at, edges, wires)
+    setInto(null)
+    if (found) insertBlock(type, { x: at.x, y: found.y }, found.wire)
+    else insertBlock(type, at)
+  }
+  const hover = (event: React.DragEvent) => {
+    event.preventDefault()
+    if (!event.dataTransfer.types.includes(BLOCK_TYPE)) return
+    setInto(
+      keyOf(
+        wireAt(
+          flow.screenToFlowPosition({ x: event.clientX, y: event.clientY }, { snapToGrid: false }),
+          edges,
+          wires,
+        )?.wire,
+      ),
+    )
+  }
+  return { onDragOver: hover, onDragLeave: () => setInto(null), onDrop: drop }
+}
+
+const keyOf = (wire: Wire | undefined): string | null => (wire ? wireKey(wire) : null)
+
+export const present = (blocks: Record<string, SheetBlock>, names: readonly string[]): SheetBlock[] =>
+  names.map((name) => blocks[name]).filter((block) => block !== undefined)
+
+const middleOf = ({ width, height }: SheetBlock, at: { x: number; y: number }) => ({
+  x: at.x + width / 2,
+  y: at.y + height / 2,
+})

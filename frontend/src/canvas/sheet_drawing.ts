@@ -1,0 +1,38 @@
+import { useMemo, useState } from 'react'
+import { takenOut } from '../model/rewiring'
+import { wireKey } from '../model/wires'
+import { useStudio } from '../store'
+import { present, type SheetDrag } from './sheet_drag'
+import { SheetGraph } from './sheet_graph'
+import { SheetRoutes } from './sheet_layout'
+import { useBending } from './wire_edge'
+
+/** The nodes and edges of the sheet on the screen, as the mouse has them now. */
+export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenWires: ReadonlySet<string>) {
+  const blocks = useStudio((s) => s.document!.blocks)
+  const wires = useStudio((s) => s.document!.wires)
+  const notes = useStudio((s) => s.document!.notes)
+  const findings = useStudio((s) => s.document!.findings)
+  const kinds = useStudio((s) => s.document!.wireKinds)
+  const level = useStudio((s) => s.document!.inside.map((name) => `${name}/`).join(''))
+  const selection = useStudio((s) => s.selection)
+  const bending = useBending((s) => s.wire)
+  const [{ graph, routes }] = useState(() => ({ graph: new SheetGraph(), routes: new SheetRoutes() }))
+  const shown = useMemo(() => {
+    if (bending) return wires.map((wire) => (wireKey(wire) === wireKey(bending) ? bending : wire))
+    return freed.length ? takenOut(present(blocks, freed), wires) : wires
+  }, [wires, bending, freed, blocks])
+  const routed = useMemo(
+    () => routes.update(blocks, shown, drag, loose),
+    [routes, blocks, shown, drag, loose],
+  )
+  const nodes = useMemo(
+    () => graph.nodes(blocks, notes, findings, level, drag, selection),
+    [graph, blocks, notes, findings, level, drag, selection],
+  )
+  const edges = useMemo(
+    () => graph.edges(shown, routed, kinds, level, chosenWires, into),
+    [graph, shown, routed, kinds, level, chosenWires, into],
+  )
+  return { graph, nodes, edges }
+}

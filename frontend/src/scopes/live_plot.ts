@@ -1,0 +1,259 @@
+import uPlot from 'uplot'
+import { changed, watch } from '../frames'
+import { Growing } from '../model/growing'
+import { extremes, within, type Drawn, type Extremes, type Trace } from '../model/trace'
+import { useCursor } from '../run/cursor'
+import { mayFollow } from '../run/pace'
+import { useRuns } from '../run/runs'
+import { samples } from '../samples'
+import { useStudio } from '../store'
+import { aired, type Figure } from './figure'
+import { listen, listenAtValues, type Values } from './plot_gestures'
+import { colour } from './plot_marks'
+import { LEAST_PX, plotOptions } from './plot_options'
+import { reading, useUnits, type Reading } from './quantity'
+import { shownWindow, useWindow } from './window'
+
+/** From so many samples in a pixel on only the least and the greatest are drawn. */
+const DENSE = 3
+/** While a run goes on, the part of its range that a vertical axis grows by beyond what is needed. */
+const ROOM = 0.15
+
+/** The values that are seen, in the unit of the signals (`null`: all of them), and who hears of others. */
+export interface SeenValues {
+  values: Values | null
+  onValues: (values: Values | null) => void
+}
+
+/** A plot that follows a run: drawn in the animation frame after a change, and only what is new where nothing else changed. */
+export class LivePlot {
+  private readonly plot: uPlot
+  private readonly growing: Growing
+  private readonly leave: (() => void)[]
+  private unit = ''
+  private factor = 1
+  private drawn: Drawn = [new Float64Array(0)]
+  private known: Extremes | undefined
+  private range: [number, number] = [0, 1]
+  /** The version of the samples that was looked at last, and the one of which all is drawn. */
+  private seen = 0
+  private whole = 0
+  /** What the picture depends on besides the samples: all of it anew, and the lines above it. */
+  private shape = ''
+  private lines = ''
+
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly shown: Trace[],
+    band: number | undefined,
+    private readonly held: { readonly current: SeenValues },
+  ) {
+    this.plot = new uPlot(
+      plotOptions(element, shown, () => this.unit, band),
+      [[], ...shown.map(() => [])] as uPlot.AlignedData,
+      element,
+    )
+    this.growing = new Growing(
+      this.plot,
+      shown.map(({ tone, dash }) => ({ colour: colour(tone), dash })),
+    )
+    const sized = new ResizeObserver(() => {
+      this.plot.setSize({
+        width: Math.max(element.clientWidth, LEAST_PX),
+        height: Math.max(element.clientHeight, LEAST_PX),
+      })
+      changed()
+    })
+    this.leave = [
+      listen(this.plot),
+      listenAtValues(this.plot, (next) =>
+        held.current.onValues(next && [next[0] / this.factor, next[1] / this.factor]),
+      ),
+      watch((at) => this.frame(at)),
+      () => sized.disconnect(),
+    ]
+    sized.observe(element)
+  }
+
+  destroy(): void {
+    for (const one of this.leave) one()
+    this.plot.destroy()
+  }
+
+  /** The picture as it is now, for exports. */
+  figure(title: string): Figure {
+    const { plot, shown } = this
+    const [min, max] = [plot.scales['y']?.min ?? 0, plot.scales['y']?.max ?? 1]
+    const [from, to] = shownWindow()
+    const [x, ...columns] = scaled(this.drawn, this.factor)
+    return {
+      title,
+      width: 760,
+      height: 360,
+      x: { min: from, max: to, label: 'time, s' },
+      y: { min, max, label: this.unit },
+      lines: shown.map(({ tone, dash, label }, k) => ({ tone, dash, label, x, y: columns[k] ?? [] })),
+    }
+  }
+
+  private frame(at: number): void {
+    if (!this.element.isConnected) return // behind another panel
+    const [from, to] = shownWindow()
+    const width = Math.max(Math.floor(this.plot.bbox.width / devicePixelRatio), 10)
+    const live = useStudio.getState().run?.state === 'running'
+    const { version, returns, run } = samples
+    const shape = [
+      run,
+      returns,
+      from,
+      to,
+      width,
+      this.plot.height,
+      live,
+      useUnits.getState().radians,
+      String(this.held.current.values),
+    ].join(' ')
+    const marks = [
+      useCursor.getState().time,
+      String(useWindow.getState().cursors),
+      useRuns.getState().runs.at(-1)?.tunings.length,
+    ].join(' ')
+    const same = shape === this.shape
+    const marked = marks === this.lines
+    if (same && marked && version === this.seen) return
+    if (same && version === this.whole) {
+      this.lines = marks
+      this.plot.redraw(false, false)
+    } else if (same && marked && live && !mayFollow(at)) changed()
+    else {
+      // What is drawn of a run that goes on only grows; once it went back, all is looked at again.
+      const before = same ? this.known : undefined
+      const made = drawnOf(this.shown, from, to, width, before)
+      this.drawn = made.drawn
+      this.known = made.extremes
+      this.seen = version
+      if (this.draw(made, before, live && same, marked, [from, to])) return
+      this.whole = version
+      this.shape = shape
+      this.lines = marks
+    }
+  }
+
+  /** Draw what was made; whether only what is new had to be drawn. */
+  private draw(
+    made: ToDraw,
+    before: Extremes | undefined,
+    follows: boolean,
+    marked: boolean,
+    [from, to]: [number, number],
+  ): boolean {
+    const { plot, shown, drawn, range } = this
+    const found = axisReading(shown, drawn)
+    const wanted = this.held.current.values
+    const needed: [number, number] = wanted
+      ? [wanted[0] * found.factor, wanted[1] * found.factor]
+      : rangeOf(drawn, found.factor, from, to)
+    const alike = found.factor === this.factor
+    const fits = follows && needed[0] >= range[0] && needed[1] <= range[1]
+    if (fits && marked && alike && Boolean(made.extremes) === Boolean(before) && made.ends) {
+      this.growing.grow(drawn, this.factor, made.ends, devicePixelRatio)
+      return true
+    }
+    this.range = fits ? range : follows && alike ? withRoom(needed, range) : needed
+    this.factor = found.factor
+    this.unit = shown.length === 1 ? [shown[0]!.label, found.unit].filter(Boolean).join(', ') : found.unit
+    plot.batch(() => {
+      plot.setData(scaled(drawn, this.factor), false)
+      plot.setScale('x', { min: from, max: to })
+      plot.setScale('y', { min: this.range[0], max: this.range[1] })
+    })
+    if (made.ends) this.growing.shows(drawn, made.ends)
+    return false
+  }
+}
+
+/** Unit and factor of the vertical axis: shared by all traces, or none. */
+function axisReading(traces: Trace[], drawn: Drawn): Reading {
+  const [first, ...others] = traces
+  if (!first || others.some(({ unit }) => unit !== first.unit)) return { factor: 1, unit: '' }
+  let largest = 0
+  for (const column of drawn.slice(1))
+    for (const value of column)
+      if (typeof value === 'number' && Math.abs(value) > largest) largest = Math.abs(value)
+  return reading(first.unit, largest)
+}
+
+/** What there is to draw; of each trace the rows before its end stay as they are while the run goes on. */
+interface ToDraw {
+  drawn: Drawn
+  ends?: number[]
+  extremes?: Extremes
+}
+
+/** What there is to draw in a window: raw samples while few, else the extremes of each pixel. */
+function drawnOf(
+  traces: Trace[],
+  from: number,
+  to: number,
+  width: number,
+  before: Extremes | undefined,
+): ToDraw {
+  const found = traces.map(({ read }) => read() ?? { time: new Float64Array(0), values: new Float64Array(0) })
+  const parts = found.map((one) => within(one, from, to))
+  if (parts.some(({ time }) => time.length > DENSE * width)) {
+    const known = extremes(found, from, to, width, before)
+    return { drawn: known.drawn, ends: known.ends, extremes: known }
+  }
+  const [first, ...others] = parts
+  if (!first) return { drawn: [new Float64Array(0)] }
+  if (
+    others.every(
+      ({ time }) =>
+        time.buffer === first.time.buffer &&
+        time.length === first.time.length &&
+        time.byteOffset === first.time.byteOffset,
+    )
+  )
+    return {
+      drawn: [first.time, ...parts.map(({ values }) => values)],
+      ends: parts.map(({ time }) => time.length),
+    }
+  return {
+    drawn: uPlot.join(
+      parts.map(({ time, values }) => [time, values] as uPlot.AlignedData),
+    ) as unknown as Drawn,
+  }
+}
+
+function scaled(drawn: Drawn, factor: number): Drawn {
+  if (factor === 1) return drawn
+  const [time, ...columns] = drawn
+  return [
+    time,
+    ...columns.map((column) =>
+      column instanceof Float64Array
+        ? column.map((v) => v * factor)
+        : column.map((v) => (typeof v === 'number' ? v * factor : v)),
+    ),
+  ]
+}
+
+/** Least and greatest value that is seen, with air around them. */
+function rangeOf([time, ...columns]: Drawn, factor: number, from: number, to: number): [number, number] {
+  let low = Infinity
+  let high = -Infinity
+  for (const column of columns)
+    for (let k = 0; k < time.length; k++) {
+      const value = column[k]
+      if (typeof value !== 'number' || !(time[k]! >= from && time[k]! <= to)) continue
+      if (value < low) low = value
+      if (value > high) high = value
+    }
+  return aired(low * factor, high * factor)
+}
+
+/** A range that has become too small, with room to where it grows: each change of it draws all anew. */
+function withRoom([low, high]: [number, number], [before, after]: [number, number]): [number, number] {
+  const room = ROOM * (Math.max(high, after) - Math.min(low, before))
+  return [low < before ? low - room : before, high > after ? high + room : after]
+}

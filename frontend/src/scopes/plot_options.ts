@@ -1,0 +1,85 @@
+import type uPlot from 'uplot'
+import type { Trace } from '../model/trace'
+import { CLICK_PX, gripOf } from './plot_gestures'
+import { colour, drawBand, drawLines } from './plot_marks'
+import { digits } from './quantity'
+import { useWindow, zoomTo } from './window'
+
+const FONT = '11px "Inter Variable", system-ui, sans-serif'
+/** Width and height of a plot whose panel has none yet. */
+export const LEAST_PX = 60
+
+/** How uPlot draws the traces; `unit` says what stands beside the vertical axis, `band` is a band about zero. */
+export function plotOptions(
+  element: HTMLElement,
+  shown: Trace[],
+  unit: () => string,
+  band: number | undefined,
+): uPlot.Options {
+  const axis = {
+    stroke: colour('muted'),
+    grid: { stroke: colour('grid'), width: 1 },
+    ticks: { stroke: colour('grid'), width: 1 },
+    font: FONT,
+    labelFont: FONT,
+    labelSize: 16,
+    labelGap: 0,
+  }
+  return {
+    width: Math.max(element.clientWidth, LEAST_PX),
+    height: Math.max(element.clientHeight, LEAST_PX),
+    legend: { show: false },
+    cursor: {
+      points: { show: false },
+      drag: { x: true, y: false, setScale: false },
+      bind: {
+        dblclick: () => () => (useWindow.setState({ range: null }), null),
+        mousedown: (u, _, handler) => (event) =>
+          gripOf(u, event) !== null || event.button || event.shiftKey ? null : handler(event),
+      },
+    },
+    scales: { x: { time: false, auto: false }, y: { auto: false } },
+    axes: [
+      {
+        ...axis,
+        size: 32,
+        label: 'time, s',
+        values: (_, splits) => splits.map((value) => tick(value, splits)),
+      },
+      {
+        ...axis,
+        size: 54,
+        label: unit,
+        values: (_, splits) => splits.map((value) => tick(value, splits)),
+      },
+    ],
+    series: [
+      {},
+      ...shown.map(({ label, tone, dash }) => ({
+        label,
+        stroke: colour(tone),
+        width: 1.5,
+        dash,
+        spanGaps: true,
+        points: { show: false },
+      })),
+    ],
+    hooks: {
+      drawClear: [(u) => band !== undefined && drawBand(u, band)],
+      draw: [(u) => drawLines(u)],
+      setSelect: [
+        (u) => {
+          if (u.select.width < CLICK_PX) return
+          zoomTo(u.posToVal(u.select.left, 'x'), u.posToVal(u.select.left + u.select.width, 'x'))
+          u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false)
+        },
+      ],
+    },
+  }
+}
+
+function tick(value: number, splits: number[]): string {
+  const step = Math.abs((splits[1] ?? 1) - (splits[0] ?? 0))
+  if (Math.abs(value) >= 1e6 || step < 1e-6) return digits(value, 3)
+  return value.toFixed((String(Number(step.toPrecision(3))).split('.')[1] ?? '').length).replace('-', '−')
+}
