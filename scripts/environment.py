@@ -20,6 +20,8 @@ BINARIES = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BINARIES / ("python.exe" if os.name == "nt" else "python")
 STAMP = VENV / "armblocks-installed.json"
 OLDEST_PYTHON = (3, 11)
+ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+"""pip makes no bytecode here; with that of the first import a process starts three times as fast."""
 
 
 def say(text: str) -> None:
@@ -29,7 +31,8 @@ def say(text: str) -> None:
 
 def run(*command: str | Path, cwd: Path = ROOT) -> int:
     """Run a command without standard input; its output goes straight through. Returns the exit code."""
-    return subprocess.run([str(part) for part in command], cwd=cwd, stdin=subprocess.DEVNULL).returncode
+    done = subprocess.run([str(part) for part in command], cwd=cwd, env=ENVIRONMENT, stdin=subprocess.DEVNULL)
+    return done.returncode
 
 
 def prepare(*extras: str) -> None:

@@ -11,7 +11,6 @@ later one is kept until its turn.
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Event
 
-from environment import BINARIES, PYTHON, ROOT, prepare, prepare_browser, say
+from environment import BINARIES, ENVIRONMENT, PYTHON, ROOT, prepare, prepare_browser, say
 
 SOURCES = ("src", "tests", "scripts", "docs", "benchmarks", "hatch_build.py", "frontend")
 WEB_TOOL = (PYTHON, "frontend/node.py", "exec", "--offline", "--")
@@ -48,8 +47,6 @@ STAGES = (
 """Stages follow one another. In a stage, the steps of a row run one after the other, beside the other rows.
 The tests have the machine for themselves: journeys in a browser need it."""
 GLANCE_SECONDS = 0.1
-ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-"""Many tests start armblocks as a process: with kept bytecode it starts three times as fast."""
 
 
 class Step:
