@@ -45,7 +45,6 @@ from armblocks.drawing.diagram_drawing import (
     wire_nets,
 )
 from armblocks.drawing.diagram_layout import boxes, sized_box, standing_box
-from armblocks.drawing.face_symbols import SIGNS
 from armblocks.drawing.wire_routing import Net, Obstacle, RoutedNet, WireEnd, bent, route
 from armblocks.face.block_examples import example_block
 from armblocks.pictures.picture import Curve, Picture, text_marks
@@ -222,10 +221,6 @@ def test_a_face_is_read_whole(kind: type[Block]) -> None:
             places.append((left + 0.5, left + wide - 0.5, mark.y - 0.6 * mark.size, mark.y))
         for (a, b, c, d), (e, f, g, h) in itertools.combinations(places, 2):
             assert b <= e or f <= a or d <= g or h <= c, [mark.text for mark in texts]
-
-
-def test_signs_stand_for_blocks_that_exist() -> None:
-    assert set(SIGNS) <= set(BLOCKS)
 
 
 def test_a_mask_shows_its_name() -> None:

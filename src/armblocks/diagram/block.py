@@ -15,10 +15,13 @@ from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formu
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View, name_before
 from armblocks.diagram.shape_rules import broadcast
+from armblocks.diagram.signs import FaceSign, Title, value_text
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 from armblocks.errors import UnknownNameError, check_arguments
 
+_LONGEST_FORMULA = 16
+"""Characters of a formula that a face shows in the place of its value."""
 Shapes = Mapping[str, Shape]
 """Shapes by port name."""
 Signals = Mapping[str, SX]
@@ -95,6 +98,9 @@ class Block(ABC):
         check_arguments(cls, values, named)
         return super().__new__(cls)
 
+    sign: ClassVar[FaceSign | None] = None
+    """What stands on the block's face, where no parameter matters for it; left out, its title."""
+
     def __post_init__(self) -> None:
         formulas, open_ones = dict(self.formulas), False
         for rule in self.parameters():
@@ -134,6 +140,15 @@ class Block(ABC):
         """The parameters that the equations are made with; others change without anything being traced."""
         inputs, behind = self.inputs_of_the_run(), self.parameters_behind_inputs()
         return tuple(rule for rule in self.parameters() if rule not in inputs and rule.name not in behind)
+
+    def face_sign(self) -> FaceSign:
+        """What stands on the block's face."""
+        return self.sign or Title(self.title)
+
+    def stated_text(self, name: str) -> str:
+        """What a face shows for a parameter: its formula where that is short, else its value."""
+        text = dict(self.formulas).get(name, "")
+        return text if 0 < len(text) <= _LONGEST_FORMULA else value_text(self.parameter_value(name))
 
     @classmethod
     def type_name(cls) -> str:

@@ -1,6 +1,6 @@
 """What a block shows on its face: outline, size, and the drawing that says what it does.
 
-Most blocks show a sign of :mod:`.face_symbols`; here are those whose outline or drawing is their own.
+Most blocks show the sign that they declare; here are those whose outline or drawing is their own.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 
 from armblocks import blocks as kinds
 from armblocks.diagram import Block
+from armblocks.diagram.signs import value_text
 from armblocks.drawing.face_marks import Room, least_room, sign_marks, words
-from armblocks.drawing.face_symbols import sign_of, stated_text, value_text
 from armblocks.drawing.sink_faces import Trend, display, scope, xy_graph
 from armblocks.drawing.structure_faces import (
     BAR,
@@ -79,7 +79,7 @@ def face_size(block: Block) -> tuple[FaceShape, float, float]:
         case _ if is_subsystem(block):
             return FaceShape.CARD, 104.0, 64.0
         case _:
-            width, height = least_room(sign_of(block))
+            width, height = least_room(block.face_sign())
             return FaceShape.CARD, max(68.0, width), max(50.0, height)
 
 
@@ -92,7 +92,7 @@ def face_width(block: Block) -> float:
         return mask_width(block)
     if _draws_itself(block):
         return 0.62 * width
-    return least_room(sign_of(block))[0]
+    return least_room(block.face_sign())[0]
 
 
 def _draws_itself(block: Block) -> bool:
@@ -152,7 +152,7 @@ def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False
             caption = "" if isinstance(block, kinds.RobotPlot) else block.title
             return _robot(room, block.robot, caption)
         case _:
-            return sign_marks(sign_of(block), room)
+            return sign_marks(block.face_sign(), room)
 
 
 def face_at_ports(
@@ -224,7 +224,7 @@ def _powered(gain: object) -> str:
 def _gain(block: kinds.Gain | kinds.SliderGain, room: Room, *, flipped: bool) -> list[Mark]:
     """The formula or the value, as much of both as the triangle holds; else the letter of every gain."""
     most = 0.56 * room.width
-    wishes = (stated_text(block, "gain"), value_text(block.gain), _powered(block.gain))
+    wishes = (block.stated_text("gain"), value_text(block.gain), _powered(block.gain))
     text = next((wish for wish in wishes if wish and text_width(wish, 9.5) <= most), "K")
     size = 12.0 if text_width(text, 12.0) < 0.52 * room.width else 9.5
     share = 0.64 if flipped else 0.36

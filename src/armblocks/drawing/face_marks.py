@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from armblocks.drawing.face_symbols import Fraction, Graph, Lines, Sign, Title, Words
+from armblocks.diagram.signs import FaceSign, Fraction, Graph, Lines, Title, Words
 from armblocks.pictures.picture import Mark, Polyline, Text
 from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import shorten, text_width
@@ -38,7 +38,7 @@ class Room:
         return Room(self.x + dx, self.y + dy, max(self.width - 2 * dx, 1.0), max(self.height - 2 * dy, 1.0))
 
 
-def least_room(sign: Sign) -> tuple[float, float]:
+def least_room(sign: FaceSign) -> tuple[float, float]:
     """Width and height (px) that a sign needs to be read whole."""
     match sign:
         case Words():
@@ -57,7 +57,7 @@ def least_room(sign: Sign) -> tuple[float, float]:
             return 42.0, 40.0
 
 
-def sign_marks(sign: Sign, room: Room) -> list[Mark]:
+def sign_marks(sign: FaceSign, room: Room) -> list[Mark]:
     """A sign in the middle of its room."""
     match sign:
         case Words():

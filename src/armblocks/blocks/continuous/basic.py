@@ -22,6 +22,7 @@ from armblocks.diagram import (
     rate_unit,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Fraction
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,7 @@ class Integrator(Block):
     """The integral over time: y' = u, y(0) = initial."""
 
     title: ClassVar[str] = "Integrator"
+    sign: ClassVar[FaceSign] = Fraction("1", "s")
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of a sine that starts at 0: 1 - cos t.",
@@ -70,6 +72,7 @@ class Derivative(Block):
     """
 
     title: ClassVar[str] = "Derivative"
+    sign: ClassVar[FaceSign] = Fraction("du", "dt")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The slope of a sine: a cosine, exactly, from the first instant on.",
     )

@@ -22,6 +22,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, graph
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +38,7 @@ class FirstOrderHold(Block):
     """
 
     title: ClassVar[str] = "First Order Hold"
+    sign: ClassVar[FaceSign] = graph((0, 0.1), (0.33, 0.5), (0.33, 0.35), (0.67, 0.95), (0.67, 0.8), (1, 1))
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine, sampled every second, as straight lines from sample to sample, one second late.",

@@ -19,6 +19,11 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Fraction, value_text
+
+
+def _lag(time: object) -> str:
+    return f"{'' if value_text(time) == '1' else value_text(time)}s + 1"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +41,9 @@ class FirstOrderLag(Block):
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
     time_constant: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="T", unit="s")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(value_text(self.gain), _lag(self.time_constant))
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the input"),)
@@ -61,6 +69,7 @@ class SecondOrderLag(Block):
     """A lag of second order (PT2): y = gain w^2 / (s^2 + 2 damping w s + w^2) u, at rest at the start."""
 
     title: ClassVar[str] = "Second-Order Lag"
+    sign: ClassVar[FaceSign] = Fraction("ω²", "s² + 2ζωs + ω²")
     spreads: ClassVar[tuple[str, ...]] = ("gain", "natural_frequency", "damping")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response with a damping of 0.3: it overshoots and swings in.",
@@ -116,6 +125,9 @@ class LeadLag(Block):
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
     lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="T1", unit="s")
     lag_time: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, above=0.0, doc="T2", unit="s")
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(_lag(self.lead_time), _lag(self.lag_time))
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the input"),)

@@ -33,6 +33,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Fraction
 from armblocks.equations import Shape
 
 _SATURATED = Port("saturated", "1 at the upper limit, -1 at the lower, else 0")
@@ -50,6 +51,7 @@ class ResettableIntegrator(Block):
     """
 
     title: ClassVar[str] = "Integrator with Reset"
+    sign: ClassVar[FaceSign] = Fraction("1", "s")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The integral of 1, set back to 0 by every rising edge.",
         inputs={"u": made("Constant"), "reset": made("PulseGenerator", period=3.0, delay=1.0)},
@@ -190,6 +192,7 @@ class IntegratorLimited(Block):
     """The integral over time, held between two limits: y' = u, but 0 at a limit while u drives beyond it."""
 
     title: ClassVar[str] = "Integrator Limited"
+    sign: ClassVar[FaceSign] = Fraction("1", "s", limited=True)
     spreads: ClassVar[tuple[str, ...]] = ("initial", "lower", "upper")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(

@@ -41,6 +41,7 @@ from armblocks.diagram import (
     State,
     WorkedExample,
 )
+from armblocks.diagram.signs import FaceSign, Lines, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +132,7 @@ class PID(ContinuousPidBlock):
     """
 
     title: ClassVar[str] = "PID Controller"
+    sign: ClassVar[FaceSign] = Words("PID(s)")
     example: ClassVar[WorkedExample] = pid_example("one", I=1.5, D=0.4)
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -149,6 +151,7 @@ class PID2DOF(ContinuousPidBlock):
     """
 
     title: ClassVar[str] = "PID Controller (2DOF)"
+    sign: ClassVar[FaceSign] = Lines(("PID(s)", "2DOF"))
     example: ClassVar[WorkedExample] = pid_example("two", P=4.0, I=3.0, D=1.0, b=0.4, c=0.0)
 
     b: ArrayLike = gain_parameter(1.0, "weight of the reference in the proportional action")

@@ -27,6 +27,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Fraction
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -36,6 +37,7 @@ class SecondOrderIntegrator(Block):
     """Position and speed of an acceleration: x'' = u, dx = x'."""
 
     title: ClassVar[str] = "Integrator, Second-Order"
+    sign: ClassVar[FaceSign] = Fraction("1", "s²")
     output_rates: ClassVar[Mapping[str, str]] = {"x": "dx"}
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A mass on a spring: the acceleration is -4 x, so it swings at 2 rad/s.",
@@ -89,6 +91,7 @@ class SecondOrderIntegratorLimited(Block):
     """
 
     title: ClassVar[str] = "Integrator, Second-Order Limited"
+    sign: ClassVar[FaceSign] = Fraction("1", "s²", limited=True)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A ball that keeps 0.7 of its speed at each bounce, and rests in the end.",
         parameters={"initial": 1.0, "lower": 0.0, "reinitialize": True},

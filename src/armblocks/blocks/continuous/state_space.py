@@ -17,6 +17,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Lines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,7 @@ class StateSpace(LinearBlock):
     """
 
     title: ClassVar[str] = "State-Space"
+    sign: ClassVar[FaceSign] = Lines(("x' = A x + B u", "y = C x + D u"))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A mass on a spring with a damper, pushed from 1 s on: it swings in.",
         parameters={

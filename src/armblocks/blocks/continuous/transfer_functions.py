@@ -15,6 +15,7 @@ from armblocks.diagram import (
     WorkedExample,
     made,
 )
+from armblocks.diagram.signs import FaceSign, Fraction, polynomial
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +32,9 @@ class TransferFunction(RationalBlock):
         parameters={"numerator": (4.0,), "denominator": (1.0, 0.8, 4.0)},
         inputs={"u": made("Step")},
     )
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(polynomial("b", self.numerator), polynomial("a", self.denominator))
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", (self.degree,), "the canonical state"),)

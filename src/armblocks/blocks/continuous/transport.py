@@ -28,6 +28,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +40,7 @@ class TransportDelay(Block):
     """
 
     title: ClassVar[str] = "Transport Delay"
+    sign: ClassVar[FaceSign] = Words("u(t − T)")
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -85,6 +87,7 @@ class VariableTimeDelay(Block):
     """
 
     title: ClassVar[str] = "Variable Time Delay"
+    sign: ClassVar[FaceSign] = Words("u(t − d)")
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine whose delay grows from 0.1 s to 2 s: it comes out slower.",
@@ -138,6 +141,7 @@ class VariableTransportDelay(Block):
     """
 
     title: ClassVar[str] = "Variable Transport Delay"
+    sign: ClassVar[FaceSign] = Words("u(t − τ)")
     rated_inputs: ClassVar[tuple[str, ...]] = ("u", "T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The flow in a pipe gets slower, its transit time grows from 1 s: a sine comes out late.",

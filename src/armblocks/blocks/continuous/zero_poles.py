@@ -32,6 +32,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import BANDS, FaceSign, ratio_of_roots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +49,9 @@ class ZeroPole(SectionsByRoots):
         parameters={"zeros": (-2.0,), "poles": ((-0.5, 0.0), (-1.0, 3.0), (-1.0, -3.0)), "gain": 2.5},
         inputs={"u": made("Step")},
     )
+
+    def face_sign(self) -> FaceSign:
+        return ratio_of_roots(self.zeros, self.poles, self.gain, "s")
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", (shape_of(self.poles)[0],), "the states of the sections"),)
@@ -80,6 +84,9 @@ class AnalogFilter(Block):
     )
     ripple: float = parameter(1.0, above=0.0, tunable=False, doc="in the pass band (chebyshev1), dB")
     attenuation: float = parameter(40.0, above=0.0, tunable=False, doc="in the stop band (chebyshev2), dB")
+
+    def face_sign(self) -> FaceSign:
+        return BANDS[self.filter_type]
 
     def check(self) -> None:
         check_band(self, self.filter_type, self.edge, self.upper_edge)

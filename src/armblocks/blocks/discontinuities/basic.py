@@ -31,6 +31,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import DEAD_ZONE, SATURATION, FaceSign, graph, stairs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +40,7 @@ class Saturation(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Saturation"
+    sign: ClassVar[FaceSign] = SATURATION
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The crests of the sine are cut off at 1.5, its troughs at -0.5.",
         parameters={"lower": -0.5, "upper": 1.5},
@@ -90,6 +92,7 @@ class DeadZone(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Dead Zone"
+    sign: ClassVar[FaceSign] = DEAD_ZONE
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Between -0.5 and 0.5 nothing comes through, outside what exceeds the zone.",
     )
@@ -141,6 +144,7 @@ class Relay(Block):
     """
 
     title: ClassVar[str] = "Relay"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.7, 0), (0.7, 1), (1, 1), (0.3, 1), (0.3, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="It switches on as the sine rises through 0.5 and off as it falls through -0.5, not before.",
     )
@@ -193,6 +197,7 @@ class Quantizer(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Quantizer"
+    sign: ClassVar[FaceSign] = stairs((0.0, 0.33, 0.67, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine in steps of 0.5.",
         inputs={"u": made("SineWave", amplitude=2.0)},

@@ -24,6 +24,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, graph
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,7 @@ class CoulombFriction(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Coulomb and Viscous Friction"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 0.3), (0.5, 0.7), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Friction of a speed that swings: it jumps where the speed changes its sign.",
         parameters={"gain": 0.5},
@@ -81,6 +83,7 @@ class Backlash(Block):
     """
 
     title: ClassVar[str] = "Backlash"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.55, 1), (1, 1), (0.45, 0), (0, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "A gear with play 1: the output follows with half of it missing, and stands still while "
@@ -158,6 +161,7 @@ class StickSlipFriction(Block):
     """
 
     title: ClassVar[str] = "Stick-Slip Friction"
+    sign: ClassVar[FaceSign] = graph((0, 0.12), (0.4, 0.22), (0.5, 0), (0.5, 1), (0.6, 0.78), (1, 0.88))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The force grows evenly. The mass rests, and friction holds the force, until it breaks "

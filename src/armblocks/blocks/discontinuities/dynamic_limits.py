@@ -24,6 +24,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import DEAD_ZONE, SATURATION, FaceSign, graph
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +53,7 @@ class SaturationDynamic(MovingLimits):
     """The input held between two signals: y = min(max(u, lower), upper)."""
 
     title: ClassVar[str] = "Saturation Dynamic"
+    sign: ClassVar[FaceSign] = SATURATION
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine between -0.2 and a limit that rises.",
         inputs={
@@ -73,6 +75,7 @@ class DeadZoneDynamic(MovingLimits):
     """Nothing between two signals, what exceeds them outside: y = u - upper, 0 or u - lower."""
 
     title: ClassVar[str] = "Dead Zone Dynamic"
+    sign: ClassVar[FaceSign] = DEAD_ZONE
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="What of a sine exceeds a zone that grows upwards.",
         inputs={
@@ -94,6 +97,7 @@ class WrapToZero(Block):
     """Zero where the input exceeds a threshold: y = u, but 0 where u > threshold."""
 
     title: ClassVar[str] = "Wrap To Zero"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.6, 1), (0.6, 0), (1, 0))
     spreads: ClassVar[tuple[str, ...]] = ("threshold",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A ramp that falls to 0 once it exceeds 5.",

@@ -30,6 +30,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import RATE_LIMIT, FaceSign
 
 APART = 1e-3
 """A limiter that is switched on, in an enabled subsystem, follows an input that is nearer to its last output
@@ -145,6 +146,7 @@ class RateLimiterContinuous(RateLimiting):
     """
 
     title: ClassVar[str] = "Rate Limiter (continuous)"
+    sign: ClassVar[FaceSign] = RATE_LIMIT
     spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine of which the rise is limited to 0.5 a second and the fall to 0.8.",
@@ -205,6 +207,7 @@ class RateLimiter(Block):
     """The input, no faster than allowed: y(k) is u(k) held to y(k-1) + falling T … y(k-1) + rising T."""
 
     title: ClassVar[str] = "Rate Limiter"
+    sign: ClassVar[FaceSign] = RATE_LIMIT
     spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Pulses whose edges may not be steeper than 1 a second upwards and 2 downwards.",

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from casadi import SX, fmax, fmin, if_else, logic_or
 from numpy.typing import ArrayLike
 
@@ -32,10 +33,16 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Fraction, Words, times
 
 INPUT = Port("u", "what is sampled")
 
-_METHODS = ("forward_euler", "backward_euler", "trapezoidal")
+_METHODS = {
+    "forward_euler": ("T", "z − 1"),
+    "backward_euler": ("T z", "z − 1"),
+    "trapezoidal": ("T (z + 1)", "2 (z − 1)"),
+}
+"""Methods of integration, each with its transfer function: what stands above and below the line."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +62,7 @@ class DiscreteIntegrator(Block):
     )
     sampled: ClassVar[bool] = True
 
-    method: str = parameter("forward_euler", choices=_METHODS, doc="the rule of integration")
+    method: str = parameter("forward_euler", choices=tuple(_METHODS), doc="the rule of integration")
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
     external_reset: str = external_reset_parameter("none")
     initial_condition_source: str = initial_source_parameter()
@@ -67,6 +74,13 @@ class DiscreteIntegrator(Block):
     state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
     saturation_port: bool = parameter(False, doc="whether an output says at which limit the sum is")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(
+            times(self.gain, _METHODS[self.method][0]),
+            _METHODS[self.method][1],
+            bool(np.any(np.isfinite(self.lower)) or np.any(np.isfinite(self.upper))),
+        )
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
@@ -137,6 +151,7 @@ class Difference(Block):
     """What the input gained since the tick before: y(k) = u(k) - u(k-1)."""
 
     title: ClassVar[str] = "Difference"
+    sign: ClassVar[FaceSign] = Words("1 − z⁻¹")
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="What the sine has gained since the last tick.",
@@ -179,6 +194,9 @@ class DiscreteDerivative(Block):
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(times(self.gain, "(z − 1)"), "T z")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)

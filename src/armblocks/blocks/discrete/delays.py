@@ -34,6 +34,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words, raised, stairs
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -84,6 +85,7 @@ class UnitDelay(OneTickDelay):
     """The input one tick before: y(k) = u(k-1), y(0) = initial."""
 
     title: ClassVar[str] = "Unit Delay"
+    sign: ClassVar[FaceSign] = Words("z⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine as it was one tick ago, held until the next.",
     )
@@ -119,6 +121,9 @@ class Delay(Block):
     length: int = parameter(2, minimum=1, doc="by how many ticks")
     initial: float = parameter(0.0, doc="every element of the first outputs")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(f"z{raised(-self.length)}")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (INPUT,)
@@ -296,6 +301,7 @@ class ZeroOrderHold(Block):
     """The input as it was at the last tick: y(t) = u(k T) until the next one."""
 
     title: ClassVar[str] = "Zero-Order Hold"
+    sign: ClassVar[FaceSign] = stairs((0.2, 0.7, 1.0, 0.6))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine as it was at the last tick.",
     )

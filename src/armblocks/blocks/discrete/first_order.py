@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from casadi import SX
 from numpy.typing import ArrayLike
 
@@ -20,6 +21,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Fraction, minus, value_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +40,11 @@ class TransferFunctionFirstOrder(Block):
     pole: ArrayLike = parameter(0.95, kind=ParameterKind.ARRAY, doc="the pole in the z plane")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(
+            f"{value_text(1.0 - np.asarray(self.pole, dtype=np.float64))} z", f"z {minus(self.pole)}"
+        )
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the input"),)
@@ -83,6 +90,9 @@ class TransferFunctionLeadOrLag(Block):
     initial_input: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
 
+    def face_sign(self) -> FaceSign:
+        return Fraction(f"z {minus(self.zero)}", f"z {minus(self.pole)}")
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the input"),)
 
@@ -120,6 +130,9 @@ class TransferFunctionRealZero(Block):
     zero: ArrayLike = parameter(0.75, kind=ParameterKind.ARRAY, doc="the zero in the z plane")
     initial_input: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(f"z {minus(self.zero)}", "z")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the input"),)

@@ -39,6 +39,7 @@ from armblocks.diagram import (
     WorkedExample,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Lines, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +118,7 @@ class DiscretePID(SampledPidBlock):
     """
 
     title: ClassVar[str] = "Discrete PID Controller"
+    sign: ClassVar[FaceSign] = Words("PID(z)")
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = pid_example("one", I=1.5, sample_time=0.1)
 
@@ -136,6 +138,7 @@ class DiscretePID2DOF(SampledPidBlock):
     """
 
     title: ClassVar[str] = "Discrete PID Controller (2DOF)"
+    sign: ClassVar[FaceSign] = Lines(("PID(z)", "2DOF"))
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = pid_example("two", P=4.0, I=3.0, D=1.0, N=8.0, b=0.4, sample_time=0.1)
 

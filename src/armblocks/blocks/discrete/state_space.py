@@ -17,6 +17,7 @@ from armblocks.diagram import (
     made,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Lines
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +29,7 @@ class DiscreteStateSpace(LinearBlock):
     """
 
     title: ClassVar[str] = "Discrete State-Space"
+    sign: ClassVar[FaceSign] = Lines(("x⁺ = A x + B u", "y = C x + D u"))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The step response of x(k+1) = 0.5 x + u: it goes to 2, half of the way with every tick.",
         inputs={"u": made("Step")},

@@ -25,6 +25,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Fraction, Words, polynomial
 from armblocks.errors import InputError
 
 
@@ -45,6 +46,9 @@ class DiscreteTransferFunction(RationalBlock):
 
     denominator: ArrayLike = parameter((1.0, 0.5), dimensions=(1,), doc="a0 … an, highest power first")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(polynomial("b", self.numerator, "z"), polynomial("a", self.denominator, "z"))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", (self.degree,), "u / denominator at the last ticks"),)
@@ -68,6 +72,12 @@ class DiscreteFilter(RationalBlock):
     numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, rising powers of 1/z")
     denominator: ArrayLike = parameter((1.0, 0.5), dimensions=(1,), doc="a0 … an, rising powers of 1/z")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Fraction(
+            polynomial("b", self.numerator, "z", delays=True),
+            polynomial("a", self.denominator, "z", delays=True),
+        )
 
     def check(self) -> None:
         a = np.asarray(self.denominator)
@@ -115,6 +125,9 @@ class DiscreteFir(Block):
 
     coefficients: ArrayLike = parameter((0.5, 0.5), dimensions=(1,), doc="b0 … bm")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(polynomial("b", self.coefficients, "z", delays=True))
 
     def check(self) -> None:
         if shape_of(self.coefficients)[0] < 2:

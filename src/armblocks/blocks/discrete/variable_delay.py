@@ -19,6 +19,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 
 
@@ -30,6 +31,7 @@ class VariableIntegerDelay(Block):
     """
 
     title: ClassVar[str] = "Variable Integer Delay"
+    sign: ClassVar[FaceSign] = Words("z⁻ᵈ")
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine whose delay grows by a tick of 0.1 s each second.",

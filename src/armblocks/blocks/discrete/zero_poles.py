@@ -36,6 +36,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import BANDS, FaceSign, ratio_of_roots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +62,9 @@ class DiscreteZeroPole(SectionsByRoots):
 
     poles: ArrayLike = parameter((0.0, 0.5), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return ratio_of_roots(self.zeros, self.poles, self.gain, "z")
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("x", (shape_of(self.poles)[0],), "the states of the sections"),)
@@ -100,6 +104,9 @@ class DigitalFilter(Block):
     ripple: float = parameter(1.0, above=0.0, tunable=False, doc="in the pass band (chebyshev1), dB")
     attenuation: float = parameter(40.0, above=0.0, tunable=False, doc="in the stop band (chebyshev2), dB")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return BANDS[self.filter_type]
 
     def check(self) -> None:
         check_band(self, self.filter_type, self.edge, self.upper_edge)

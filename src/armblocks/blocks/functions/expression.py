@@ -22,6 +22,7 @@ from armblocks.diagram import (
     shape_of,
 )
 from armblocks.diagram.expression_language import CONSTANTS, FUNCTIONS, Formula
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError, UnknownNameError
 
 
@@ -50,6 +51,9 @@ class Expression(Block):
     values: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="their values, in order"
     )
+
+    def face_sign(self) -> FaceSign:
+        return Words(self.formula, italic=True)
 
     def check(self) -> None:
         Formula(self.formula, "Expression.formula")

@@ -26,6 +26,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Lines
 from armblocks.equations import Shape, flatten, unflatten
 from armblocks.errors import ArmblocksError, InputError
 
@@ -61,6 +62,9 @@ class PythonFunction(Block):
         doc="the function, such as def law(u, t)",
     )
     results: str = parameter("y", doc="names of the outputs, such as tau, power")
+
+    def face_sign(self) -> FaceSign:
+        return Lines(("Python", f"{self.function.name}()"))
 
     def check(self) -> None:
         _check_results(self, _names(self.results))

@@ -32,11 +32,13 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words, graph, value_text
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
 _MOST_CONDITIONS = 12
-_RELATIONS = ("==", "~=", "<", "<=", ">", ">=")
+_RELATIONS = {"==": "=", "~=": "≠", "<": "<", "<=": "≤", ">": ">", ">=": "≥"}
+"""Relations in MATLAB's spelling, each with its sign."""
 _GATES: Mapping[str, tuple[Callable[[SX, SX], SX], bool]] = {
     "AND": (logic_and, False),
     "OR": (logic_or, False),
@@ -57,8 +59,11 @@ class RelationalOperator(Block):
         inputs={"u1": made("SineWave"), "u2": made("Constant", value=0.5)},
     )
 
-    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
     zero_crossing: bool = zero_crossing_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(_RELATIONS[self.relation])
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u1", "the left side"), Port("u2", "the right side"))
@@ -95,6 +100,9 @@ class LogicalOperator(Block):
     operator: str = parameter("AND", choices=(*_GATES, "NOT"), doc="the gate")
     inputs: int = parameter(2, minimum=1, doc="how many inputs; NOT always has one")
 
+    def face_sign(self) -> FaceSign:
+        return Words(self.operator)
+
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", 1 if self.operator == "NOT" else self.inputs, "condition")
 
@@ -121,9 +129,12 @@ class CompareToConstant(Block):
         parameters={"relation": ">", "constant": 0.5},
     )
 
-    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
     zero_crossing: bool = zero_crossing_parameter()
     constant: ArrayLike = parameter(3.0, kind=ParameterKind.ARRAY, doc="the right side")
+
+    def face_sign(self) -> FaceSign:
+        return Words(f"{_RELATIONS[self.relation]} {value_text(self.constant)}")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the left side"),)
@@ -150,8 +161,11 @@ class CompareToZero(Block):
         shows="1 while the sine is not above 0.",
     )
 
-    relation: str = parameter("<=", choices=_RELATIONS, doc="what is asked")
+    relation: str = parameter("<=", choices=tuple(_RELATIONS), doc="what is asked")
     zero_crossing: bool = zero_crossing_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(f"{_RELATIONS[self.relation]} 0")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the left side"),)
@@ -177,6 +191,7 @@ class IntervalTest(Block):
     """
 
     title: ClassVar[str] = "Interval Test"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is between -0.5 and 0.5.",
     )
@@ -214,6 +229,7 @@ class IntervalTestDynamic(Block):
     """Whether a signal lies in an interval that moves: y = 1 where lower <= u <= upper, else 0."""
 
     title: ClassVar[str] = "Interval Test Dynamic"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is between two limits, of which the upper one rises.",
         inputs={

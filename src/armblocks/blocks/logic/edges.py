@@ -23,7 +23,17 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Lines, Words
 
+_EDGE_SIGNS = {
+    "change": "≠",
+    "increase": "↑",
+    "decrease": "↓",
+    "rise positive": "↑ > 0",
+    "rise nonnegative": "↑ ≥ 0",
+    "fall negative": "↓ < 0",
+    "fall nonpositive": "↓ ≤ 0",
+}
 _EDGES: Mapping[str, Callable[[SX, SX], SX]] = {
     "change": lambda u, before: u != before,
     "increase": lambda u, before: u > before,
@@ -57,6 +67,9 @@ class EdgeDetection(Block):
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
 
+    def face_sign(self) -> FaceSign:
+        return Words(_EDGE_SIGNS[self.edge])
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "what is watched"),)
 
@@ -81,6 +94,7 @@ class SRFlipFlop(Block):
     """Set and reset: Q(k) = 1 if S, 0 if R, as before if neither; with both, Q and its opposite are 0."""
 
     title: ClassVar[str] = "S-R Flip-Flop"
+    sign: ClassVar[FaceSign] = Lines(("S-R", "Flip-Flop"))
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Set by one pulse, reset by another.",
@@ -130,6 +144,7 @@ class DFlipFlop(Block):
     """
 
     title: ClassVar[str] = "D Flip-Flop"
+    sign: ClassVar[FaceSign] = Lines(("D", "Flip-Flop"))
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine, caught at each rising edge of the pulses.",
@@ -179,6 +194,7 @@ class JKFlipFlop(Block):
     """
 
     title: ClassVar[str] = "J-K Flip-Flop"
+    sign: ClassVar[FaceSign] = Lines(("J-K", "Flip-Flop"))
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="With J = K = 1 it halves the frequency of the pulses.",

@@ -28,6 +28,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import TABLE, FaceSign, Words
 from armblocks.errors import InputError
 
 
@@ -40,6 +41,7 @@ class LookupTable1D(BlockWithAxes):
     """
 
     title: ClassVar[str] = "1-D Lookup Table"
+    sign: ClassVar[FaceSign] = TABLE
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A curve through five points: straight between them, held beyond the ends.",
         parameters={"positions": (1.0, 3.0, 5.0, 6.0, 8.0), "table": (0.0, 2.0, 1.0, 1.5, 0.0)},
@@ -79,6 +81,7 @@ class LookupTable2D(BlockWithAxes):
     """A surface over given points: y = table(u1, u2), rows along u1 and columns along u2."""
 
     title: ClassVar[str] = "2-D Lookup Table"
+    sign: ClassVar[FaceSign] = Words("T(u₁, u₂)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The table is crossed along its first axis while the second swings.",
         parameters={
@@ -194,6 +197,7 @@ class LookupTableDynamic(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Lookup Table Dynamic"
+    sign: ClassVar[FaceSign] = TABLE
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A curve whose values grow while it is read.",
         inputs={

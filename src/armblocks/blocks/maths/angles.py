@@ -31,6 +31,7 @@ from armblocks.diagram import (
     broadcast,
     made,
 )
+from armblocks.diagram.signs import FaceSign, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +39,7 @@ class DegreesToRadians(Block):
     """An angle in degrees told in radians: y = u pi / 180."""
 
     title: ClassVar[str] = "Degrees to Radians"
+    sign: ClassVar[FaceSign] = Words("° → rad")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An angle from 0 to 360 degrees, in radians from 0 to 2 pi.",
         inputs={"u": made("Ramp", slope=36.0)},
@@ -59,6 +61,7 @@ class RadiansToDegrees(Block):
     """An angle in radians told in degrees: y = u 180 / pi."""
 
     title: ClassVar[str] = "Radians to Degrees"
+    sign: ClassVar[FaceSign] = Words("rad → °")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An angle from 0 to 10 radians, in degrees.",
         inputs={"u": made("Ramp")},
@@ -80,6 +83,7 @@ class CartesianToPolar(Block):
     """Magnitude and angle of the point (x, y): r = sqrt(x^2 + y^2), angle = atan2(y, x)."""
 
     title: ClassVar[str] = "Cartesian to Polar"
+    sign: ClassVar[FaceSign] = Words("xy→rθ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which "
@@ -109,6 +113,7 @@ class PolarToCartesian(Block):
     """The point at a magnitude and an angle: x = r cos(angle), y = r sin(angle)."""
 
     title: ClassVar[str] = "Polar to Cartesian"
+    sign: ClassVar[FaceSign] = Words("rθ→xy")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Distance and angle grow evenly: the point runs along a spiral of Archimedes.",
         inputs={

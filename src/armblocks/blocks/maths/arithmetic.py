@@ -29,6 +29,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Words, function_sign, graph, plus
 
 _ROOTS: Mapping[str, Callable[[SX], SX]] = {
     "sqrt": sqrt,
@@ -42,6 +43,7 @@ class Abs(Block):
     """The absolute value of every element: y = abs(u)."""
 
     title: ClassVar[str] = "Abs"
+    sign: ClassVar[FaceSign] = Words("|u|")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The lower half of the sine, turned up.",
     )
@@ -80,6 +82,9 @@ class Bias(Block):
 
     bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
 
+    def face_sign(self) -> FaceSign:
+        return Words(f"u {plus(self.bias)}")
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
 
@@ -98,6 +103,7 @@ class UnaryMinus(Block):
     """The negative of every element: y = -u."""
 
     title: ClassVar[str] = "Unary Minus"
+    sign: ClassVar[FaceSign] = Words("−u")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sine, upside down.",
     )
@@ -120,6 +126,7 @@ class Sign(Block):
     """The sign of every element: y = 1 where u > 0, -1 where u < 0, 0 where u = 0."""
 
     title: ClassVar[str] = "Sign"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 0), (0.5, 1), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="1 while the sine is positive, -1 while it is negative.",
     )
@@ -157,6 +164,9 @@ class Sqrt(Block):
 
     function: str = parameter("sqrt", choices=tuple(_ROOTS), doc="root, signed root or reciprocal root")
 
+    def face_sign(self) -> FaceSign:
+        return function_sign(self.function)
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the square"),)
 
@@ -172,6 +182,7 @@ class Hypot(Block):
     """The hypotenuse, element by element: y = sqrt(u^2 + v^2), without overflow on the way."""
 
     title: ClassVar[str] = "Hypot"
+    sign: ClassVar[FaceSign] = Words("√(u²+v²)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The longest side of a right triangle with one side of 3 and one that grows: it meets 5 at 4 s."
@@ -197,6 +208,7 @@ class Divide(Block):
     """One input by the other, element by element: y = dividend / divisor."""
 
     title: ClassVar[str] = "Divide"
+    sign: ClassVar[FaceSign] = Words("÷")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A sine divided by a divisor that rises from 1 to 3.",
         inputs={"dividend": made("SineWave"), "divisor": made("Ramp", slope=0.2, initial=1.0)},
@@ -220,6 +232,7 @@ class Polynomial(Block):
     """
 
     title: ClassVar[str] = "Polynomial"
+    sign: ClassVar[FaceSign] = Words("P(u)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The parabola u^2 - 1, over u.",
         parameters={"coefficients": (1.0, 0.0, -1.0)},

@@ -9,6 +9,7 @@ from math import pi
 from typing import ClassVar
 
 import casadi
+import numpy as np
 from casadi import SX, atan2, if_else, mtimes
 from numpy.typing import ArrayLike
 
@@ -27,6 +28,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words, function_sign, value_text
 from armblocks.errors import InputError
 from armblocks.rounded_functions import log
 
@@ -70,6 +72,9 @@ class MatrixGain(Block):
     )
 
     gain: ArrayLike = parameter(((1.0,),), kind=ParameterKind.ARRAY, dimensions=(2,), doc="the matrix (m, n)")
+
+    def face_sign(self) -> FaceSign:
+        return Words("K·u" if np.size(self.gain) > 4 else value_text(self.gain))
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the vector", shape=shape_of(self.gain)[1:]),)
@@ -163,6 +168,7 @@ class MatrixProduct(Block):
     """The matrix product of two inputs: y = A B, where A (m, n) and B (n, k) or (n,)."""
 
     title: ClassVar[str] = "Matrix Multiply"
+    sign: ClassVar[FaceSign] = Words("A·B")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A shear of the vector (1, sin t): the second element is added to the first.",
         inputs={
@@ -242,6 +248,9 @@ class MathFunction(Block):
 
     function: str = parameter("exp", choices=tuple(_FUNCTIONS), doc="the function f")
 
+    def face_sign(self) -> FaceSign:
+        return function_sign(self.function)
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the argument"),)
 
@@ -264,6 +273,9 @@ class Trigonometry(Block):
 
     function: str = parameter("sin", choices=tuple(_TRIGONOMETRY), doc="the function f")
 
+    def face_sign(self) -> FaceSign:
+        return function_sign(self.function)
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the argument"),)
 
@@ -279,6 +291,7 @@ class Atan2(Block):
     """The angle of the point (x, y) from the x axis, in all four quadrants: angle = atan2(y, x)."""
 
     title: ClassVar[str] = "Atan2"
+    sign: ClassVar[FaceSign] = Words("atan2")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The angle of a point that runs around a circle: it jumps from pi to -pi where it crosses "
@@ -305,6 +318,7 @@ class Power(Block):
     """Base to the power of the exponent, element by element: y = base ^ exponent."""
 
     title: ClassVar[str] = "Power"
+    sign: ClassVar[FaceSign] = Words("uᵛ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A base between 1 and 3 to a power that rises from -1 to 1: at 5 s, power 0, the output is 1.",
         inputs={"base": made("SineWave", bias=2.0), "exponent": made("Ramp", slope=0.2, initial=-1.0)},
@@ -332,6 +346,9 @@ class MinMax(Block):
     function: str = parameter("min", choices=("min", "max"), doc="which one")
     inputs: int = parameter(2, minimum=1, doc="how many inputs")
     zero_crossing: bool = zero_crossing_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(self.function, italic=True)
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", self.inputs, "candidate")

@@ -20,6 +20,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +34,7 @@ class AlgebraicConstraint(Block):
     """
 
     title: ClassVar[str] = "Algebraic Constraint"
+    sign: ClassVar[FaceSign] = Words("f(z) = 0")
     implicit_outputs: ClassVar[tuple[str, ...]] = ("z",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The z for which z + z^3 is the sine.",

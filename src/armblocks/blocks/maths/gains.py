@@ -23,6 +23,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, Words, swing
 from armblocks.errors import InputError
 
 _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
@@ -75,6 +76,9 @@ class WeightedSampleTime(Block):
     weight: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor of the sample time")
     sample_time: ArrayLike = sample_time_parameter()
 
+    def face_sign(self) -> FaceSign:
+        return Words(f"u {self.operation} w T")
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal"),)
 
@@ -90,6 +94,7 @@ class SineWaveFunction(Block):
     """A sine of a time that comes from outside: y = amplitude sin(frequency u + phase) + bias."""
 
     title: ClassVar[str] = "Sine Wave Function"
+    sign: ClassVar[FaceSign] = swing(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A time that passes twice as fast.", inputs={"u": made("Ramp", slope=2.0)}
     )

@@ -14,6 +14,7 @@ from casadi import SX, dot, fabs, fmax, if_else, sqrt, vertcat
 from armblocks.blocks.example_signals import CIRCLING, THREE_PHASES
 from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import Block, Condition, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 
 
@@ -27,6 +28,7 @@ class SumOfElements(Block):
     """The sum of all elements: y = u1 + u2 + …"""
 
     title: ClassVar[str] = "Sum of Elements"
+    sign: ClassVar[FaceSign] = Words("Σ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Three phases, 120 degrees apart: their sum is 0.",
         inputs={"u": THREE_PHASES},
@@ -50,6 +52,7 @@ class ProductOfElements(Block):
     """The product of all elements: y = u1 u2 …"""
 
     title: ClassVar[str] = "Product of Elements"
+    sign: ClassVar[FaceSign] = Words("Π")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The product of three sines, 120 degrees apart, is a sine of three times their frequency.",
         inputs={"u": THREE_PHASES},
@@ -81,6 +84,9 @@ class Extremum(Block):
 
     function: str = parameter("min", choices=("min", "max"), doc="which one")
     zero_crossing: bool = zero_crossing_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(self.function, italic=True)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -126,6 +132,7 @@ class CumulativeSum(Block):
     """Running sums along a vector: y(k) = u1 + … + uk; down every column of a matrix."""
 
     title: ClassVar[str] = "Cumulative Sum"
+    sign: ClassVar[FaceSign] = Words("Σ↓")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Each output adds one more element of the vector: the partial sums of a square wave.",
         inputs={"u": made("SineWave", amplitude=(1.0, 0.3333, 0.2), frequency=(1.0, 3.0, 5.0))},
@@ -153,6 +160,7 @@ class DotProduct(Block):
     """The sum of the products of the elements: y = u1 v1 + u2 v2 + …"""
 
     title: ClassVar[str] = "Dot Product"
+    sign: ClassVar[FaceSign] = Words("u · v")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="How far a turning vector points along a fixed one.",
         inputs={"u": CIRCLING, "v": made("Constant", value=(1.0, 1.0))},
@@ -186,6 +194,7 @@ class Norm(Block):
     """
 
     title: ClassVar[str] = "Norm"
+    sign: ClassVar[FaceSign] = Words("‖u‖")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The length of a vector that runs around an ellipse.",
         inputs={"u": made("SineWave", amplitude=(2.0, 1.0), phase=(pi / 2, 0.0))},

@@ -22,6 +22,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Words, function_sign
 from armblocks.equations import Shape
 
 
@@ -72,6 +73,9 @@ class Rounding(Block):
 
     function: str = parameter("floor", choices=tuple(_ROUNDINGS), doc="which way")
     zero_crossing: bool = zero_crossing_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return function_sign(self.function)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -129,6 +133,7 @@ class Modulo(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Modulo"
+    sign: ClassVar[FaceSign] = Words("mod")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A straight rise modulo 3: it starts again from 0 each time it reaches 3.",
         inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},

@@ -22,6 +22,7 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +43,9 @@ class MinMaxRunningResettable(Block):
     function: str = parameter("min", choices=("min", "max"), doc="which one")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="where it begins, and after a reset")
     sample_time: ArrayLike = sample_time_parameter()
+
+    def face_sign(self) -> FaceSign:
+        return Words(f"{self.function}(u, y)", italic=True)
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal"), Port("reset", "starts anew while not 0", shape=()))

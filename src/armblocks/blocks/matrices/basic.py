@@ -13,6 +13,7 @@ from casadi import SX, cross, diag, horzcat, mtimes, reshape, trace, vertcat
 from armblocks.blocks.elementwise import common_unit, numbered_ports
 from armblocks.blocks.elimination import determinant, solve
 from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, made, parameter
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
@@ -31,6 +32,7 @@ class CrossProduct(Block):
     """The vector product of two vectors of three: y = u x v."""
 
     title: ClassVar[str] = "Cross Product"
+    sign: ClassVar[FaceSign] = Words("u × v")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A vector that turns in the plane, crossed with z: it runs a quarter turn behind.",
         inputs={
@@ -55,6 +57,7 @@ class Transpose(Block):
     """Rows to columns: y = u'; a vector counts as a column and becomes a matrix of one row."""
 
     title: ClassVar[str] = "Transpose"
+    sign: ClassVar[FaceSign] = Words("Aᵀ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The two entries off the diagonal change places.",
         inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
@@ -82,6 +85,7 @@ class MatrixInverse(Block):
     """The inverse of a square matrix: u y = I, by elimination with pivots; not finite where u is singular."""
 
     title: ClassVar[str] = "Matrix Inverse"
+    sign: ClassVar[FaceSign] = Words("A⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The entries of the inverse of [1 a; 0 2] while a rises: only the one off the diagonal moves.",
         inputs={"u": made("Ramp", slope=((0.0, 0.2), (0.0, 0.0)), initial=((1.0, 0.0), (0.0, 2.0)))},
@@ -106,6 +110,7 @@ class LinearSolve(Block):
     """The solution of linear equations: A y = B, by elimination; not finite where A is singular."""
 
     title: ClassVar[str] = "Matrix Solve"
+    sign: ClassVar[FaceSign] = Words("A⁻¹ B")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The solution of [2 1; 1 3] y = (sin t, cos t).",
         inputs={
@@ -140,6 +145,7 @@ class Determinant(Block):
     """The determinant of a square matrix: y = det(u), by elimination with pivots."""
 
     title: ClassVar[str] = "Determinant"
+    sign: ClassVar[FaceSign] = Words("det")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The determinant of [1 a; a 1] while a swings: 1 - a^2.",
         inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (1.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
@@ -164,6 +170,7 @@ class Trace(Block):
     """The sum of the diagonal of a square matrix: y = u11 + u22 + …"""
 
     title: ClassVar[str] = "Trace"
+    sign: ClassVar[FaceSign] = Words("tr")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The sum of the diagonal: one entry swings about 1, the other about 2.",
         inputs={
@@ -198,6 +205,7 @@ class MatrixPower(Block):
     """A square matrix times itself: y = u^exponent; 0 gives the identity, negative ones take the inverse."""
 
     title: ClassVar[str] = "Matrix Power"
+    sign: ClassVar[FaceSign] = Words("Aⁿ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The square of [1 a; 0 1] is [1 2a; 0 1].",
         inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (0.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
@@ -275,6 +283,7 @@ class MatrixConcatenate(Block):
     """
 
     title: ClassVar[str] = "Matrix Concatenate"
+    sign: ClassVar[FaceSign] = Words("[A B]")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two vectors side by side are the columns of a matrix.",
         inputs={"u1": made("SineWave", amplitude=(1.0, 2.0)), "u2": made("Constant", value=(-1.0, 1.0))},
@@ -315,6 +324,7 @@ class DiagonalMatrix(Block):
     """The square matrix with a vector on its diagonal and zeros elsewhere: y = diag(u)."""
 
     title: ClassVar[str] = "Create Diagonal Matrix"
+    sign: ClassVar[FaceSign] = Words("diag")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two numbers on the diagonal, zeros elsewhere.",
         inputs={"u": made("SineWave", amplitude=(1.0, 2.0))},
@@ -344,6 +354,7 @@ class ExtractDiagonal(Block):
     """The diagonal of a square matrix as a vector: y = (u11, u22, …)."""
 
     title: ClassVar[str] = "Extract Diagonal"
+    sign: ClassVar[FaceSign] = Words("diag(A)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The diagonal of a matrix.",
         inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},

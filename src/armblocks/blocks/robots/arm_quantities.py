@@ -24,6 +24,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 
@@ -38,6 +39,7 @@ class JacobianInverse(Block):
     """
 
     title: ClassVar[str] = "ijacob"
+    sign: ClassVar[FaceSign] = Words("J⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The pseudo-inverse of the Jacobian while an arm unfolds: the speeds that a motion asks for grow."
@@ -90,6 +92,7 @@ class Manipulability(Block):
     """How far an arm is from a singularity: w = sqrt(det(J J')), Yoshikawa's measure."""
 
     title: ClassVar[str] = "manipulability"
+    sign: ClassVar[FaceSign] = Words("√|J Jᵀ|")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="An arm with two links unfolds: the nearer it is to being stretched, the smaller the measure.",
         inputs={"q": made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
@@ -112,6 +115,7 @@ class RobotEnergy(Block):
     """Kinetic and potential energy of an arm: T = 1/2 qd' M(q) qd, V = -sum of m g . r."""
 
     title: ClassVar[str] = "Energy"
+    sign: ClassVar[FaceSign] = Words("E(q, qd)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "A double pendulum without friction: kinetic and potential energy change places, their sum stays."

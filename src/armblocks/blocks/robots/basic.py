@@ -37,6 +37,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words, graph
 from armblocks.errors import InputError
 from armblocks.robot import Robot
 from armblocks.trajectories import Quintic
@@ -52,6 +53,9 @@ class JTraj(Block):
     """
 
     title: ClassVar[str] = "jtraj"
+    sign: ClassVar[FaceSign] = graph(
+        *((k / 20, 10 * (k / 20) ** 3 - 15 * (k / 20) ** 4 + 6 * (k / 20) ** 5) for k in range(21))
+    )
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two joints leave and arrive at rest; position, speed and acceleration are smooth.",
         parameters={"tmax": 8.0, "q0": (0.0, 0.0), "qf": (1.0, -1.5)},
@@ -120,6 +124,7 @@ class Jacob0(Block):
     """The Jacobian in the world frame: (v; w) = J qd, rows linear then angular, point = tool origin."""
 
     title: ClassVar[str] = "jacob0"
+    sign: ClassVar[FaceSign] = Words("J(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The linear rows of the Jacobian: how far the tool moves along x, y, z for each joint.",
         shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
@@ -142,6 +147,7 @@ class Jacobe(Block):
     """The Jacobian in the tool frame: (v; w) = J qd, rows linear then angular (jacobn in the toolbox)."""
 
     title: ClassVar[str] = "jacobn"
+    sign: ClassVar[FaceSign] = Words("Jₑ(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The linear rows of the Jacobian in the axes of the tool.",
         shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
@@ -167,6 +173,7 @@ class Rne(Block):
     """
 
     title: ClassVar[str] = "rne"
+    sign: ClassVar[FaceSign] = Words("rne")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The torques that a motion of two joints asks for; at the end they only hold the arm "
@@ -192,6 +199,7 @@ class Gravload(Block):
     """The torques that hold the robot still against gravity: tau = gravload(q)."""
 
     title: ClassVar[str] = "gravload"
+    sign: ClassVar[FaceSign] = Words("g(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The torques that hold the arm against gravity, on its way up.",
     )
@@ -213,6 +221,7 @@ class Inertia(Block):
     """The joint-space inertia matrix: M = inertia(q), motors included."""
 
     title: ClassVar[str] = "inertia"
+    sign: ClassVar[FaceSign] = Words("M(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "The entries of the inertia matrix: the first joint feels less inertia the more the arm "
@@ -238,6 +247,7 @@ class Coriolis(Block):
     """The matrix of Coriolis and centrifugal terms: C = coriolis(q, qd), with torque C qd."""
 
     title: ClassVar[str] = "coriolis"
+    sign: ClassVar[FaceSign] = Words("C(q, qd)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The entries of the Coriolis matrix: they vanish with the speeds.",
         shown=("qd", "C"),

@@ -28,6 +28,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, graph
 from armblocks.errors import InputError
 from armblocks.spatial.orientation import from_quaternion, part_of_turn, to_quaternion
 from armblocks.trajectories import Quintic
@@ -43,6 +44,7 @@ class Trapezoidal(Block):
     """
 
     title: ClassVar[str] = "lspb"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.25, 0.12), (0.75, 0.88), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Even ramps of the speed with a stretch of even speed between them.",
         parameters={"q0": (0.0, 0.0), "qf": (1.0, -0.5), "tmax": 8.0},
@@ -100,6 +102,7 @@ class MultiSegment(Block):
     """
 
     title: ClassVar[str] = "mstraj"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.35, 0.9), (0.45, 0.95), (0.55, 0.9), (1, 0.3))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Through three corners: the joint goes straight and rounds each corner within 0.6 s.",
         parameters={"points": ((0.0,), (1.0,), (0.5,), (1.5,)), "durations": (3.0, 3.0, 3.0), "blend": 0.6},

@@ -18,6 +18,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, Words, graph
 from armblocks.errors import InputError
 
 FILE_SUFFIXES = ("csv", "npz", "mat", "parquet")
@@ -94,6 +95,9 @@ class ToWorkspace(Block):
 
     variable: str = parameter("simout", doc="the name of the variable")
 
+    def face_sign(self) -> FaceSign:
+        return Words(self.variable)
+
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "what is kept"),)
 
@@ -124,6 +128,9 @@ class ToFile(Block):
     limit: int = parameter(
         1_000_000, minimum=1, maximum=10_000_000, doc="at most so many rows, the last ones"
     )
+
+    def face_sign(self) -> FaceSign:
+        return Words(self.file.rpartition("/")[2])
 
     def check(self) -> None:
         parts = self.file.split("/")
@@ -157,6 +164,9 @@ class Spectrum(Block):
     """
 
     title: ClassVar[str] = "Spectrum"
+    sign: ClassVar[FaceSign] = graph(
+        (0, 0), (0.22, 0.1), (0.28, 1), (0.34, 0.1), (0.6, 0.06), (0.66, 0.5), (0.72, 0.06), (1, 0)
+    )
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two sines of 0.5 and 2 Hz, the second a tenth as large.",
         parameters={"decibels": False},
@@ -204,6 +214,7 @@ class Terminator(Block):
     """Takes a signal that nobody needs."""
 
     title: ClassVar[str] = "Terminator"
+    sign: ClassVar[FaceSign] = Words("⊣")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Nothing is done with the signal; a scope shows it here.",
         inputs={"u": made("SineWave")},

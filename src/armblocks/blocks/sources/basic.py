@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import parameters_shape
 from armblocks.diagram import Block, ParameterKind, Port, Shapes, Signals, WorkedExample, parameter, shape_of
+from armblocks.diagram.signs import FaceSign, Words, graph, swing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +24,9 @@ class Constant(Block):
     )
 
     value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="what comes out")
+
+    def face_sign(self) -> FaceSign:
+        return Words(self.stated_text("value"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value"),)
@@ -39,6 +43,7 @@ class Clock(Block):
     """The time of the simulation: y = t."""
 
     title: ClassVar[str] = "Clock"
+    sign: ClassVar[FaceSign] = Words("t")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The time itself: a slope of 1.",
     )
@@ -58,6 +63,7 @@ class Step(Block):
     """
 
     title: ClassVar[str] = "Step"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.45, 0), (0.45, 1), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="From 0 to 1 at 2 s.",
         parameters={"time": 2.0},
@@ -88,6 +94,7 @@ class Ramp(Block):
     """A straight rise from a known time on: y = initial + slope max(t - start, 0)."""
 
     title: ClassVar[str] = "Ramp"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Level until 2 s, then a rise of 0.5 a second.",
         parameters={"slope": 0.5, "start": 2.0},
@@ -118,6 +125,7 @@ class SineWave(Block):
     """A sine of the time: y = amplitude sin(frequency t + phase) + bias."""
 
     title: ClassVar[str] = "Sine Wave"
+    sign: ClassVar[FaceSign] = swing(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two radians a second, about the bias 1.",
         parameters={"amplitude": 2.0, "frequency": 2.0, "bias": 1.0},

@@ -19,6 +19,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
+from armblocks.diagram.signs import FaceSign, stairs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +27,7 @@ class CounterLimited(Block):
     """Counts the ticks and starts again: y(k) = k mod (upper + 1)."""
 
     title: ClassVar[str] = "Counter Limited"
+    sign: ClassVar[FaceSign] = stairs((0.0, 0.5, 1.0, 0.0, 0.5, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Counts 0, 1, 2, 3 at its ticks and starts again.",
         parameters={"upper": 3, "sample_time": 0.5},
@@ -56,6 +58,7 @@ class DigitalClock(Block):
     """The time at the last tick: y = k T + offset."""
 
     title: ClassVar[str] = "Digital Clock"
+    sign: ClassVar[FaceSign] = stairs((0.0, 0.25, 0.5, 0.75, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The time of the last tick, beside the time itself.",
         inputs={},
@@ -77,6 +80,7 @@ class CounterFreeRunning(Block):
     """Counts the ticks and overflows as an unsigned integer does: y(k) = k mod 2^bits."""
 
     title: ClassVar[str] = "Counter Free-Running"
+    sign: ClassVar[FaceSign] = stairs((0.0, 0.33, 0.67, 1.0, 0.0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A counter of two bits: after 3 comes 0.",
         parameters={"bits": 2},

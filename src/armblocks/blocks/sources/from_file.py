@@ -21,6 +21,7 @@ from armblocks.diagram import (
     WorkedExample,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, graph
 from armblocks.equations import last_at_or_below, read_entry
 
 
@@ -36,6 +37,7 @@ class FromFile(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "From File"
+    sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Five rows, with straight lines between them.",
         parameters={"data": ((0.0, 0.0), (1.0, 2.0), (2.5, -1.0), (4.0, 1.0), (5.0, 1.0))},

@@ -33,9 +33,13 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, graph, stairs
 
 _MOST = float(2**SEED_BITS - 1)
 _SEED = f"which stream of numbers, 0 to {_MOST:.0f}; its whole part counts"
+
+
+_NOISE = (0.5, 0.75, 0.3, 0.55, 0.05, 0.6, 1.0, 0.4, 0.65, 0.2, 0.45, 0.9, 0.35, 0.0, 0.6, 0.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +47,7 @@ class RandomNumber(Block):
     """Gaussian random numbers, a new one at each tick: y(k) = mean + sqrt(variance) n(k), n of N(0, 1)."""
 
     title: ClassVar[str] = "Random Number"
+    sign: ClassVar[FaceSign] = stairs(_NOISE[:9])
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A new number of the normal distribution every 0.1 s; the same seed gives the same numbers.",
     )
@@ -80,6 +85,7 @@ class UniformRandomNumber(Block):
     """Evenly spread random numbers, a new one at each tick: minimum < y(k) < maximum."""
 
     title: ClassVar[str] = "Uniform Random Number"
+    sign: ClassVar[FaceSign] = stairs((0.9, 0.2, 0.6, 0.1, 1.0, 0.45, 0.75, 0.0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A new number between -1 and 1 every 0.1 s; the same seed gives the same numbers.",
     )
@@ -122,6 +128,7 @@ class BandLimitedWhiteNoise(Block):
     """
 
     title: ClassVar[str] = "Band-Limited White Noise"
+    sign: ClassVar[FaceSign] = graph(*((k / 15, v) for k, v in enumerate(_NOISE)))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Noise, and what a lag of 1 s lets through of it.",
         parameters={"noise_power": 0.05},

@@ -20,6 +20,7 @@ from armblocks.diagram import (
     made,
     parameter,
 )
+from armblocks.diagram.signs import FaceSign, pulses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,7 @@ class PWM(Block):
     """
 
     title: ClassVar[str] = "PWM"
+    sign: ClassVar[FaceSign] = pulses((0.2, 0.5, 0.8))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Pulses that become wider as the duty cycle rises from 0 to 1.",
         parameters={"period": 1.0},

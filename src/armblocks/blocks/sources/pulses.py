@@ -24,6 +24,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, pulses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,7 @@ class PulseGenerator(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Pulse Generator"
+    sign: ClassVar[FaceSign] = pulses((0.5, 0.5))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="High for the first 30 % of every two seconds.",
         parameters={"width": 30.0},

@@ -31,9 +31,17 @@ from armblocks.diagram import (
     sample_time_parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, graph, pulses, stairs, swing
 from armblocks.errors import InputError
 
 _ROUNDED = 1.0 + 1e-14  # k * period / period may come out a little below k
+
+
+_WAVES = {
+    "sine": swing(2.0),
+    "square": pulses((0.5, 0.5)),
+    "sawtooth": graph((0, 0.5), (0.25, 0), (0.25, 1), (0.75, 0), (0.75, 1), (1, 0.5)),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +64,9 @@ class SignalGenerator(Block):
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="A, half the way from peak to peak")
     frequency: float = parameter(1.0, above=0.0, doc="f, in the units chosen")
     units: str = parameter("Hz", choices=("Hz", "rad/s"), doc="units of the frequency")
+
+    def face_sign(self) -> FaceSign:
+        return _WAVES[self.waveform]
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the wave"),)
@@ -109,6 +120,7 @@ class RepeatingSequence(Block):
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Repeating Sequence"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 1), (0.5, 0), (1, 1), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A course of four points that begins again every three seconds.",
         parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0)},
@@ -173,6 +185,7 @@ class RepeatingSequenceInterpolated(Block):
     """
 
     title: ClassVar[str] = "Repeating Sequence Interpolated"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.2, 1), (0.5, 0.3), (0.5, 0), (0.7, 1), (1, 0.3))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A course of four points, read every 0.1 s and held in between.",
         parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0), "sample_time": 0.1},
@@ -206,6 +219,7 @@ class RepeatingSequenceStair(Block):
     """One value after the other at each tick, then again from the first: y(k) = values[k mod n]."""
 
     title: ClassVar[str] = "Repeating Sequence Stair"
+    sign: ClassVar[FaceSign] = stairs((0.2, 1.0, 0.6, 0.2, 1.0, 0.6))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Five values, one a second, then again from the first.",
     )

@@ -26,6 +26,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
+from armblocks.diagram.signs import FaceSign, Words, graph, swing
 from armblocks.equations import last_at_or_below, read_entry
 
 Array = NDArray[np.float64]
@@ -36,6 +37,7 @@ class Ground(Block):
     """Nothing: y = 0, for inputs that are not used."""
 
     title: ClassVar[str] = "Ground"
+    sign: ClassVar[FaceSign] = Words("0")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Nothing: zero at all times.",
     )
@@ -52,6 +54,7 @@ class Pulse(Block):
     """One pulse: y = amplitude for start <= t < start + width, else 0. Steps end at both edges."""
 
     title: ClassVar[str] = "Pulse"
+    sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (0.3, 1), (0.7, 1), (0.7, 0), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="One pulse from 2 s to 5 s.",
         parameters={"start": 2.0, "width": 3.0},
@@ -84,6 +87,7 @@ class Chirp(Block):
     """
 
     title: ClassVar[str] = "Chirp Signal"
+    sign: ClassVar[FaceSign] = swing(1.2, 1.6)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The frequency rises from 0.1 Hz to 1 Hz within ten seconds.",
         parameters={"target_time": 10.0},
@@ -117,6 +121,7 @@ class FromTable(Block):
     """
 
     title: ClassVar[str] = "From Workspace"
+    sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A smooth curve through four points; after the last one its value is held.",
         parameters={"times": (0.0, 2.0, 5.0, 8.0), "values": (0.0, 1.0, -1.0, 0.5), "method": "cubic"},

@@ -10,6 +10,7 @@ from casadi import SX, horzcat, vertcat
 
 from armblocks.blocks.example_signals import HELIX_POSE, last_column_of
 from armblocks.diagram import Block, Port, Signals, WorkedExample, made
+from armblocks.diagram.signs import FaceSign, Words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,6 +18,7 @@ class T2xyz(Block):
     """The position of a pose: x, y, z = T[0, 3], T[1, 3], T[2, 3]."""
 
     title: ClassVar[str] = "T2xyz"
+    sign: ClassVar[FaceSign] = Words("T→xyz")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The position of a pose that moves along a circle.",
         inputs={"T": HELIX_POSE},
@@ -38,6 +40,7 @@ class Xyz2T(Block):
     """The pose at a position, not turned: T = [I, (x, y, z); 0 0 0 1]."""
 
     title: ClassVar[str] = "xyz2T"
+    sign: ClassVar[FaceSign] = Words("xyz→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The last column of the pose is the position.",
         inputs={"x": made("SineWave", phase=pi / 2), "y": made("SineWave"), "z": made("Ramp", slope=0.1)},

@@ -13,6 +13,7 @@ from casadi import SX, dot, horzcat, sqrt, vertcat
 
 from armblocks.blocks.example_signals import HALF_ANGLE, SPINNING_POSE, ZERO, corner_of
 from armblocks.diagram import Block, Port, Signals, WorkedExample, made, parameter
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.spatial import orientation
 
 _T = Port("T", "the pose", shape=(4, 4))
@@ -39,6 +40,7 @@ class Rpy2T(Block):
     """
 
     title: ClassVar[str] = "rpy2T"
+    sign: ClassVar[FaceSign] = Words("rpy→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A pose that only yaws: the corner of its rotation holds cosines and sines of the angle.",
         inputs={"roll": ZERO, "pitch": ZERO, "yaw": made("Ramp").named("yaw")},
@@ -66,6 +68,7 @@ class T2rpy(Block):
     """
 
     title: ClassVar[str] = "T2rpy"
+    sign: ClassVar[FaceSign] = Words("T→rpy")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The three angles of a pose that was made of them come back; yaw wraps at pi.",
         inputs={
@@ -96,6 +99,7 @@ class Eul2T(Block):
     """The pose turned by Euler angles ZYZ: T = Rz(phi) Ry(theta) Rz(psi)."""
 
     title: ClassVar[str] = "eul2T"
+    sign: ClassVar[FaceSign] = Words("eul→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "A pose that turns about z only: the corner of its rotation holds cosines and sines of the angle."
@@ -123,6 +127,7 @@ class T2eul(Block):
     """
 
     title: ClassVar[str] = "T2eul"
+    sign: ClassVar[FaceSign] = Words("T→eul")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The three angles of a pose that was made of them come back; phi wraps at pi.",
         inputs={
@@ -150,6 +155,7 @@ class Quaternion2T(Block):
     """The pose turned by a quaternion (s, x, y, z), whose length does not matter: T = T(u / |u|)."""
 
     title: ClassVar[str] = "Quaternion to Pose"
+    sign: ClassVar[FaceSign] = Words("q→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A quaternion (cos t/2, 0, 0, sin t/2) is a turn by t about z.",
         inputs={"u": HALF_ANGLE},
@@ -174,6 +180,7 @@ class T2Quaternion(Block):
     """
 
     title: ClassVar[str] = "Pose to Quaternion"
+    sign: ClassVar[FaceSign] = Words("T→q")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The quaternion of a pose that turns about z: cosine and sine of half the angle.",
         inputs={"T": SPINNING_POSE},
@@ -195,6 +202,7 @@ class AngleAxis2T(Block):
     """The pose turned about an axis of any length: R = I + sin(angle) [k] + (1 - cos(angle)) [k]^2."""
 
     title: ClassVar[str] = "angvec2T"
+    sign: ClassVar[FaceSign] = Words("θ, a→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A turn about the axis z: the corner of its rotation holds cosines and sines of the angle.",
         inputs={
@@ -219,6 +227,7 @@ class T2AngleAxis(Block):
     """Angle and unit axis of a pose, 0 <= angle <= pi; where nothing is turned the axis is (0, 0, 0)."""
 
     title: ClassVar[str] = "T2angvec"
+    sign: ClassVar[FaceSign] = Words("T→θ, a")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Angle and axis of a pose that turns about z: beyond pi the shorter turn is about -z.",
         inputs={"T": SPINNING_POSE},
@@ -241,6 +250,7 @@ class QuaternionProduct(Block):
     """Hamilton's product, one turn after the other: y = u v, R(y) = R(u) R(v)."""
 
     title: ClassVar[str] = "Quaternion Multiplication"
+    sign: ClassVar[FaceSign] = Words("u v")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A turn about z after a quarter turn about x.",
         inputs={
@@ -267,6 +277,7 @@ class QuaternionInverse(Block):
     """The opposite turn: y = (s, -x, -y, -z) / |u|^2, so that u y = 1."""
 
     title: ClassVar[str] = "Quaternion Inverse"
+    sign: ClassVar[FaceSign] = Words("q⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The turn back: the vector part changes its sign.",
         inputs={"u": HALF_ANGLE},
@@ -288,6 +299,7 @@ class QuaternionNormalize(Block):
     """The quaternion of unit length with the same orientation: y = u / |u|."""
 
     title: ClassVar[str] = "Quaternion Normalize"
+    sign: ClassVar[FaceSign] = Words("q / |q|")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A quaternion that grows, brought to length 1.",
         inputs={
@@ -310,6 +322,7 @@ class QuaternionRate(Block):
     """How a quaternion changes at an angular velocity: y = 1/2 u w (body axes) or 1/2 w u (world axes)."""
 
     title: ClassVar[str] = "Quaternion Rate"
+    sign: ClassVar[FaceSign] = Words("½ q ω")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
             "Integrated at a steady angular velocity about z: the quaternion goes around with half the angle."

@@ -21,6 +21,7 @@ from armblocks.blocks.example_signals import (
 )
 from armblocks.blocks.transforms.orientations import pose
 from armblocks.diagram import Block, Port, Shapes, Signals, State, WorkedExample, made, parameter, shape_of
+from armblocks.diagram.signs import FaceSign, Words
 from armblocks.errors import InputError
 from armblocks.spatial.orientation import from_quaternion, quaternion_product
 
@@ -38,6 +39,7 @@ class PoseProduct(Block):
     """Poses one after the other: T = T1 T2 …, that is T_ac = T_ab T_bc."""
 
     title: ClassVar[str] = "Pose Product"
+    sign: ClassVar[FaceSign] = Words("T₁ T₂")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A frame that turns, and 1 m along its x axis a second one: its origin runs around a circle.",
         inputs={"T1": SPINNING_POSE, "T2": pose_along_x(made("Constant").named("one"))},
@@ -62,6 +64,7 @@ class PoseInverse(Block):
     """The pose seen from the other frame: T^-1 = [R' -R'p; 0 0 0 1]."""
 
     title: ClassVar[str] = "Pose Inverse"
+    sign: ClassVar[FaceSign] = Words("T⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A pose that moves along x, and how the old frame is seen from it: it moves along -x.",
         inputs={
@@ -87,6 +90,7 @@ class Rp2T(Block):
     """A pose from a rotation and a position: T = [R p; 0 0 0 1]."""
 
     title: ClassVar[str] = "rt2tr"
+    sign: ClassVar[FaceSign] = Words("R, p→T")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A fixed rotation and a position that swings make a pose; its upper rows are [R p].",
         inputs={
@@ -111,6 +115,7 @@ class T2Rp(Block):
     """Rotation and position of a pose: T = [R p; 0 0 0 1]."""
 
     title: ClassVar[str] = "tr2rt"
+    sign: ClassVar[FaceSign] = Words("T→R, p")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The position of a pose as a vector; the rotation is the other output.",
         inputs={"T": HELIX_POSE},
@@ -132,6 +137,7 @@ class TransformPoint(Block):
     """A point of frame b told in frame a: p_a = R_ab p_b + p_ab."""
 
     title: ClassVar[str] = "Transform Point"
+    sign: ClassVar[FaceSign] = Words("T p")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The point (1, 0, 0) of a frame that turns about z, seen from outside.",
         inputs={"T": SPINNING_POSE, "p": made("Constant", value=(1.0, 0.0, 0.0)).named("point")},
