@@ -15,7 +15,7 @@ from armblocks.diagram.mask import ParameterFormula, Scope, formula_names, formu
 from armblocks.diagram.parameter import Parameter, Value, shape_of
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, View, name_before
 from armblocks.diagram.shape_rules import broadcast
-from armblocks.diagram.signs import FaceSign, Title, value_text
+from armblocks.diagram.signs import FaceSign, Outline, Title, value_text
 from armblocks.diagram.worked_example import WorkedExample
 from armblocks.equations import Shape
 from armblocks.errors import UnknownNameError, check_arguments
@@ -100,6 +100,10 @@ class Block(ABC):
 
     sign: ClassVar[FaceSign | None] = None
     """What stands on the block's face, where no parameter matters for it; left out, its title."""
+    outline: ClassVar[Outline] = Outline.CARD
+    """The block's outline, where no parameter matters for it."""
+    card_size: ClassVar[tuple[float, float] | None] = None
+    """Width and height of a card, px; left out, as much as the sign takes. Names of ports may widen it."""
 
     def __post_init__(self) -> None:
         formulas, open_ones = dict(self.formulas), False
@@ -140,6 +144,10 @@ class Block(ABC):
         """The parameters that the equations are made with; others change without anything being traced."""
         inputs, behind = self.inputs_of_the_run(), self.parameters_behind_inputs()
         return tuple(rule for rule in self.parameters() if rule not in inputs and rule.name not in behind)
+
+    def face_outline(self) -> Outline:
+        """The outline of the block."""
+        return self.outline
 
     def face_sign(self) -> FaceSign:
         """What stands on the block's face."""

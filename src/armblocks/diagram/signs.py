@@ -1,4 +1,5 @@
-"""The sign on a block's face: a curve, a fraction, or a few characters as the field writes them.
+"""The face of a block: its outline, and a sign: a curve, a fraction, or a few characters as the field writes
+them.
 
 A block whose sign is always the same declares it as ``sign``; one whose sign follows from its parameters
 overrides ``face_sign``. :mod:`armblocks.drawing` draws signs; a block without one shows its title.
@@ -9,11 +10,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import TypeAlias
 
 import numpy as np
 
 from armblocks.pictures.numbers import axis_number
+
+
+class Outline(Enum):
+    """The outline of a block."""
+
+    CARD = "card"
+    TRIANGLE = "triangle"
+    CIRCLE = "circle"
+    BAR = "bar"
+    BUS = "bus"
+    OVAL = "oval"
+    TAG = "tag"
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.diagram import Connection, Diagram
 from armblocks.diagram.parameter import Parameter, ParameterKind, Value, parameter
 from armblocks.diagram.port import Port, PortRef
+from armblocks.diagram.signs import Outline
 from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
 
@@ -63,6 +64,7 @@ class Inport(Block):
     """
 
     title: ClassVar[str] = "In"
+    outline: ClassVar[Outline] = Outline.OVAL
 
     port: int = parameter(0, minimum=0, doc="its place among the inputs, from 1; 0 takes the next free one")
     dimensions: ArrayLike = parameter(
@@ -104,6 +106,7 @@ class Outport(Block):
     """
 
     title: ClassVar[str] = "Out"
+    outline: ClassVar[Outline] = Outline.OVAL
 
     port: int = parameter(0, minimum=0, doc="its place among the outputs, from 1; 0 takes the next free one")
     dimensions: ArrayLike = parameter(
@@ -141,6 +144,7 @@ class DiagramBlock(Block):
     """
 
     virtual: ClassVar[bool] = True
+    card_size: ClassVar[tuple[float, float]] = (104.0, 64.0)
 
     diagram: Diagram = parameter(
         PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"

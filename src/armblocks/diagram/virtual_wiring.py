@@ -8,6 +8,7 @@ from typing import ClassVar
 from armblocks.diagram.block import Block
 from armblocks.diagram.parameter import parameter
 from armblocks.diagram.port import Port
+from armblocks.diagram.signs import Outline
 from armblocks.diagram.worked_example import WorkedExample, made
 from armblocks.errors import InputError
 
@@ -47,6 +48,7 @@ class Goto(Block):
     """
 
     title: ClassVar[str] = "Goto"
+    outline: ClassVar[Outline] = Outline.TAG
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="What a Goto sends, a From with the same tag receives, without a wire.",
@@ -68,6 +70,7 @@ class From(Block):
     """Receives the signal that the Goto with the same tag sends."""
 
     title: ClassVar[str] = "From"
+    outline: ClassVar[Outline] = Outline.TAG
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="What a Goto sends, a From with the same tag receives, without a wire.",
@@ -88,6 +91,7 @@ class BusCreator(Block):
     """Puts several signals on one wire, each under its name; a bus may be an element of a bus."""
 
     title: ClassVar[str] = "Bus Creator"
+    outline: ClassVar[Outline] = Outline.BUS
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two signals on one wire: the scope shows both under their names.",
@@ -112,6 +116,7 @@ class BusSelector(Block):
     """Takes elements out of a bus by their paths: speed, or motor.speed of a bus within a bus."""
 
     title: ClassVar[str] = "Bus Selector"
+    outline: ClassVar[Outline] = Outline.BUS
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The speed is taken out of a bus that holds position and speed.",
@@ -138,6 +143,7 @@ class BusAssignment(Block):
     """The same bus with other signals for some of its elements."""
 
     title: ClassVar[str] = "Bus Assignment"
+    outline: ClassVar[Outline] = Outline.BUS
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The speed in the bus is replaced by another signal; the position stays.",

@@ -5,13 +5,11 @@ Most blocks show the sign that they declare; here are those whose outline or dra
 
 from __future__ import annotations
 
-from enum import Enum
-
 import numpy as np
 
 from armblocks import blocks as kinds
 from armblocks.diagram import Block
-from armblocks.diagram.signs import value_text
+from armblocks.diagram.signs import Outline, value_text
 from armblocks.drawing.face_marks import Room, least_room, sign_marks, words
 from armblocks.drawing.sink_faces import Trend, display, scope, xy_graph
 from armblocks.drawing.structure_faces import (
@@ -38,55 +36,35 @@ from armblocks.rendering.camera import Camera
 from armblocks.robot import Robot
 from armblocks.robot.geometry import link_frames
 
-
-class FaceShape(Enum):
-    """The outline of a block."""
-
-    CARD = "card"
-    TRIANGLE = "triangle"
-    CIRCLE = "circle"
-    BAR = "bar"
-    BUS = "bus"
-    OVAL = "oval"
-    TAG = "tag"
+_SIZES = {
+    Outline.CIRCLE: (34.0, 34.0),
+    Outline.TRIANGLE: (62.0, 52.0),
+    Outline.BAR: (9.0, 48.0),
+    Outline.BUS: (30.0, 48.0),
+    Outline.OVAL: (44.0, 24.0),
+}
+"""Width and height, px."""
 
 
-def face_size(block: Block) -> tuple[FaceShape, float, float]:
+def face_size(block: Block) -> tuple[Outline, float, float]:
     """Outline, width and height in px that suit the face; port names may widen it."""
-    match block:
-        case kinds.Sum() if len(block.signs) <= 3:
-            return FaceShape.CIRCLE, 34.0, 34.0
-        case kinds.Gain() | kinds.SliderGain():
-            return FaceShape.TRIANGLE, 62.0, 52.0
-        case kinds.Mux() | kinds.Demux():
-            return FaceShape.BAR, 9.0, 48.0
-        case kinds.BusCreator() | kinds.BusSelector() | kinds.BusAssignment():
-            return FaceShape.BUS, 30.0, 48.0
-        case kinds.Inport() | kinds.Outport():
-            return FaceShape.OVAL, 44.0, 24.0
-        case kinds.Goto() | kinds.From():
-            return FaceShape.TAG, tag_width(block), 26.0
-        case kinds.Product():
-            return FaceShape.CARD, 46.0, 46.0
-        case kinds.Display():
-            return FaceShape.CARD, 104.0, max(40.0, 24.0 * block.inputs + 8)
-        case kinds.Scope() | kinds.XYGraph():
-            return FaceShape.CARD, 72.0, 60.0
-        case kinds.JTraj() | kinds.RobotPlot() | kinds.Fkine() | kinds.ForwardDynamics() | kinds.ArmPlant():
-            return FaceShape.CARD, 84.0, 64.0
-        case kinds.Terminator():
-            return FaceShape.CARD, 34.0, 34.0
-        case _ if is_subsystem(block):
-            return FaceShape.CARD, 104.0, 64.0
-        case _:
-            width, height = least_room(block.face_sign())
-            return FaceShape.CARD, max(68.0, width), max(50.0, height)
+    outline = block.face_outline()
+    if isinstance(block, kinds.Goto | kinds.From):
+        return outline, tag_width(block), 26.0
+    if isinstance(block, kinds.Display):
+        return outline, 104.0, max(40.0, 24.0 * block.inputs + 8)
+    if outline in _SIZES:
+        return outline, *_SIZES[outline]
+    if block.card_size is not None:
+        return outline, *block.card_size
+    width, height = least_room(block.face_sign())
+    return outline, max(68.0, width), max(50.0, height)
 
 
 def face_width(block: Block) -> float:
     """px that the drawing needs between the names of the ports."""
     shape, width, _ = face_size(block)
-    if shape is not FaceShape.CARD or isinstance(block, kinds.Display):
+    if shape is not Outline.CARD or isinstance(block, kinds.Display):
         return width
     if is_subsystem(block):
         return mask_width(block)
@@ -107,22 +85,22 @@ def _draws_itself(block: Block) -> bool:
 def outline(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
     """The block's body."""
     match face_size(block)[0]:
-        case FaceShape.CIRCLE:
+        case Outline.CIRCLE:
             radius = min(width, height) / 2
             return Disc(x + width / 2, y + height / 2, radius, Tone.SURFACE, Tone.WIRE, 1.2)
-        case FaceShape.TRIANGLE:
+        case Outline.TRIANGLE:
             tip, back = (x, x + width) if flipped else (x + width, x)
             corners = [(back, y), (tip, y + height / 2), (back, y + height)]
             return Polyline(corners, stroke=Tone.WIRE, width=1.2, fill=Tone.SURFACE, closed=True)
-        case FaceShape.BAR:
+        case Outline.BAR:
             return Rectangle(x, y, width, height, radius=1.5, fill=Tone.WIRE)
-        case FaceShape.BUS:
+        case Outline.BUS:
             return Group(bus_outline(block, x, y, width, height, flipped))
-        case FaceShape.OVAL:
+        case Outline.OVAL:
             return oval(x, y, width, height)
-        case FaceShape.TAG:
+        case Outline.TAG:
             return tag_outline(block, x, y, width, height, flipped)
-        case FaceShape.CARD:
+        case Outline.CARD:
             return Rectangle(x, y, width, height, 5, Tone.SURFACE, Tone.WIRE, 1.2)
 
 

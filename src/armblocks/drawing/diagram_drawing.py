@@ -20,8 +20,8 @@ from armblocks.diagram import (
     infer_shapes,
     levels_of,
 )
+from armblocks.diagram.signs import Outline
 from armblocks.drawing import block_faces
-from armblocks.drawing.block_faces import FaceShape
 from armblocks.drawing.diagram_layout import (
     NAME_ROOM,
     NAME_SIZE,
@@ -173,12 +173,12 @@ def _label(box: Box) -> tuple[float, float, float, float]:
     width = box.name_width
     if not box.upright:  # wires leave above and below
         return box.x + box.width + 5, box.y + box.height / 2 - 7, width, NAME_ROOM - 4
-    if _shape(box) is FaceShape.CIRCLE:
+    if _shape(box) is Outline.CIRCLE:
         return box.x + box.width * 0.78, box.y - NAME_SIZE - 2, width, NAME_SIZE + 3
     return box.x + (box.width - width) / 2, box.y + box.height + 2, width, NAME_ROOM - 4
 
 
-def _shape(box: Box) -> FaceShape:
+def _shape(box: Box) -> Outline:
     return block_faces.face_size(box.block)[0]
 
 
@@ -199,15 +199,15 @@ def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
     shape, block = _shape(box), box.block
     marks: list[Mark] = [_outline(box)]
     room = Room(box.x, box.y, box.width, box.height)
-    if shape in (FaceShape.CARD, FaceShape.BUS):
+    if shape in (Outline.CARD, Outline.BUS):
         names, room = _port_names(box)
         marks += names
-    elif shape is FaceShape.CIRCLE:
+    elif shape is Outline.CIRCLE:
         marks += _signs(box)
-    if shape is FaceShape.BAR:
+    if shape is Outline.BAR:
         return marks
     flipped = box.flipped != (box.rotation == 180)
-    if not box.upright and shape is FaceShape.TRIANGLE:
+    if not box.upright and shape is Outline.TRIANGLE:
         # The number stands in the wide half, which is the upper one of a triangle that points down.
         points_down = (box.rotation == 90) != box.flipped
         way = -1 if points_down else 1
@@ -236,7 +236,7 @@ def _block(box: Box, trend: Trend | None) -> list[Mark]:
     shape, marks = _shape(box), block_marks(box, trend)
     lx, ly, lw, _ = _label(box)
     name = shorten(box.name, NAME_SIZE, lw + 1)
-    if shape is FaceShape.CIRCLE or not box.upright:
+    if shape is Outline.CIRCLE or not box.upright:
         marks.append(Text(lx, ly + NAME_SIZE, name, NAME_SIZE, Tone.MUTED))
     else:
         marks.append(Text(lx + lw / 2, ly + NAME_SIZE + 1, name, NAME_SIZE, Tone.MUTED, "middle"))

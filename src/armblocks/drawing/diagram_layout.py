@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from armblocks.diagram import Block, Diagram, Inport, Outport, Placement
-from armblocks.drawing.block_faces import FaceShape, bus_width, face_size, face_width, port_labels
+from armblocks.diagram.signs import Outline
+from armblocks.drawing.block_faces import bus_width, face_size, face_width, port_labels
 from armblocks.drawing.structure_faces import CONTROL_ROOM, control_ports
 from armblocks.pictures.text_width import text_width
 
@@ -121,15 +122,15 @@ def standing_box(name: str, block: Block, place: Placement) -> Box:
 def _standing(box: Box) -> tuple[float, float]:
     """Width and height of a block turned by a quarter: its drawing stays upright, its ports go round."""
     shape = face_size(box.block)[0]
-    if shape is FaceShape.TAG:  # as wide as its text
+    if shape is Outline.TAG:  # as wide as its text
         return box.width, box.height + 10
-    if shape not in (FaceShape.CARD, FaceShape.BUS):
+    if shape not in (Outline.CARD, Outline.BUS):
         return box.height, box.width
     labels = port_labels(box.block)
     pitches = [max((text_width(text, PORT_TEXT) + 6 for text in side), default=0.0) for side in labels]
     ports = (len(box.block.input_ports()), len(box.block.output_ports()))
     wide = max(count * max(20.0, pitch) + 8 for count, pitch in zip(ports, pitches))
-    if shape is FaceShape.BUS:
+    if shape is Outline.BUS:
         return float(round(max(box.height, wide))), 30.0
     _, width, height = face_size(box.block)
     named = sum(any(side) for side in labels)
@@ -171,7 +172,7 @@ def _turned(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
     turned = dict(placed)
     for name, box in placed.items():
         count = len(box.inputs)
-        if face_size(box.block)[0] is not FaceShape.CIRCLE or count not in (2, 3) or box.rotation:
+        if face_size(box.block)[0] is not Outline.CIRCLE or count not in (2, 3) or box.rotation:
             continue
         centre = box.y + box.height / 2
         height = {
@@ -351,15 +352,15 @@ def sized_box(name: str, block: Block) -> Box:
     """A box of the size that suits the block, its ports along the edges, at the origin."""
     shape, width, height = face_size(block)
     inputs, outputs = len(block.input_ports()) - len(control_ports(block)), len(block.output_ports())
-    if shape is FaceShape.CARD:
+    if shape is Outline.CARD:
         labels = port_labels(block)
         if any(label for side in labels for label in side):
             widest = [max((text_width(t, PORT_TEXT) + 5 for t in side if t), default=0.0) for side in labels]
             width = max(width, face_width(block) + sum(widest) + 4)
         height = max(height, 20.0 * max(inputs, outputs) + 8 + CONTROL_ROOM * bool(control_ports(block)))
-    elif shape is FaceShape.BAR:
+    elif shape is Outline.BAR:
         height = max(height, 20.0 * max(inputs, outputs) + 4)
-    elif shape is FaceShape.BUS:
+    elif shape is Outline.BUS:
         width, height = bus_width(block, PORT_TEXT), max(height, 20.0 * max(inputs, outputs) + 4)
     return _with_ports(Box(name=name, block=block, x=0.0, y=0.0, width=float(round(width)), height=height))
 
@@ -386,7 +387,7 @@ def _with_upright_ports(box: Box) -> Box:
     left, right = box.x, box.x + box.width
     entry, leave = (right, left) if box.flipped else (left, right)
     forwards = -1 if box.flipped else 1
-    if shape is FaceShape.CIRCLE and len(into) in (2, 3):
+    if shape is Outline.CIRCLE and len(into) in (2, 3):
         # The first from behind, the second from below, a third from above, as round sums are drawn.
         cx, cy = box.x + box.width / 2, box.y + box.height / 2
         spots = [

@@ -28,7 +28,7 @@ from armblocks.diagram import (
     parameter,
     shape_of,
 )
-from armblocks.diagram.signs import FaceSign, Words, function_sign, value_text
+from armblocks.diagram.signs import FaceSign, Outline, Words, function_sign, value_text
 from armblocks.errors import InputError
 from armblocks.rounded_functions import log
 
@@ -38,6 +38,7 @@ class Gain(Block):
     """Every element times a number of its own, or all times one: y = gain * u."""
 
     title: ClassVar[str] = "Gain"
+    outline: ClassVar[Outline] = Outline.TRIANGLE
     spreads: ClassVar[tuple[str, ...]] = ("gain",)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Half the sine.",
@@ -99,6 +100,9 @@ class Sum(Block):
 
     signs: str = parameter("++", doc="one + or - for each input, such as +-")
 
+    def face_outline(self) -> Outline:
+        return Outline.CIRCLE if len(self.signs) <= 3 else Outline.CARD
+
     def check(self) -> None:
         if not self.signs or set(self.signs) - set("+-"):
             raise InputError(
@@ -130,6 +134,7 @@ class Product(Block):
     """The product of all inputs, element by element: for operators "*/" y = u1 / u2."""
 
     title: ClassVar[str] = "Product"
+    card_size: ClassVar[tuple[float, float]] = (46.0, 46.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A fast sine times a slow one: its amplitude swells and fades.",
         inputs={

@@ -23,7 +23,7 @@ from armblocks.diagram import (
     parameter,
     sample_time_parameter,
 )
-from armblocks.diagram.signs import FaceSign, Words, swing
+from armblocks.diagram.signs import FaceSign, Outline, Words, swing
 from armblocks.errors import InputError
 
 _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
@@ -39,6 +39,7 @@ class SliderGain(Block):
     """A gain to be moved between two ends while a model runs: y = gain u, low <= gain <= high."""
 
     title: ClassVar[str] = "Slider Gain"
+    outline: ClassVar[Outline] = Outline.TRIANGLE
 
     gain: float = parameter(1.0, doc="the factor")
     low: float = parameter(0.0, tunable=False, doc="the lower end of the slider")

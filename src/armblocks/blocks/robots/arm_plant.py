@@ -59,6 +59,7 @@ class ArmPlant(Block):
     """
 
     title: ClassVar[str] = "Arm Plant"
+    card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The Puma falls onto the end stop of its shoulder and, by the friction of its motors, to rest.",

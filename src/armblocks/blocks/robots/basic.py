@@ -53,6 +53,7 @@ class JTraj(Block):
     """
 
     title: ClassVar[str] = "jtraj"
+    card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     sign: ClassVar[FaceSign] = graph(
         *((k / 20, 10 * (k / 20) ** 3 - 15 * (k / 20) ** 4 + 6 * (k / 20) ** 5) for k in range(21))
     )
@@ -101,6 +102,7 @@ class Fkine(Block):
     """Forward kinematics: T = fkine(q), the pose of the tool in the world frame."""
 
     title: ClassVar[str] = "fkine"
+    card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The path of the tool of an arm with two links, in its vertical plane.",
         across=position_of("T")[0],
@@ -277,6 +279,7 @@ class ForwardDynamics(Block):
     """
 
     title: ClassVar[str] = "Robot"
+    card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Let go from the horizontal without torque: a double pendulum.",
         inputs={"tau": made("Constant", value=(0.0, 0.0)).named("no torque")},
@@ -331,6 +334,7 @@ class RobotPlot(Block):
     """The moving robot: records the poses of all its links, so that a view needs no kinematics."""
 
     title: ClassVar[str] = "plot"
+    card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The arm at six moments of its motion, with the path of the tool.",
     )

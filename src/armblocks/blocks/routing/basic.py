@@ -12,6 +12,7 @@ from casadi import SX, vertcat
 from armblocks.blocks.elementwise import common_unit, numbered_ports
 from armblocks.blocks.example_signals import CIRCLING
 from armblocks.diagram import Block, Port, Shapes, Signals, WorkedExample, parameter
+from armblocks.diagram.signs import Outline
 from armblocks.errors import InputError
 
 
@@ -20,6 +21,7 @@ class Mux(Block):
     """Scalars and vectors one after the other in one vector: y = [u1; u2; …]."""
 
     title: ClassVar[str] = "Mux"
+    outline: ClassVar[Outline] = Outline.BAR
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two scalars become one vector.",
         shown=("y",),
@@ -55,6 +57,7 @@ class Demux(Block):
     """A vector cut into equal parts: [y1; y2; …] = u; parts of one element are scalars."""
 
     title: ClassVar[str] = "Demux"
+    outline: ClassVar[Outline] = Outline.BAR
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The elements of a vector, one by one.",
         inputs={"u": CIRCLING},

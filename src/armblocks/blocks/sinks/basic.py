@@ -31,6 +31,7 @@ class Scope(Block):
     """Traces of all inputs over time."""
 
     title: ClassVar[str] = "Scope"
+    card_size: ClassVar[tuple[float, float]] = (72.0, 60.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Two signals of one unit, in one panel.",
         parameters={"inputs": 2},
@@ -51,6 +52,7 @@ class XYGraph(Block):
     """The path of one signal over another."""
 
     title: ClassVar[str] = "XY Graph"
+    card_size: ClassVar[tuple[float, float]] = (72.0, 60.0)
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="A figure of Lissajous: two sines of different frequency, one over the other.",
         inputs={"x": made("SineWave", frequency=2.0), "y": made("SineWave", frequency=3.0)},
@@ -214,6 +216,7 @@ class Terminator(Block):
     """Takes a signal that nobody needs."""
 
     title: ClassVar[str] = "Terminator"
+    card_size: ClassVar[tuple[float, float]] = (34.0, 34.0)
     sign: ClassVar[FaceSign] = Words("⊣")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="Nothing is done with the signal; a scope shows it here.",

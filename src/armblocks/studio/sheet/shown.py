@@ -8,7 +8,8 @@ from typing import Any
 
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import Block, Connection, Diagram, DiagramBlock, Parameter, ParameterKind, Placement
-from armblocks.drawing.block_faces import FaceShape, face_size, port_labels
+from armblocks.diagram.signs import Outline
+from armblocks.drawing.block_faces import face_size, port_labels
 from armblocks.drawing.diagram_drawing import block_marks
 from armblocks.drawing.diagram_layout import Box, drawn_blocks, standing_box
 from armblocks.errors import ArmblocksError
@@ -165,7 +166,7 @@ def _spots(box: Box, labels: tuple[str, ...], *, inputs: bool) -> list[PortSpot]
     ports = box.block.input_ports() if inputs else box.block.output_ports()
     spots = {spot.name: spot for spot in (box.inputs if inputs else box.outputs)}
     shown = labels if len(labels) == len(ports) else ("",) * len(ports)
-    if face_size(box.block)[0] is FaceShape.CIRCLE:
+    if face_size(box.block)[0] is Outline.CIRCLE:
         shown = ("",) * len(ports)
     return [
         PortSpot(
