@@ -1033,11 +1033,14 @@ export interface RunStarted {
 }
 /**
  * One recorded signal of a run and where its numbers lie in the columns of a frame.
+ *
+ * ``entries`` are names of the entries of a vector, such as joints; empty where they are numbered.
  */
 export interface Channel {
   name: string;
   shape: number[];
   unit: string;
+  entries: string[];
 }
 /**
  * A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``.

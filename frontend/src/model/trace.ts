@@ -6,6 +6,9 @@ export interface Trace {
   /** The same for the same line whatever else is shown. */
   key: string
   label: string
+  /** The signal and the entry of it that the label is made of: a number, or a name such as a joint's. */
+  stem: string
+  entry: string
   unit: string
   /** Name of a custom property, `trace-0`. */
   tone: string
@@ -33,9 +36,12 @@ export function tracesOf(samples: RunSamples, paths: { path: string; label: stri
         const tone = `trace-${(single ? scalars++ : element) % 8}`
         const alike = taken.get(tone) ?? 0
         taken.set(tone, alike + 1)
+        const entry = single ? '' : (found.channel.entries[element] ?? String(element + 1))
         return {
           key: `${path} ${element}`,
-          label: single ? name : `${name} ${element + 1}`,
+          label: single ? name : `${name} ${entry}`,
+          stem: name,
+          entry,
           unit: found.channel.unit,
           tone,
           dash: DASHES[alike % DASHES.length]!,

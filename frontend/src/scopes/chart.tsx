@@ -29,7 +29,7 @@ export function Chart({
   const [values, setValues] = useState<Values | null>(null)
   const measured = useWindow((s) => s.measuring || s.cursors !== null) && !path
   const handle = useRef<PlotHandle>(null)
-  const { stem, names } = shortened(traces.map(({ label }) => label))
+  const { stem, names } = shortened(traces)
   const toggle = (key: string) =>
     setHidden((now) => {
       const next = new Set(now)
@@ -148,10 +148,10 @@ function Exports({ title, traces, figure }: ExportsProps) {
   )
 }
 
-/** The elements of one signal by their numbers alone, after the name of the signal. */
-function shortened(labels: string[]): { stem: string; names: string[] } {
-  const stem = labels[0]?.match(/^(.*) 1$/)?.[1]
-  if (!stem || labels.length < 2 || !labels.every((label, k) => label === `${stem} ${k + 1}`))
-    return { stem: '', names: labels }
-  return { stem, names: labels.map((_, k) => String(k + 1)) }
+/** The entries of one signal by their numbers or names alone, after the name of the signal. */
+function shortened(traces: Trace[]): { stem: string; names: string[] } {
+  const stem = traces[0]?.stem
+  if (!stem || traces.length < 2 || !traces.every((one) => one.entry && one.label === `${stem} ${one.entry}`))
+    return { stem: '', names: traces.map(({ label }) => label) }
+  return { stem, names: traces.map(({ entry }) => entry) }
 }

@@ -90,7 +90,7 @@ function frame(run: string, first: number, time: number[], columns: number[][]):
 }
 
 test('samples of a run come in frames, go back with it, and are found by name', () => {
-  const channel = (name: string, shape: number[]): Channel => ({ name, shape, unit: 'rad' })
+  const channel = (name: string, shape: number[]): Channel => ({ name, shape, unit: 'rad', entries: [] })
   const run = new RunSamples('r', [channel('arm/q', [2]), channel('clock/y', [])], { arm: 'arm/q' })
   run.receive(
     frame(
@@ -120,5 +120,11 @@ test('samples of a run come in frames, go back with it, and are found by name', 
     ['arm 1', 'trace-0', []],
     ['arm 2', 'trace-1', []],
     ['t', 'trace-0', [7, 3]],
+  ])
+  const named = new RunSamples('r', [{ ...channel('arm/q', [2]), entries: ['shoulder', 'elbow'] }], {})
+  named.receive(frame('r', 0, [0], [[1], [2]]))
+  expect(tracesOf(named, [{ path: 'arm/q', label: '' }]).map(({ label }) => label)).toEqual([
+    'arm/q shoulder',
+    'arm/q elbow',
   ])
 })

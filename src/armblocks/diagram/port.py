@@ -13,13 +13,15 @@ class Port:
     """One input or output of a block.
 
     ``shape`` is the only shape that the port takes or gives, or ``None`` where it follows from what is
-    connected. ``unit`` is SI, ``""`` where the port has none or takes that of its signal.
+    connected. ``unit`` is SI, ``""`` where the port has none or takes that of its signal. ``names`` are
+    those of the entries of a vector, such as joints, where the block knows them.
     """
 
     name: str
     doc: str
     unit: str = ""
     shape: Shape | None = None
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

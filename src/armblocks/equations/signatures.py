@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,11 +23,15 @@ Shape = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Slot:
-    """One named quantity: its shape and its SI unit (``""`` where it has none or they differ)."""
+    """One named quantity: its shape and its SI unit (``""`` where it has none or they differ).
+
+    ``entries`` are names of the entries of a vector, such as those of joints; without them they are numbered.
+    """
 
     name: str
     shape: Shape = ()
     unit: str = ""
+    entries: tuple[str, ...] = ()
 
     @property
     def size(self) -> int:
@@ -36,11 +40,18 @@ class Slot:
 
     @property
     def elements(self) -> tuple[str, ...]:
-        """A name for each scalar, row by row: ``clock/y``; ``rne/tau[0]``, …; ``fkine/T[0,3]``."""
+        """A name for each scalar, row by row: ``clock/y``; ``fkine/T[0,3]``; ``rne/tau[elbow]``, …"""
         if not self.shape:
             return (self.name,)
+        return tuple(f"{self.name}[{entry}]" for entry in self.entry_names)
+
+    @property
+    def entry_names(self) -> tuple[str, ...]:
+        """A name for each entry: ``entries``, or indices, ``0`` or ``0,3``; one empty name of a scalar."""
+        if self.entries:
+            return self.entries
         places = itertools.product(*(range(count) for count in self.shape))
-        return tuple(f"{self.name}[{','.join(map(str, place))}]" for place in places)
+        return tuple(",".join(map(str, place)) for place in places)
 
 
 @dataclass(frozen=True)
@@ -94,6 +105,16 @@ class Signature:
         if name not in self._by_name:
             raise UnknownNameError("quantity", name, self.names)
         return self._by_name[name]
+
+    def with_entries(self, entries: Mapping[str, tuple[str, ...]]) -> Signature:
+        """The same quantities, some of them with names of their entries."""
+        if not entries:
+            return self
+        return Signature(
+            tuple(
+                replace(slot, entries=entries[slot.name]) if slot.name in entries else slot for slot in self
+            )
+        )
 
     def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
         """Lay named values, shape of their slot each, into a new flat vector of shape ``(size,)``."""

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from armblocks.analysis.operating_point import OperatingPoint
 from armblocks.diagram import Diagram, content_key, trace_diagram, with_parameters
-from armblocks.equations import HybridSystem, SimulationOptions
+from armblocks.diagram.entry_names import entry_names
+from armblocks.equations import HybridSystem, Signature, SimulationOptions
 from armblocks.errors import InputError
 from armblocks.face.called import called_functions
 from armblocks.face.diagram_run import DiagramRun, tuned_parameters
@@ -50,6 +51,12 @@ class CompiledDiagram:
         key = content_key(self.diagram)
         return compile_system(self.system) if key is None else recall_system(key, lambda: self.system)
 
+    @cached_property
+    def _signals_layout(self) -> Signature:
+        """The layout of the signals, with the names of joints."""
+        layout = self.compiled.signals_layout
+        return layout.with_entries(entry_names(self.diagram, {slot.name: slot.shape for slot in layout}))
+
     @takes_settings
     def simulate(
         self,
@@ -66,7 +73,7 @@ class CompiledDiagram:
         tuned, values = self._tuned(parameters)
         options = with_settings(options or tuned.diagram.settings, settings)
         calls = called_functions(tuned.diagram, tuned.compiled)
-        run = Simulation(tuned.compiled, options, values, initial_state, log, calls)
+        run = Simulation(tuned.compiled, options, values, initial_state, log, calls, tuned._signals_layout)
         result = run_to_the_end(run, progress)
         if tuned._watch is None:
             tuned._watch = LimitWatch(tuned.diagram, result)
@@ -89,7 +96,10 @@ class CompiledDiagram:
         diagram = with_parameters(self.diagram, parameters) if parameters else self.diagram
         options = with_settings(options or diagram.settings, settings)
         calls = called_functions(tuned.diagram, tuned.compiled)
-        return DiagramRun(diagram, Simulation(tuned.compiled, options, values, initial_state, log, calls))
+        return DiagramRun(
+            diagram,
+            Simulation(tuned.compiled, options, values, initial_state, log, calls, tuned._signals_layout),
+        )
 
     def _tuned(
         self, parameters: Mapping[str, object] | None

@@ -222,6 +222,9 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
                 labels += joined
                 continue
             short = name if len(numbers) > 1 and fits_beside(name) else name.rpartition("/")[2]
+            if slot.entries:
+                labels += slot.entries[: len(entries)]
+                continue
             labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
         # One prefix for all of a panel, so that they can be compared.
         values, unit = for_people(np.hstack(columns), unit)
@@ -300,7 +303,7 @@ def _spectra(
         path = result.resolve(f"{block}/{signal}")
         slot = result.signals_layout[path]
         columns = result[path].reshape(len(result.time), -1)
-        for index, column in list(zip(np.ndindex(*slot.shape), columns.T))[:_FIRST_ENTRIES]:
+        for element, column in list(zip(slot.elements, columns.T))[:_FIRST_ENTRIES]:
             found = signal_spectrum(
                 result.time,
                 column,
@@ -311,8 +314,7 @@ def _spectra(
                 begin=settings.begin,
                 remove_mean=settings.remove_mean,
             )
-            label = f"{path}[{','.join(map(str, index))}]" if index else path
-            lines.append((label, _SPELLED.get(slot.unit, slot.unit), found))
+            lines.append((element, _SPELLED.get(slot.unit, slot.unit), found))
     return lines, settings
 
 

@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armblocks.simulation.run_data import element_names
-
 if TYPE_CHECKING:
     from armblocks.equations import Slot
     from armblocks.simulation.run_data import RunData
@@ -90,12 +88,12 @@ def _panel(time: Array, values: Array, slot: Slot) -> str:
 
 
 def _legend(slot: Slot, chosen: list[int]) -> str:
-    """The index of each component in the colour of its trace; nothing for a scalar."""
+    """The name or index of each component in the colour of its trace; nothing for a scalar."""
     if not slot.shape:
         return ""
-    names = element_names(slot)
+    names = slot.entry_names
     labels = (
-        f'<i style="color:{TRACES[k % len(TRACES)]}">{names[component][len(slot.name) + 1 : -1]}</i>'
+        f'<i style="color:{TRACES[k % len(TRACES)]}">{escape(names[component])}</i>'
         for k, component in enumerate(chosen)
     )
     return f" <b>{' '.join(labels)}</b>"

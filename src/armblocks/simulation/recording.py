@@ -66,7 +66,9 @@ class Recorded:
 class Recording:
     """The stretches of a run, and the file that a logged one is written to while it goes on."""
 
-    def __init__(self, compiled: CompiledSystem, instants: Instants, log: LogRequest | None) -> None:
+    def __init__(
+        self, compiled: CompiledSystem, instants: Instants, log: LogRequest | None, layout: Signature
+    ) -> None:
         """Raises what opening a log raises."""
         self._compiled = compiled
         self.stretches: list[Stretch] = []
@@ -77,7 +79,7 @@ class Recording:
             # A run without a log loads no writers.
             from armblocks.simulation.run_log import RunLog, window_rows
 
-            layout, states = compiled.signals_layout, compiled.states.size
+            states = compiled.states.size
             self._log = RunLog(log, layout, compiled.aliases, states, instants.count)
             self.window = window_rows(1 + states + layout.size)
 

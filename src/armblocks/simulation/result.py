@@ -51,7 +51,8 @@ class SimulationResult(RunData):
         width = max((len(name) for name in self.names), default=0)
         for slot in self.signals_layout:
             shape = "x".join(map(str, slot.shape)) or "scalar"
-            lines.append(f"  {slot.name:<{width}}  {shape:<6} {slot.unit}".rstrip())
+            entries = f"{slot.unit:<8} {', '.join(slot.entries)}" if slot.entries else slot.unit
+            lines.append(f"  {slot.name:<{width}}  {shape:<6} {entries}".rstrip())
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:

@@ -155,5 +155,8 @@ class RunData:
         )
 
     def columns(self) -> tuple[str, ...]:
-        """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[0]``, ``fkine/T[0,3]``."""
+        """A name for each scalar of ``signals``: ``clock/y``, ``rne/tau[link2]``, ``fkine/T[0,3]``.
+
+        Entries of joint vectors have the names of the joints.
+        """
         return tuple(name for slot in self.signals_layout for name in element_names(slot))

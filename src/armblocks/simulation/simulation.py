@@ -9,7 +9,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armblocks.equations import SimulationOptions
+from armblocks.equations import Signature, SimulationOptions
 from armblocks.errors import InputError, SimulationError
 from armblocks.integration.native_integrator import RunPoint
 from armblocks.integration.system import CompiledSystem
@@ -54,6 +54,7 @@ class Simulation:
         initial_state: RunState | None = None,
         log: LogRequest | None = None,
         calls: Sequence[CalledFunction] = (),
+        signals_layout: Signature | None = None,
     ) -> None:
         if {function.block for function in calls} != set(compiled.called):
             raise InputError(
@@ -71,7 +72,9 @@ class Simulation:
         start = 0.0 if initial_state is None else initial_state.time
         self._plan = make_plan(compiled, options, start, logged=log is not None)
         self._method = RunMethod(compiled, options, self._plan, initial_state)
-        self._recording = Recording(compiled, self._plan.instants, log)
+        self.signals_layout = signals_layout or compiled.signals_layout
+        """The layout of the compiled system, or one like it that also names entries of signals."""
+        self._recording = Recording(compiled, self._plan.instants, log, self.signals_layout)
         self._message = ""
         self._stopped = False
         self._failure: SimulationError | None = None
@@ -322,7 +325,7 @@ class Simulation:
         result = SimulationResult(
             name=compiled.name,
             time=good.time,
-            signals_layout=compiled.signals_layout,
+            signals_layout=self.signals_layout,
             signals=good.signals,
             states_layout=compiled.states,
             states=good.states,

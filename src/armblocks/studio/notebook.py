@@ -98,8 +98,8 @@ def _record(views: Sequence[tuple[str, View]], result: SimulationResult) -> tupl
     run = {
         "stopTime": float(result.time[-1]),
         "channels": [
-            {"name": name, "shape": list(value.shape[1:]), "unit": result.units.get(name, "")}
-            for name, value in zip(names, values, strict=True)
+            {"name": slot.name, "shape": list(slot.shape), "unit": slot.unit, "entries": list(slot.entries)}
+            for slot in (result.signals_layout[name] for name in names)
         ],
         "views": [
             {

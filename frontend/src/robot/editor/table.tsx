@@ -69,7 +69,7 @@ export function LinkTable({
                     column={column}
                     angles={angles}
                     locked={link.locked[column.name]}
-                    place={column.name === link.variable ? `q${row + 1}` : ''}
+                    place={column.name === link.variable ? 'q' : ''}
                     finding={shown.findings.find(
                       (finding) => finding.link === link.name && finding.columns.includes(column.name),
                     )}

@@ -25,22 +25,29 @@ def coordinate_unit(robot: Robot) -> str:
 
 def q_port(robot: Robot, name: str = "q") -> Port:
     """Joint coordinates (n,)."""
-    return Port(name, "joint coordinates", coordinate_unit(robot), (robot.n,))
+    return Port(name, "joint coordinates", coordinate_unit(robot), (robot.n,), robot.joint_names)
 
 
 def qd_port(robot: Robot, name: str = "qd") -> Port:
     """Joint speeds (n,)."""
-    return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,))
+    return Port(name, "joint speeds", rate_unit(coordinate_unit(robot)), (robot.n,), robot.joint_names)
 
 
 def qdd_port(robot: Robot, name: str = "qdd") -> Port:
     """Joint accelerations (n,)."""
-    return Port(name, "joint accelerations", rate_unit(rate_unit(coordinate_unit(robot))), (robot.n,))
+    return Port(
+        name,
+        "joint accelerations",
+        rate_unit(rate_unit(coordinate_unit(robot))),
+        (robot.n,),
+        robot.joint_names,
+    )
 
 
 def tau_port(robot: Robot, doc: str) -> Port:
     """Joint forces (n,)."""
-    return Port("tau", doc, {"rad": "N m", "m": "N"}.get(coordinate_unit(robot), ""), (robot.n,))
+    unit = {"rad": "N m", "m": "N"}.get(coordinate_unit(robot), "")
+    return Port("tau", doc, unit, (robot.n,), robot.joint_names)
 
 
 def check_joint_values(block: Block, robot: Robot, name: str) -> None:

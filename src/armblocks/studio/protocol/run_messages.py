@@ -22,11 +22,15 @@ class ViewOf(Message):
 
 
 class Channel(Message):
-    """One recorded signal of a run and where its numbers lie in the columns of a frame."""
+    """One recorded signal of a run and where its numbers lie in the columns of a frame.
+
+    ``entries`` are names of the entries of a vector, such as joints; empty where they are numbered.
+    """
 
     name: str
     shape: list[int]
     unit: str
+    entries: list[str]
 
 
 class Tunable(Message):

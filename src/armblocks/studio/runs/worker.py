@@ -234,8 +234,10 @@ class _Run:
                 run=self.key,
                 stop_time=run.stop_time,
                 channels=[
-                    say.Channel(name=slot.name, shape=list(slot.shape), unit=slot.unit)
-                    for slot in compiled.signals_layout
+                    say.Channel(
+                        name=slot.name, shape=list(slot.shape), unit=slot.unit, entries=list(slot.entries)
+                    )
+                    for slot in run.simulation.signals_layout
                 ],
                 views=[
                     say.ViewOf(

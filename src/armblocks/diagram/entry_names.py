@@ -1,0 +1,79 @@
+"""Names of the entries of vectors: stated by ports, kept by blocks that work entry by entry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from armblocks.diagram.block import Block
+from armblocks.diagram.diagram import Diagram
+from armblocks.diagram.hierarchy import flat_diagram
+from armblocks.diagram.parameter import ParameterKind
+from armblocks.diagram.port import Port, PortRef
+from armblocks.equations import Shape
+
+
+def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, tuple[str, ...]]:
+    """Names of the entries of signals, by path; a signal about which nothing is known is left out.
+
+    A port states names where its block has a robot. They hold for the signal at the port, and for all
+    vectors of the same length that blocks work out of it entry by entry. A signal that is called by two rows
+    of names has none. ``shapes`` are those of all signals. For people only.
+    """
+    flat = flat_diagram(diagram)
+    if not any(_may_state_names(block) for block in flat.blocks.values()):
+        return {}
+    groups = _Groups()
+    stated: list[tuple[str, tuple[str, ...]]] = []
+    for name, block in flat.blocks.items():
+        inputs = {port: str(flat.drivers[PortRef(name, port.name)]) for port in block.input_ports()}
+        outputs = {port: f"{name}/{port.name}" for port in block.output_ports()}
+        for one, other in _alike(block, inputs, outputs):
+            if shapes.get(one) == shapes.get(other) and len(shapes.get(one, ())) == 1:
+                groups.join(one, other)
+        stated += [(path, port.names) for port, path in {**inputs, **outputs}.items() if port.names]
+    found: dict[str, set[tuple[str, ...]]] = {}
+    for path, names in stated:
+        if shapes.get(path) == (len(names),):
+            found.setdefault(groups.of(path), set()).add(names)
+    named = {path: found.get(groups.of(path), set()) for path in shapes}
+    return {path: next(iter(rows)) for path, rows in named.items() if len(rows) == 1}
+
+
+def _may_state_names(block: Block) -> bool:
+    return any(rule.kind is ParameterKind.ROBOT for rule in block.parameters())
+
+
+def _alike(
+    block: Block, inputs: Mapping[Port, str], outputs: Mapping[Port, str]
+) -> Iterator[tuple[str, str]]:
+    """Pairs of signals at a block whose entries belong together, if they have one shape."""
+    by_name = {port.name: path for port, path in outputs.items()}
+    yield from ((by_name[one], by_name[other]) for one, other in block.output_rates.items())
+    yield from ((by_name[one], by_name.get(other, "")) for one, other in block.time_derivatives.items())
+    if type(block).output_shapes is Block.output_shapes and not block.virtual:
+        # A block without a rule of its own for shapes works entry by entry.
+        ends = [path for port, path in outputs.items() if port.shape is None]
+        ends += [path for port, path in inputs.items() if port.shape is None]
+        yield from ((ends[0], end) for end in ends[1:])
+
+
+class _Groups:
+    """Signals that belong together."""
+
+    def __init__(self) -> None:
+        self._next: dict[str, str] = {}
+
+    def of(self, path: str) -> str:
+        """The signal that stands for the group of another."""
+        root = path
+        while root in self._next:
+            root = self._next[root]
+        while path != root:
+            self._next[path], path = root, self._next[path]
+        return root
+
+    def join(self, one: str, other: str) -> None:
+        """Put the groups of two signals together."""
+        first, second = self.of(one), self.of(other)
+        if first != second:
+            self._next[second] = first
