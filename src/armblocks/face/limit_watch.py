@@ -31,7 +31,7 @@ class LimitWatch:
         """
         for (arm, q_low, q_high, qd_most, tau_most), turning in zip(self._arms, self._turning):
             q = result[arm.q]
-            if np.abs(q[:1]).max(initial=0.0) > LARGEST_ANGLE:
+            if any(abs(value) > LARGEST_ANGLE for value in q[:1].ravel().tolist()):
                 warn_of_degrees(q[:1, turning], f"{arm.q} at the start")
             qd = None if arm.qd is None else result[arm.qd]
             tau = None if arm.tau is None else result[arm.tau]

@@ -25,6 +25,9 @@ class RunSettings(TypedDict, total=False):
     atol: float
 
 
+_NAMES = frozenset(RunSettings.__annotations__)
+
+
 class _OfTheDiagram:
     """Default of a setting in signatures: the diagram's own value."""
 
@@ -52,7 +55,7 @@ def takes_settings(call: Call) -> Call:
 def check_settings(settings: Mapping[str, object], call: Callable[..., object]) -> None:
     """Raise ``UnknownNameError`` for a keyword argument that ``call`` does not have."""
     for name in settings:
-        if name not in RunSettings.__annotations__:
+        if name not in _NAMES:
             known = [entry for entry in inspect.signature(call).parameters if entry != name]
             raise UnknownNameError("argument", name, known, where=call.__name__)
 
