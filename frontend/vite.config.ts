@@ -28,7 +28,8 @@ const unseen: Exclude<NonNullable<NonNullable<UserConfig['css']>['postcss']>, st
 
 /** What the style sheet of the font says that this part of it has: `unicode-range` of the Latin part. */
 const LATIN =
-  'U+20-7E,U+A0-FF,U+131,U+152-153,U+2BB-2BC,U+2C6,U+2DA,U+2DC,U+304,U+308,U+329,U+2000-206F,U+20AC,U+2122,U+2191,U+2193,U+2212,U+2215,U+FEFF,U+FFFD'
+  'U+20-7E,U+A0-FF,U+131,U+152-153,U+2BB-2BC,U+2C6,U+2DA,U+2DC,U+304,U+308,U+329,U+2000-206F,' +
+  'U+20AC,U+2122,U+2191,U+2193,U+2212,U+2215,U+FEFF,U+FFFD'
 
 function characters(ranges: string): string {
   return ranges
@@ -43,7 +44,10 @@ function characters(ranges: string): string {
     .join('')
 }
 
-/** The part of the sans that every page needs, without the weights and the alternates that none shows: half the size. */
+/**
+ * The part of the sans that every page needs, without the weights and the alternates that none shows: half
+ * the size.
+ */
 function lighterSans(): Plugin {
   return {
     name: 'lighter-sans',

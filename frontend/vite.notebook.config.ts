@@ -3,7 +3,10 @@ import { defineConfig } from 'vite'
 
 import { bundledPackages } from './bundled_packages'
 
-/** The views that a notebook shows, as one script and one style sheet: `studio/notebook.py` puts them into a frame. */
+/**
+ * The views that a notebook shows, as one script and one style sheet: `studio/notebook.py` puts them into a
+ * frame.
+ */
 export default defineConfig({
   plugins: [react(), bundledPackages()],
   define: { 'process.env.NODE_ENV': '"production"' },

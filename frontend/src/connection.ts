@@ -31,9 +31,9 @@ const SILENCE_MS = 2500
 const DEAD_MS = 10_000
 
 /**
- * The websocket to the server. What was not answered when the line broke, and what is asked while it is down, is sent
- * when it is back and the page has its document again (`resend`): edits carry keys, so the server does each once, and
- * they outlive a reload of the page.
+ * The websocket to the server. What was not answered when the line broke, and what is asked while it is down,
+ * is sent when it is back and the page has its document again (`resend`): edits carry keys, so the server
+ * does each once, and they outlive a reload of the page.
  */
 export class Connection {
   private socket: WebSocket | null = null

@@ -1,7 +1,10 @@
 import { create } from 'zustand'
 import { ask, useStudio } from './store'
 
-/** Every dialog that opens by itself; that of a block opens with `useStudio().edit`, and the tour has its own stops. */
+/**
+ * Every dialog that opens by itself; that of a block opens with `useStudio().edit`, and the tour has its own
+ * stops.
+ */
 type Dialog =
   | 'commands'
   | 'find'
@@ -20,14 +23,19 @@ interface Dialogs {
   times: number
   /** What is typed into the lists that are searched. */
   typed: string
-  /** The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the one whose sheet is on the screen. */
+  /**
+   * The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the one whose sheet is on the
+   * screen.
+   */
   of: string
   ofSheet: boolean
   /** Where a new block goes, in screen px; `null` is a free place. */
   at: { x: number; y: number } | null
 }
 
-/** Which dialog is open: known before the dialogs themselves, which come after the first picture of the page. */
+/**
+ * Which dialog is open: known before the dialogs themselves, which come after the first picture of the page.
+ */
 export const useDialogs = create<Dialogs>(() => ({
   open: null,
   times: 0,

@@ -1,7 +1,7 @@
 /**
- * Views that draw what changes outside of React's state: samples, the time cursor, sizes. Each view is called in the
- * animation frame after a change, and compares there what it shows with what it drew last. While nothing changes the
- * page requests no frames.
+ * Views that draw what changes outside of React's state: samples, the time cursor, sizes. Each view is called
+ * in the animation frame after a change, and compares there what it shows with what it drew last. While
+ * nothing changes the page requests no frames.
  */
 type Look = (now: number) => void
 
@@ -16,7 +16,10 @@ export function changed(): void {
   })
 }
 
-/** Call `look` in the next animation frame and in the frame after every change; returns the function that ends this. */
+/**
+ * Call `look` in the next animation frame and in the frame after every change; returns the function that ends
+ * this.
+ */
 export function watch(look: Look): () => void {
   looks.add(look)
   changed()

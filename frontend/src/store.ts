@@ -135,7 +135,9 @@ export async function ask<T = unknown>(request: Request): Promise<T | undefined>
 /** By what the server tells the edits of this page from those of others. */
 export const author = newKey()
 
-/** What goes with everything that changes a drawing: which, what of it this page saw, and a key to do it once. */
+/**
+ * What goes with everything that changes a drawing: which, what of it this page saw, and a key to do it once.
+ */
 function alteration(document: OpenDocument) {
   return { document: document.state.document, key: newKey(), base: document.state.version, author }
 }

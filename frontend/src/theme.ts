@@ -61,7 +61,8 @@ export const theme = createTheme({
   autoContrast: true,
   defaultRadius: 'sm',
   components: {
-    // The colours of titles and labels on their own tint are too pale to read; the tints are those of every message.
+    // The colours of titles and labels on their own tint are too pale to read; the tints are those of every
+    // message.
     Alert: {
       styles: { title: { color: 'var(--ink)' } },
       vars: (_theme: MantineTheme, { color }: AlertProps) => {

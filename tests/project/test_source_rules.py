@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-SOURCE = Path(__file__).resolve().parents[2] / "src" / "armblocks"
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = ROOT / "src" / "armblocks"
+FRONTEND = ROOT / "frontend"
 MODULES = sorted(SOURCE.rglob("*.py"))
 NAMES = [path.relative_to(SOURCE).as_posix() for path in MODULES]
 
@@ -27,6 +29,7 @@ DOORS = {"studio/server/launch.py": {"socket", "urllib"}}
 """Files that may import one of these, for what they are there for."""
 VAGUE_NAMES = {"utils", "util", "helpers", "helper", "manager", "core", "misc", "common"}
 LONGEST_FUNCTION = 80
+LONGEST_LINE = 110
 CONTROL_FLOW = re.compile(r"\b(br label|br i1|switch i\d+|indirectbr) | = phi |\.(label|branch)\(")
 """Text of LLVM IR that jumps, branches or merges, and calls that would write it."""
 
@@ -113,6 +116,18 @@ def test_functions_can_be_read_in_one_sitting(nodes: dict[str, list[ast.AST]]) -
         for function in inside
         if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
         and (lines := (function.end_lineno or 0) - function.lineno + 1) > LONGEST_FUNCTION
+    ] == []
+
+
+def test_lines_of_the_front_end_fit() -> None:
+    """Of Python, ruff checks the same; prettier breaks code, but neither comments nor text."""
+    sources = (path for folder in ("src", "tests") for path in (FRONTEND / folder).rglob("*.ts*"))
+    assert [
+        f"{path.relative_to(FRONTEND).as_posix()}:{number}"
+        for path in sources
+        if path.name != "protocol.ts"  # generated
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if len(line) > LONGEST_LINE
     ] == []
 
 

@@ -5,8 +5,9 @@ import { SCROLLED } from '../scrolled'
 import { change, useStudio } from '../store'
 
 /**
- * How a port is chosen: by typing. Without `selectFirstOptionOnDropdownOpen`, Mantine forgets the highlighted option in a
- * timer after the list opens; on a busy machine that is after the first keys, and Enter chooses nothing.
+ * How a port is chosen: by typing. Without `selectFirstOptionOnDropdownOpen`, Mantine forgets the highlighted
+ * option in a timer after the list opens; on a busy machine that is after the first keys, and Enter chooses
+ * nothing.
  */
 const TYPED = {
   ...SCROLLED,

@@ -7,7 +7,10 @@ export const BLOCK_TYPE = 'application/x-armblocks-block'
 /** px: where blocks may stand. */
 export const GRID = 5
 
-/** Put a new block of a type on the sheet, its middle at a point and in a wire if one is given; it is selected then. */
+/**
+ * Put a new block of a type on the sheet, its middle at a point and in a wire if one is given; it is selected
+ * then.
+ */
 export function insertBlock(type: string, at: { x: number; y: number }, wire?: Wire): void {
   const { document, library, select } = useStudio.getState()
   const kind = library.get(type)

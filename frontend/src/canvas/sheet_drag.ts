@@ -8,10 +8,16 @@ import { move } from './sheet_actions'
 import type { SheetNode } from './sheet_graph'
 import type { WireEdgeType } from './wire_edge'
 
-/** What the mouse holds: blocks that it takes out of their wires, and one without wires, which goes into a wire that it is dropped on. */
+/**
+ * What the mouse holds: blocks that it takes out of their wires, and one without wires, which goes into a
+ * wire that it is dropped on.
+ */
 const NOTHING_HELD: { freed: readonly string[]; loose: string | null } = { freed: [], loose: null }
 
-/** What the mouse does on a sheet: how far it has moved blocks, what it holds, and the wire that a block would go into. */
+/**
+ * What the mouse does on a sheet: how far it has moved blocks, what it holds, and the wire that a block would
+ * go into.
+ */
 export function useSheetDrag(blocks: Record<string, SheetBlock>, notes: Record<string, SheetNote>) {
   const [drag, setDrag] = useState<Places>({})
   const [{ freed, loose }, setHeld] = useState(NOTHING_HELD)

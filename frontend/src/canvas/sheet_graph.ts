@@ -14,7 +14,10 @@ const NO_FINDINGS: Finding[] = []
 const NO_POINTS: Point[] = []
 const SCALAR: WireKind = { shape: [], unit: '' }
 
-/** Things by name, made anew only where what they are made from is other than before: so an edit draws what it touches. */
+/**
+ * Things by name, made anew only where what they are made from is other than before: so an edit draws what it
+ * touches.
+ */
 class Kept<T> {
   private known = new Map<string, { from: readonly unknown[]; made: T }>()
   private seen = new Map<string, { from: readonly unknown[]; made: T }>()
@@ -116,7 +119,8 @@ export class SheetGraph {
       dotted.add(wire.source)
       const path = net?.paths.get(key) ?? NO_POINTS
       const rank = kind.bus ? 3 : Math.min(kind.shape.length, 2)
-      const label = `${wire.source} to ${wire.target}${kind.shape.length ? `, ${kind.shape.join(' × ')}` : ''}${kind.unit ? `, ${kind.unit}` : ''}`
+      const carried = [kind.shape.join(' × '), kind.unit].filter(Boolean)
+      const label = [`${wire.source} to ${wire.target}`, ...carried].join(', ')
       const selected = chosen.has(key)
       return this.wires.get(key, [path, dots, net, rank, label, selected, wire, key === into], () => ({
         id: key,

@@ -39,7 +39,10 @@ export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'besi
   return inputs.some(({ y }) => y >= height) ? 'above' : 'below' // wires enter a round sum from below
 }
 
-/** How the sheet is fitted into its panel: nothing of it lies under the buttons at the left, and the lowest names are seen. */
+/**
+ * How the sheet is fitted into its panel: nothing of it lies under the buttons at the left, and the lowest
+ * names are seen.
+ */
 export const FIT: FitViewOptions = {
   padding: { top: '16px', right: '24px', bottom: '32px', left: '56px' },
   maxZoom: 1.25,
@@ -72,8 +75,8 @@ function end(
 }
 
 /**
- * The wires of a sheet. What was laid is kept as long as no end of the net moved and no block was put on its way, so an
- * edit costs what it touches and not the whole sheet.
+ * The wires of a sheet. What was laid is kept as long as no end of the net moved and no block was put on its
+ * way, so an edit costs what it touches and not the whole sheet.
  */
 export class SheetRoutes {
   private routed = new Map<string, RoutedNet>()

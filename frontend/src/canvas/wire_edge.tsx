@@ -14,7 +14,9 @@ export type WireEdgeType = Edge<
     rank: number
     label: string
     bent: boolean
-    /** The whole way from the source, of which `path` is the last part where the wire branches from another. */
+    /**
+     * The whole way from the source, of which `path` is the last part where the wire branches from another.
+     */
     way: () => Point[]
   },
   'wire'
@@ -25,7 +27,10 @@ export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire:
 
 const SNAP = 7
 
-/** A wire along its way: thin for a scalar, heavier for a vector, double for a matrix, three lines for a bus. Its pieces can be dragged. */
+/**
+ * A wire along its way: thin for a scalar, heavier for a vector, double for a matrix, three lines for a bus.
+ * Its pieces can be dragged.
+ */
 export const WireEdge = memo(function WireEdge({
   id,
   data,
@@ -114,7 +119,9 @@ function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: num
   )
 }
 
-/** Where a piece comes to lie: level with the next parallel pieces where it is near them, else on the grid. */
+/**
+ * Where a piece comes to lie: level with the next parallel pieces where it is near them, else on the grid.
+ */
 function level(way: Point[], piece: number, wanted: number): number {
   const axis = isFlat(way, piece) ? 1 : 0
   const others = way.filter((_, k) => k !== piece && k !== piece + 1).map((point) => point[axis])

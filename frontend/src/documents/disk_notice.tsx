@@ -11,7 +11,10 @@ interface Standing {
   journaled: boolean
 }
 
-/** That somebody else has written the file of a drawing or robot, or that nothing keeps its edits: with what can be done. */
+/**
+ * That somebody else has written the file of a drawing or robot, or that nothing keeps its edits: with what
+ * can be done.
+ */
 export function FileNotice({
   path,
   disk,

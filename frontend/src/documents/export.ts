@@ -2,7 +2,10 @@ import { useStudio } from '../store'
 
 const CHECK = { headers: { 'X-Armblocks': '1' } }
 
-/** Save a drawing of the sheet on the screen: what `armblocks diagram` writes, in the colours of this page for SVG and PNG. */
+/**
+ * Save a drawing of the sheet on the screen: what `armblocks diagram` writes, in the colours of this page for
+ * SVG and PNG.
+ */
 export function exportDrawing(kind: 'svg' | 'png' | 'pdf'): void {
   const { document } = useStudio.getState()
   if (!document) return

@@ -18,22 +18,30 @@ const STOPS: Stop[] = [
   {
     at: '.sheet',
     title: 'The sheet',
-    text: 'Blocks and wires of the model. Drag from port to port to wire; drag a piece of a wire to lead it elsewhere; double-click a block to open it.',
+    text:
+      'Blocks and wires of the model. Drag from port to port to wire; drag a piece of a wire to lead ' +
+      'it elsewhere; double-click a block to open it.',
   },
   {
     at: '.palette',
     title: 'The library',
-    text: 'All blocks by family. Drag one to the sheet, onto a wire to put it in between. Faster: type its name on the sheet.',
+    text:
+      'All blocks by family. Drag one to the sheet, onto a wire to put it in between. Faster: type its ' +
+      'name on the sheet.',
   },
   {
     at: '.run-controls',
     title: 'Run',
-    text: 'Run (Ctrl+Enter), pause, step forward and back, stop. Beside it the stop time and the speed against real time.',
+    text:
+      'Run (Ctrl+Enter), pause, step forward and back, stop. Beside it the stop time and the speed ' +
+      'against real time.',
   },
   {
     at: '.scopes-panel, .chart',
     title: 'Scopes',
-    text: 'What was recorded: zoom with the mouse, measure between cursors, export. Click a wire on the sheet to log its signal too.',
+    text:
+      'What was recorded: zoom with the mouse, measure between cursors, export. Click a wire on the ' +
+      'sheet to log its signal too.',
   },
   {
     at: '.timeline',
@@ -48,7 +56,9 @@ const STOPS: Stop[] = [
   {
     at: '[aria-label="Menu"]',
     title: 'Where to go on',
-    text: 'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every block, ? lists all keys.',
+    text:
+      'New diagrams, files and examples are in this menu. Ctrl+K finds every command, Ctrl+F every ' +
+      'block, ? lists all keys.',
   },
 ]
 

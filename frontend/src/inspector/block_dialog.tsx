@@ -8,7 +8,10 @@ import { valueText } from './value_text'
 
 const CHECK_DELAY_MS = 200
 
-/** The parameters of a block, made from its own declaration: what each is, its unit, what is allowed, what it means. */
+/**
+ * The parameters of a block, made from its own declaration: what each is, its unit, what is allowed, what it
+ * means.
+ */
 export function BlockDialog() {
   const name = useStudio((s) => s.editing)
   const block = useStudio((s) => (s.editing ? s.document?.blocks[s.editing] : undefined))

@@ -19,7 +19,10 @@ const KINDS = [
 ]
 const COLUMNS = ['Name', 'Kind', 'Default', 'Unit', 'Range or choices', 'What it is']
 
-/** A parameter as its row is typed; `range` is `0 … 10`, `> 0`, or for a choice what may be chosen, apart by commas. */
+/**
+ * A parameter as its row is typed; `range` is `0 … 10`, `> 0`, or for a choice what may be chosen, apart by
+ * commas.
+ */
 interface Row {
   key: string
   was: string
@@ -33,7 +36,10 @@ interface Row {
 
 const close = () => show(null)
 
-/** The parameters of a subsystem or of the model: declared, renamed, ordered. Blocks inside may have formulas over them. */
+/**
+ * The parameters of a subsystem or of the model: declared, renamed, ordered. Blocks inside may have formulas
+ * over them.
+ */
 export function MaskDialog() {
   const opened = useDialogs((s) => s.open === 'mask')
   const block = useDialogs((s) => s.of)
@@ -313,7 +319,10 @@ function Order({ name, first, last, swap, remove }: OrderProps) {
   )
 }
 
-/** Where a mask lies: a block of the sheet on the screen, or that whole sheet, which is a block of the one around it. */
+/**
+ * Where a mask lies: a block of the sheet on the screen, or that whole sheet, which is a block of the one
+ * around it.
+ */
 function place(): { inside: string[]; block: string } {
   const { of, ofSheet } = useDialogs.getState()
   const inside = useStudio.getState().document?.inside ?? []

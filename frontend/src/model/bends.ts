@@ -1,8 +1,8 @@
 import { corners, type Point, type RoutedNet } from './router'
 
 /**
- * Ways that a person draws: a wire's straight pieces are dragged, and what they are then is kept as `bends`, the
- * coordinates of the pieces in turn (see `bent` in the router).
+ * Ways that a person draws: a wire's straight pieces are dragged, and what they are then is kept as `bends`,
+ * the coordinates of the pieces in turn (see `bent` in the router).
  */
 
 const STUB = 15
@@ -37,7 +37,10 @@ function lies(p: Point, a: Point, b: Point): boolean {
   )
 }
 
-/** The coordinates of the pieces between the first, which goes with the source, and the last, which goes with the target. */
+/**
+ * The coordinates of the pieces between the first, which goes with the source, and the last, which goes with
+ * the target.
+ */
 function pieces(way: readonly Point[]): number[] {
   const between: number[] = []
   for (let k = 1; k < way.length - 2; k++) between.push(isFlat(way, k) ? way[k]![1] : way[k]![0])
@@ -45,8 +48,8 @@ function pieces(way: readonly Point[]): number[] {
 }
 
 /**
- * The bends after piece `piece` of a way was dragged to `level`. A piece at a port stays there for a short way, and a
- * step leads from it to the level: the port itself does not move.
+ * The bends after piece `piece` of a way was dragged to `level`. A piece at a port stays there for a short
+ * way, and a step leads from it to the level: the port itself does not move.
  */
 export function dragged(way: readonly Point[], piece: number, level: number): number[] {
   const between = pieces(way)

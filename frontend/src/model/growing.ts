@@ -6,7 +6,10 @@ export interface Stroke {
   dash: number[]
 }
 
-/** A plot that is drawn already: its canvas, where on it the lines lie, and where a value is there (device px). */
+/**
+ * A plot that is drawn already: its canvas, where on it the lines lie, and where a value is there (device
+ * px).
+ */
 export interface Surface {
   ctx: CanvasRenderingContext2D
   bbox: { left: number; top: number; width: number; height: number }
@@ -16,8 +19,9 @@ export interface Surface {
 const WIDTH = 1.5
 
 /**
- * Draws onto a plot what a run has added since: the cost of a frame is that of its new samples, and not that of all
- * that stands there already. What it draws looks as uPlot draws it, which draws all anew wherever anything else changes.
+ * Draws onto a plot what a run has added since: the cost of a frame is that of its new samples, and not that
+ * of all that stands there already. What it draws looks as uPlot draws it, which draws all anew wherever
+ * anything else changes.
  */
 export class Growing {
   /** Of each trace the row that was drawn last, and how far its dashes have come (px). */
@@ -35,7 +39,10 @@ export class Growing {
     this.lengths = columns.map(() => 0)
   }
 
-  /** Draw what came after; `ends` are the rows from which on nothing is certain yet, `ratio` device px per CSS px. */
+  /**
+   * Draw what came after; `ends` are the rows from which on nothing is certain yet, `ratio` device px per CSS
+   * px.
+   */
   grow([time, ...columns]: Drawn, factor: number, ends: number[], ratio: number): void {
     const { ctx, bbox } = this.plot
     const width = WIDTH * ratio

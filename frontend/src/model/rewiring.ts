@@ -20,7 +20,10 @@ export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
   )
 }
 
-/** The wires without those between some blocks and all others; where that is one block with one input and one output they close behind it. */
+/**
+ * The wires without those between some blocks and all others; where that is one block with one input and one
+ * output they close behind it.
+ */
 export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   const names = new Set(blocks.map(({ name }) => name))
   const within = ({ source, target }: Wire) => names.has(blockOf(source)) === names.has(blockOf(target))
@@ -102,8 +105,8 @@ export function wireAt(
 }
 
 /**
- * Where a block stands so that a wire runs straight into its first input, and through it the way that the wire goes;
- * where there is little room, in the middle of it.
+ * Where a block stands so that a wire runs straight into its first input, and through it the way that the
+ * wire goes; where there is little room, in the middle of it.
  */
 export function levelled(
   block: SheetBlock,

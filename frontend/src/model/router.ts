@@ -1,7 +1,8 @@
 /**
- * Orthogonal wires around blocks: a sparse grid, A* with a price for bends, nets that share their stem. The prices are
- * those of `drawing/wire_routing.py`, so that a report draws a sheet much as the canvas does. Each net has a grid of
- * its own over the window that it needs, so the work for one wire does not grow with the sheet.
+ * Orthogonal wires around blocks: a sparse grid, A* with a price for bends, nets that share their stem. The
+ * prices are those of `drawing/wire_routing.py`, so that a report draws a sheet much as the canvas does. Each
+ * net has a grid of its own over the window that it needs, so the work for one wire does not grow with the
+ * sheet.
  */
 
 export type Point = readonly [x: number, y: number]
@@ -55,9 +56,10 @@ const WINDOW = 260
 const MOST_NODES = 60_000
 
 /**
- * The corner points of a way along `bends`, the coordinates of its straight pieces in turn (px): of a wire that leaves
- * to the side x, y, x … The first and the last piece go with their ports. `null` without bends, or where the last piece
- * would not run in the direction of its port. The same as in `drawing/wire_routing.py`.
+ * The corner points of a way along `bends`, the coordinates of its straight pieces in turn (px): of a wire
+ * that leaves to the side x, y, x … The first and the last piece go with their ports. `null` without bends,
+ * or where the last piece would not run in the direction of its port. The same as in
+ * `drawing/wire_routing.py`.
  */
 export function bent(source: WireEnd, bends: readonly number[], target: WireEnd): Point[] | null {
   let [x, y] = [source.x, source.y]
@@ -86,7 +88,9 @@ function drawnWays({ source, targets }: Net): Map<string, Point[]> {
 const ahead = (end: WireEnd): Point => [end.x + STUB * end.dx, end.y + STUB * end.dy]
 const behind = (end: WireEnd): Point => [end.x - STUB * end.dx, end.y - STUB * end.dy]
 
-/** Wires for the nets given, the short ones first, around `obstacles` and what `kept` nets have laid already. */
+/**
+ * Wires for the nets given, the short ones first, around `obstacles` and what `kept` nets have laid already.
+ */
 export function route(
   obstacles: Obstacle[],
   nets: Net[],
@@ -373,7 +377,10 @@ function after(values: number[], limit: number): number {
   return low
 }
 
-/** The way of a net with one end straight ahead, where nothing stands or lies near it: no other way is cheaper. */
+/**
+ * The way of a net with one end straight ahead, where nothing stands or lies near it: no other way is
+ * cheaper.
+ */
 function straight({ source, targets }: Net, obstacles: Obstacle[], laid: Segment[]): Point[] | null {
   const [only] = targets
   if (!only || targets.length > 1 || only.bends) return null

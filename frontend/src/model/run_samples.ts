@@ -19,8 +19,8 @@ const FIRST_ROOM = 1024
 let versions = 0
 
 /**
- * The samples of one run, outside of React: frames arrive faster than a page may render.
- * Every view draws from here in the animation frame after a change and compares `version` with what it drew last.
+ * The samples of one run, outside of React: frames arrive faster than a page may render. Every view draws
+ * from here in the animation frame after a change and compares `version` with what it drew last.
  */
 export class RunSamples {
   version = ++versions

@@ -20,8 +20,8 @@ export const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3]]
 export const MOST_TRACES = 32
 
 /**
- * The traces of some signals of a run. An element of a vector has the colour of its number in every view, so a
- * joint is known by its colour; scalars are told apart by theirs. What would look alike is dashed.
+ * The traces of some signals of a run. An element of a vector has the colour of its number in every view, so
+ * a joint is known by its colour; scalars are told apart by theirs. What would look alike is dashed.
  */
 export function tracesOf(samples: RunSamples, paths: { path: string; label: string }[]): Trace[] {
   const taken = new Map<string, number>()
@@ -65,14 +65,18 @@ export interface Extremes {
   to: number
   width: number
   drawn: Drawn
-  /** Of each trace the sample at which its last stretch begins, and the row of that stretch: all before them stands. */
+  /**
+   * Of each trace the sample at which its last stretch begins, and the row of that stretch: all before them
+   * stands.
+   */
   rows: number[]
   ends: number[]
 }
 
 /**
- * The least and the greatest value of each trace in each of `width` stretches of a window of time: no more points
- * than can be seen, and no peak is lost. What `before` knows of the same window is not looked at again.
+ * The least and the greatest value of each trace in each of `width` stretches of a window of time: no more
+ * points than can be seen, and no peak is lost. What `before` knows of the same window is not looked at
+ * again.
  */
 export function extremes(
   traces: { time: Float64Array; values: Float64Array }[],

@@ -51,7 +51,9 @@ function seenCorners(arm: Object3D, floor: number, extent: CameraProps['extent']
   return corners
 }
 
-/** Where an eye stands that looks at `centre` from a direction and sees all corners, no nearer than `nearest`. */
+/**
+ * Where an eye stands that looks at `centre` from a direction and sees all corners, no nearer than `nearest`.
+ */
 function eyeOf(
   corners: Vector3[],
   centre: Vector3,

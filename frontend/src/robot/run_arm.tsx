@@ -30,7 +30,8 @@ export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   )
   const drawn = useRef('')
   const state = useCallback(() => {
-    // A run that has begun and says nothing yet moves no arm: its first samples are there before a picture would be.
+    // A run that has begun and says nothing yet moves no arm: its first samples are there before a picture
+    // would be.
     if (samples.count || !samples.run) drawn.current = `${samples.run} ${samples.version} ${shownTime()}`
     return drawn.current
   }, [])

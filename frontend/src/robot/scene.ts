@@ -1,6 +1,9 @@
 import { BufferAttribute, BufferGeometry, Matrix4 } from 'three'
 
-/** A joint as the server describes it: where it stands in the frame that carries it, and in that of its own link. */
+/**
+ * A joint as the server describes it: where it stands in the frame that carries it, and in that of its own
+ * link.
+ */
 export interface SceneJoint {
   name: string
   row: number
@@ -9,7 +12,9 @@ export interface SceneJoint {
   carrier: number
   /** 4×4 row by row, in the carrier's frame: z is the joint's axis, x where the joint stands at zero. */
   frame: number[]
-  /** The same in the link's own frame: how far its x has turned (its origin slid) is where the joint stands. */
+  /**
+   * The same in the link's own frame: how far its x has turned (its origin slid) is where the joint stands.
+   */
   moving: number[]
   offset: number
   radius: number

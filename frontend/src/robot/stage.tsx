@@ -13,6 +13,9 @@ import { ToolPath, type Way } from './tool_path'
 import { toggle, useViewOptions } from './view_options'
 import { ViewTools } from './view_tools'
 
+const KEYS_IN_WORDS =
+  'Arrow keys turn the view, plus and minus bring it nearer or farther, space shows all of the arm.'
+
 const COLOURS = {
   light: {
     background: '#f1eeea',
@@ -41,7 +44,10 @@ export interface Ghosts {
 interface StageProps {
   scene: RobotScene
   poses: () => Poses | undefined
-  /** Changes whenever the poses do, with a call of `changed` in `frames.ts`: what is not changed is not drawn again. */
+  /**
+   * Changes whenever the poses do, with a call of `changed` in `frames.ts`: what is not changed is not drawn
+   * again.
+   */
   state: () => string
   way?: () => Way | undefined
   ghosts?: Ghosts
@@ -53,7 +59,9 @@ interface StageProps {
   drawing: () => Promise<string | undefined>
   /** Changes when the drawing would; one that says nothing is drawn once. */
   drawn?: () => string
-  /** Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film. */
+  /**
+   * Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film.
+   */
   film?: () => Promise<void>
   /** Buttons of its own that stand before the others. */
   children?: React.ReactNode
@@ -99,7 +107,7 @@ export function Stage(props: StageProps) {
       <div
         className="stage"
         role="application"
-        aria-label={`The robot ${scene.name}. Arrow keys turn the view, plus and minus bring it nearer or farther, space shows all of the arm.`}
+        aria-label={`The robot ${scene.name}. ${KEYS_IN_WORDS}`}
         tabIndex={0}
         onKeyDown={onKeyDown}
       >
@@ -235,7 +243,10 @@ const Surroundings = memo(function Surroundings({ dark }: { dark: boolean }) {
   )
 })
 
-/** The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it has reached. */
+/**
+ * The floor, m: under the foot of the arm, or, where the arm has reached below its foot, under all that it
+ * has reached.
+ */
 function useFloor(
   scene: RobotScene,
   poses: () => Poses | undefined,
@@ -317,7 +328,7 @@ function Ground({
 }) {
   return (
     <>
-      {/* The shadow hides nothing: the lines lie so near above it that depth alone cannot tell them apart. */}
+      {/* The shadow hides nothing: the lines lie so near above it that depth cannot tell them apart. */}
       <mesh position={[0, 0, height - 0.001 * reach]} renderOrder={-2} receiveShadow>
         <planeGeometry args={[12 * reach, 12 * reach]} />
         <shadowMaterial opacity={colours.shadow} depthWrite={false} />

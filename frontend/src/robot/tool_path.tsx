@@ -8,7 +8,10 @@ const MOST_POINTS = 600
 /** How much of the colour the oldest point keeps. */
 const OLDEST = 0.22
 
-/** The way of the tool so far: how many points there are, what tells one state of it from another, and each point. */
+/**
+ * The way of the tool so far: how many points there are, what tells one state of it from another, and each
+ * point.
+ */
 export interface Way {
   key: string
   last: number

@@ -1,6 +1,6 @@
 /**
- * What merely follows a run is drawn as often as the machine can: where pictures take long to get to the screen,
- * there is a pause after each, so that what people press and type is answered meanwhile.
+ * What merely follows a run is drawn as often as the machine can: where pictures take long to get to the
+ * screen, there is a pause after each, so that what people press and type is answered meanwhile.
  */
 
 /** ms that two pictures may take without a pause. */
@@ -16,7 +16,10 @@ export function isFree(now: number): boolean {
   return now >= freeAt
 }
 
-/** Whether what follows the run may be drawn in the animation frame `now`; it is measured then what that costs. */
+/**
+ * Whether what follows the run may be drawn in the animation frame `now`; it is measured then what that
+ * costs.
+ */
 export function mayFollow(now: number): boolean {
   if (!isFree(now)) return false
   if (drawn !== now) {

@@ -36,7 +36,9 @@ const MOST_BYTES = 384 * 2 ** 20
 
 interface Runs {
   runs: KeptRun[]
-  /** Values of tunable parameters that are tried, by `block.parameter`: not in the model until they are kept. */
+  /**
+   * Values of tunable parameters that are tried, by `block.parameter`: not in the model until they are kept.
+   */
   tried: Record<string, unknown>
   /** Simulated seconds for each second of the clock; null: as fast as possible. */
   speed: number | null

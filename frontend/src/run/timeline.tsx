@@ -7,7 +7,9 @@ import { hold, play, shownTime, stepCursor, useCursor } from './cursor'
 const RATES = ['0.1', '0.25', '0.5', '1', '2', '5', '10'].map((value) => ({ value, label: `${value} ×` }))
 const LONG_STEP = 10
 
-/** The time cursor of all views: drag it through the run, or play the run again; `wires` where there are any. */
+/**
+ * The time cursor of all views: drag it through the run, or play the run again; `wires` where there are any.
+ */
 export function Timeline({ wires = false }: { wires?: boolean }) {
   const run = useStudio((s) => s.run)
   const { time, playing, loop, rate } = useCursor()

@@ -17,7 +17,10 @@ const useTuning = create<Tuning>(() => ({ pinned: new Set(), ranges: {} }))
 const NUMERIC = ['number', 'array']
 const SLIDER_STEPS = 400
 
-/** What can be tuned on the sheet that is shown, with the values of the model; below it, by the last run's account. */
+/**
+ * What can be tuned on the sheet that is shown, with the values of the model; below it, by the last run's
+ * account.
+ */
 function useTunables(): Map<string, Tunable> {
   const blocks = useStudio((s) => s.document?.blocks)
   const library = useStudio((s) => s.library)

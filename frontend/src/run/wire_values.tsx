@@ -45,7 +45,10 @@ function outputs(blocks: Record<string, SheetBlock>): { ref: string; block: Shee
   )
 }
 
-/** Values on the wires, marks of what is logged, and what can be done with the wire that is `chosen`: on the sheet itself. */
+/**
+ * Values on the wires, marks of what is logged, and what can be done with the wire that is `chosen`: on the
+ * sheet itself.
+ */
 export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const blocks = useStudio((s) => s.document!.blocks)
   const logged = useStudio((s) => s.document!.logged)
@@ -58,16 +61,7 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
   const portal = useMemo(() => flow?.querySelector('.react-flow__viewport-portal'), [flow])
   const zoom = useStore((s) => s.transform[2])
   const layer = useRef<HTMLDivElement>(null)
-  const [hovered, setHovered] = useState('')
-  useEffect(() => {
-    if (!flow) return
-    const over = ({ target }: Event) => {
-      const id = (target as Element).closest('.react-flow__edge')?.getAttribute('data-id')
-      setHovered(id ? id.slice(0, id.indexOf(' -> ')) : '')
-    }
-    flow.addEventListener('pointerover', over)
-    return () => flow.removeEventListener('pointerover', over)
-  }, [flow])
+  const hovered = useHovered(flow)
   useWriting(layer)
   const found = outputs(blocks)
   const shown = ran ? found.filter(({ ref }) => all || ref === hovered || pinned.has(level + ref)) : []
@@ -87,7 +81,9 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
           className="wire-value numbers"
           data-path={level + ref}
           style={{
-            transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -6 : 6)}px, ${block.place.y + spot.y - 4}px) scale(var(--legible)) translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)`,
+            transform:
+              legible(block.place.x + spot.x + (spot.dx < 0 ? -6 : 6), block.place.y + spot.y - 4) +
+              ` translate(${spot.dx < 0 ? '-100%' : '0'}, -100%)`,
           }}
         />
       ))}
@@ -115,7 +111,10 @@ export function WireValues({ chosen }: { chosen: WireEdgeType | undefined }) {
             className="logged-badge"
             title={`${ref} is logged`}
             style={{
-              transform: `translate(${block.place.x + spot.x + (spot.dx < 0 ? -16 : 4)}px, ${block.place.y + spot.y + 3}px) scale(var(--legible))`,
+              transform: legible(
+                block.place.x + spot.x + (spot.dx < 0 ? -16 : 4),
+                block.place.y + spot.y + 3,
+              ),
             }}
           >
             <IconAntennaBars5 size={12} aria-label={`${ref} is logged`} />
@@ -169,7 +168,7 @@ function WireTools({
       role="toolbar"
       aria-label={`Wire from ${ref}`}
       style={{
-        transform: `translate(${(from[0] + to[0]) / 2}px, ${(from[1] + to[1]) / 2 - 6}px) scale(var(--legible)) translate(-50%, -100%)`,
+        transform: legible((from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 6) + ' translate(-50%, -100%)',
       }}
     >
       <Tooltip label={isLogged ? 'Do not log this signal' : 'Log this signal: it gets a scope of its own'}>
@@ -226,3 +225,23 @@ function WireTools({
 
 const length = (path: Point[], k: number) =>
   path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0
+
+/** The output whose wire the mouse is on; empty where it is on none. */
+function useHovered(flow: HTMLElement | null): string {
+  const [hovered, setHovered] = useState('')
+  useEffect(() => {
+    if (!flow) return
+    const over = ({ target }: Event) => {
+      const id = (target as Element).closest('.react-flow__edge')?.getAttribute('data-id')
+      setHovered(id ? id.slice(0, id.indexOf(' -> ')) : '')
+    }
+    flow.addEventListener('pointerover', over)
+    return () => flow.removeEventListener('pointerover', over)
+  }, [flow])
+  return hovered
+}
+
+/** To a place of the sheet (px), as large as can be read however far away the sheet is. */
+function legible(x: number, y: number): string {
+  return `translate(${x}px, ${y}px) scale(var(--legible))`
+}

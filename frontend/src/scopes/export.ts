@@ -27,7 +27,9 @@ export async function savePng(figure: Figure): Promise<void> {
 
 const quoted = (text: string) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)
 
-/** Every recorded sample of the traces, in SI units; a trace of another run has a column of times of its own. */
+/**
+ * Every recorded sample of the traces, in SI units; a trace of another run has a column of times of its own.
+ */
 export function csvOf(traces: Trace[]): string {
   const columns: { name: string; values: Float64Array }[] = []
   let last: Float64Array | undefined

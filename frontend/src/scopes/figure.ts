@@ -213,23 +213,33 @@ export function svgOf(figure: Figure): string {
       const dashed = dash.length ? ` stroke-dasharray="${dash.join(' ')}"` : ''
       if (points.length)
         parts.push(
-          `<path d="${d}" fill="none" stroke="${colour(tone)}" stroke-width="${width}" stroke-linejoin="round"${dashed}/>`,
+          `<path d="${d}" fill="none" stroke="${colour(tone)}" stroke-width="${width}" ` +
+            `stroke-linejoin="round"${dashed}/>`,
         )
     },
-    text: (x, y, text, tone, anchor, bold, upright) =>
+    text: (x, y, text, tone, anchor, bold, upright) => {
+      const weight = bold ? ' font-weight="600"' : ''
+      const turn = upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''
       parts.push(
-        `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="${colour(tone)}" text-anchor="${anchor}" font-size="${bold ? FONT + 1 : FONT}"${bold ? ' font-weight="600"' : ''}${upright ? ` transform="rotate(-90 ${x.toFixed(1)} ${y.toFixed(1)})"` : ''}>${escaped(text)}</text>`,
-      ),
+        `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" fill="${colour(tone)}" text-anchor="${anchor}" ` +
+          `font-size="${bold ? FONT + 1 : FONT}"${weight}${turn}>${escaped(text)}</text>`,
+      )
+    },
     disc: (x, y, radius, tone) =>
       parts.push(`<circle cx="${x.toFixed(2)}" cy="${y.toFixed(2)}" r="${radius}" fill="${colour(tone)}"/>`),
     inside: ({ left, top, width, height }, within) => {
       parts.push(
-        `<clipPath id="field"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath><g clip-path="url(#field)">`,
+        `<clipPath id="field"><rect x="${left}" y="${top}" width="${width}" height="${height}"/></clipPath>` +
+          '<g clip-path="url(#field)">',
       )
       within()
       parts.push('</g>')
     },
   })
   const { width, height } = figure
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" font-family="${escaped(fontOf())}"><rect width="100%" height="100%" fill="${colour('surface')}"/>${parts.join('')}</svg>\n`
+  return (
+    `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" ` +
+    `viewBox="0 0 ${width} ${height}" font-family="${escaped(fontOf())}">` +
+    `<rect width="100%" height="100%" fill="${colour('surface')}"/>${parts.join('')}</svg>\n`
+  )
 }

@@ -25,7 +25,10 @@ export interface SeenValues {
   onValues: (values: Values | null) => void
 }
 
-/** A plot that follows a run: drawn in the animation frame after a change, and only what is new where nothing else changed. */
+/**
+ * A plot that follows a run: drawn in the animation frame after a change, and only what is new where nothing
+ * else changed.
+ */
 export class LivePlot {
   private readonly plot: uPlot
   private readonly growing: Growing

@@ -68,7 +68,10 @@ export function listen(plot: uPlot): () => void {
 
 const ZOOM = 1.25
 
-/** On the axis of values the wheel zooms about the pointer, dragging moves, and a double click shows all values. */
+/**
+ * On the axis of values the wheel zooms about the pointer, dragging moves, and a double click shows all
+ * values.
+ */
 export function listenAtValues(plot: uPlot, show: (values: Values | null) => void): () => void {
   const axis = plot.root.querySelectorAll<HTMLElement>('.u-axis')[1]
   if (!axis) return () => {}

@@ -18,7 +18,9 @@ export function drawBand(plot: uPlot, tolerance: number): void {
   plot.ctx.restore()
 }
 
-/** Upright lines: the instant that every view shows, the measuring cursors, and where a parameter was tuned. */
+/**
+ * Upright lines: the instant that every view shows, the measuring cursors, and where a parameter was tuned.
+ */
 export function drawLines(plot: uPlot): void {
   const { ctx, bbox } = plot
   const { left, top, width, height } = bbox

@@ -9,7 +9,9 @@ const FONT = '11px "Inter Variable", system-ui, sans-serif'
 /** Width and height of a plot whose panel has none yet. */
 export const LEAST_PX = 60
 
-/** How uPlot draws the traces; `unit` says what stands beside the vertical axis, `band` is a band about zero. */
+/**
+ * How uPlot draws the traces; `unit` says what stands beside the vertical axis, `band` is a band about zero.
+ */
 export function plotOptions(
   element: HTMLElement,
   shown: Trace[],

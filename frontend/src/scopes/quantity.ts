@@ -29,7 +29,10 @@ const spell = (unit: string) =>
 export const useUnits = create<{ radians: boolean }>(() => ({ radians: false }))
 useUnits.subscribe(changed)
 
-/** Factor and unit in which magnitudes up to `largest` read well: degrees for angles, SI prefixes instead of long zeros. */
+/**
+ * Factor and unit in which magnitudes up to `largest` read well: degrees for angles, SI prefixes instead of
+ * long zeros.
+ */
 export function reading(unit: string, largest: number, radians = useUnits.getState().radians): Reading {
   if (/^rad\b/.test(unit) && !radians) {
     return { factor: 180 / Math.PI, unit: spell(unit.replace(/^rad/, 'deg')) }

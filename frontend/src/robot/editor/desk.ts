@@ -89,8 +89,8 @@ useDesk.subscribe(({ robots, current }, before) => {
 })
 
 /**
- * After the line was broken, or a reload: the server opens again what this page has open, under the same keys. Gives what
- * the tab showed before it was loaded anew.
+ * After the line was broken, or a reload: the server opens again what this page has open, under the same
+ * keys. Gives what the tab showed before it was loaded anew.
  */
 export async function attachAgain(): Promise<Opening | undefined> {
   const { robots, current } = useDesk.getState()
@@ -145,7 +145,9 @@ export function reload(robot: string): void {
   void ask({ kind: 'robot_reload', ...alteration(robot) })
 }
 
-/** What goes with everything that changes a robot: which, what of it this page saw, and a key to do it once. */
+/**
+ * What goes with everything that changes a robot: which, what of it this page saw, and a key to do it once.
+ */
 function alteration(robot: string) {
   return { robot, key: newKey(), base: useDesk.getState().robots[robot]?.version ?? null, author }
 }
@@ -181,7 +183,7 @@ async function readOn(): Promise<void> {
   useDesk.setState({ reading: false })
 }
 
-// -- numbers as people read them ----------------------------------------------------------------------------------
+// -- numbers as people read them ----------------------------------------------------------------------------
 
 /** Whether a column of a joint that turns or slides holds an angle. */
 export function isAngle(column: CellColumn, turns: boolean): boolean {

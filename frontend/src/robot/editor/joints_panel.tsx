@@ -116,7 +116,10 @@ function NumberField({
   )
 }
 
-/** The range of a slider: that of the joint, else a whole turn or a metre either way; of speeds the joint's own. */
+/**
+ * The range of a slider: that of the joint, else a whole turn or a metre either way; of speeds the joint's
+ * own.
+ */
 function range(link: LinkRow, kind: keyof Joints): [number, number] {
   const { lowest, highest, speed } = link.cells
   const most = typeof speed === 'number' ? speed : link.turns ? WHOLE_TURN : WITHOUT_RANGE
