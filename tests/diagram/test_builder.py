@@ -207,6 +207,11 @@ def test_the_library_says_the_nearest_type() -> None:
     assert library.family_of(Clock) == "sources"
     with pytest.raises(UnknownNameError, match="there is no block type named 'Sum'"):
         library.family_of(Sum)
+    wider = library.with_kinds("own", [Sum])
+    assert wider.family_of(Sum) == "own"
+    assert "Sum" not in library
+    with pytest.raises(DiagramError, match="there is a block type named 'Gain' already"):
+        library.with_kinds("own", [Gain])
     with pytest.raises(UnknownNameError, match=r"there is no block type named 'Gian'.*did you mean 'Gain'"):
         library["Gian"]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from armblocks.diagram.block import Block
-from armblocks.errors import UnknownNameError
+from armblocks.errors import DiagramError, UnknownNameError
 
 
 class BlockLibrary(Mapping[str, type[Block]]):
@@ -34,6 +34,22 @@ class BlockLibrary(Mapping[str, type[Block]]):
 
     def __len__(self) -> int:
         return len(self._kinds)
+
+    def with_kinds(self, family: str, kinds: Iterable[type[Block]]) -> BlockLibrary:
+        """This library and further kinds of one family.
+
+        Raises ``DiagramError`` for a type name that another kind has already.
+        """
+        added = tuple(kinds)
+        for kind in added:
+            if kind.type_name() in self._kinds:
+                raise DiagramError(
+                    f"there is a block type named '{kind.type_name()}' already",
+                    where=f"{kind.__module__}.{kind.__qualname__}",
+                    allowed="names of classes that no block of the library has",
+                    fix="rename the class",
+                )
+        return BlockLibrary({**self._families, family: (*self._families.get(family, ()), *added)})
 
     @property
     def families(self) -> Mapping[str, tuple[type[Block], ...]]:

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
-from armblocks.diagram import Diagram, DiagramBlock, Subsystem
+from armblocks.diagram import Block, Diagram, DiagramBlock, Subsystem
 
 
-def load_diagram(name_or_path: str | PathLike[str], *, trust: bool = False) -> Diagram:
+def load_diagram(
+    name_or_path: str | PathLike[str], *, trust: bool = False, blocks: Iterable[type[Block]] = ()
+) -> Diagram:
     """A shipped example by name (``"kr180model"``), or a diagram from a ``.json`` file.
+
+    ``blocks``: classes of own blocks that the file may have besides those of the library.
 
     A diagram may name functions in Python files beside it. With ``trust`` those files are run; without it,
     such a diagram is refused.
     """
-    return formats.load_diagram(name_or_path, BLOCKS, trust=trust)
+    return formats.load_diagram(name_or_path, BLOCKS.with_kinds("own", blocks), trust=trust)
 
 
 def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
