@@ -135,7 +135,7 @@ def fuzz(
     laws: Sequence[str],
     counts: Counter[str],
     *,
-    seconds: float = 90.0,
+    seconds: float = 300.0,
     reduce_for: float = 180.0,
 ) -> Iterator[Finding]:
     """Findings of the seeds, one for each law that a diagram contradicts; ``counts`` says how it went."""

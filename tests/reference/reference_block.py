@@ -78,6 +78,7 @@ class BlockNumbers:
         self.lines = block.delay_lines(shapes)
         self.conditions = block.conditions(shapes)
         self.modes = (*block.modes(shapes), *self.conditions)
+        self.remembered = [mode for mode in block.modes(shapes) if mode.remembers]
         self.guards = block.guards(shapes)
         self.symbols: dict[str, SX] = {"t": SX.sym("t")}
         self.arrays: dict[str, np.ndarray] = {"t": np.zeros(1)}
@@ -86,7 +87,8 @@ class BlockNumbers:
         self.rates: dict[str, np.ndarray] = {}
         self.history = {line.name: History(math.prod(line.shape)) for line in self.lines}
         ends = {
-            "x": {s.name: s.shape for s in (*self.states, *self.discrete, *self.lines, *self.modes)},
+            "x": {s.name: s.shape for s in (*self.states, *self.discrete, *self.lines, *self.modes)}
+            | {mode.before: mode.shape for mode in self.remembered},
             "u": {**shapes, **{f"{u}'": shapes[u] for u in block.rated_inputs}},
             "e": {guard.name: guard.shape for guard in self.guards},
             "p": {rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.inputs_of_the_run()}
@@ -122,7 +124,8 @@ class BlockNumbers:
         add("xdot", block.derivatives(t, x, u, p), {s.name: s.shape for s in self.states})
         add("update", block.updates(t, x, u, p), {s.name: s.shape for s in self.discrete})
         add("guard", block.guard_values(t, x, u, p), {g.name: g.shape for g in self.guards})
-        wanted = dict(block.mode_values(t, x, u, p)) | own_modes(block, x, u, p)
+        earlier = x | {mode.name: x[mode.before] for mode in self.remembered}
+        wanted = dict(block.mode_values(t, earlier, u, p)) | own_modes(block, x, u, p)
         for condition in self.conditions:
             quantity = block.condition_values(t, x, u, p)[condition.name]
             wanted[condition.name] = quantity >= 0.0 if condition.closed else quantity > 0.0
@@ -211,6 +214,11 @@ class BlockNumbers:
     def restart(self) -> None:
         for name in self.names("start"):
             self.arrays[f"x:{name}"][:] = self.value("start", name)
+
+    def remember(self) -> None:
+        """What a mode is now is what it was before, for what comes next."""
+        for mode in self.remembered:
+            self.arrays[f"x:{mode.before}"][:] = self.arrays[f"x:{mode.name}"]
 
     def mode_values(self) -> dict[str, np.ndarray]:
         """The modes that hold, by name."""

@@ -391,6 +391,8 @@ class Network:
                 consistent[block.name] = {} if decides else consistent[block.name]
         for block in eventful:
             block.set_modes(consistent[block.name])
+        if fired:
+            self._remember()
         acted = self._act(t, new)
         self.evaluate(t)
         if fired:
@@ -432,6 +434,11 @@ class Network:
             block.restart()
         return acted
 
+    def _remember(self) -> None:
+        """Modes with a hysteresis go on from what they are, and not from what they were on the way to it."""
+        for block in self.blocks.values():
+            block.remember()
+
     def _begin_signs(self, block: Any) -> None:
         """The guards of a block begin where they are, as at the start of a run."""
         self._feed_all(block)
@@ -441,6 +448,7 @@ class Network:
 
     def end_instant(self) -> None:
         """Guards of a subsystem that was switched on are watched from now on."""
+        self._remember()
         for name in {name for name, _ in self.signs}:
             if self.blocks[name].on and not self.was_on[name]:
                 self._begin_signs(self.blocks[name])

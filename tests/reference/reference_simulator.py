@@ -10,7 +10,8 @@ Newton's method solves. A sampled block's output is held between the ticks of it
 
 **Modes.** A mode is a function of the signals: ``mode_values`` (for a condition: whether its quantity is
 positive) at *every* evaluation, also inside a Runge-Kutta step. Only where that function reads the mode
-itself (a relay's hysteresis) does the mode have a memory: the value at the last accepted time. Where modes
+itself (a relay's hysteresis) does the mode have a memory: the value before the instant, or before the latest
+event at it. Where modes
 and signals depend on each other, both are evaluated again until no mode changes.
 
 **Flow.** Between instants x follows the classical Runge-Kutta method with steps of at most ``step``. Within
