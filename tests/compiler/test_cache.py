@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from small_functions import traced
 
+from armblocks import user_folders
 from armblocks.compiler import Kernel, cache, compile_function, recall
 from armblocks.compiler.tape import Tape
 from armblocks.equations import TracedFunction
@@ -148,36 +149,15 @@ def test_an_empty_name_switches_the_cache_off(monkeypatch: pytest.MonkeyPatch) -
     assert cache.load("0" * 64) is None
 
 
-@pytest.mark.parametrize(
-    ("platform", "variable", "expected"),
-    [
-        ("linux", "XDG_CACHE_HOME", "base/armblocks"),
-        ("linux", None, "home/.cache/armblocks"),
-        ("darwin", None, "home/Library/Caches/armblocks"),
-        ("win32", "LOCALAPPDATA", "base/armblocks/Cache"),
-        ("win32", None, "home/AppData/Local/armblocks/Cache"),
-    ],
-)
-def test_each_system_has_its_place(
-    monkeypatch: pytest.MonkeyPatch, platform: str, variable: str | None, expected: str
-) -> None:
-    for name in ("ARMBLOCKS_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
-        monkeypatch.delenv(name, raising=False)
-    if variable:
-        monkeypatch.setenv(variable, "base")
-    monkeypatch.setattr(Path, "home", lambda: Path("home"))
-    monkeypatch.setattr(cache.sys, "platform", platform)
-    assert cache.folder() == Path(expected)
+def test_the_system_has_a_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ARMBLOCKS_CACHE_DIR")
+    assert cache.folder() == user_folders.cache_folder()
 
 
 def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
-    def homeless() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.delenv("ARMBLOCKS_CACHE_DIR", raising=False)
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(cache.sys, "platform", "linux")
-    monkeypatch.setattr(Path, "home", homeless)
+    monkeypatch.delenv("ARMBLOCKS_CACHE_DIR")
+    monkeypatch.setattr(user_folders, "cache_folder", lambda: None)
+    monkeypatch.setattr(cache, "cache_folder", user_folders.cache_folder)
     assert cache.folder() is None
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from armblocks import user_folders
 from armblocks.errors import FormatError
 from armblocks.studio.documents import state_folder
 from armblocks.studio.documents.state_folder import SESSION_SECONDS, StateFolder
@@ -49,10 +50,6 @@ def test_files_used_last_come_first_and_once(kept: StateFolder) -> None:
 
 
 def test_a_user_without_a_home_is_told_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def nowhere() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
-    monkeypatch.setattr(Path, "home", nowhere)
+    monkeypatch.setattr(user_folders, "state_folder", lambda: None)
     with pytest.raises(FormatError, match=r"this user has no home folder.*set XDG_STATE_HOME to a folder"):
         StateFolder(tmp_path)

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
+
+from armblocks.user_folders import cache_folder
 
 _MAGIC = b"armblocks cache 1\n"
 _SIZE_LIMIT = 256 * 1024 * 1024
@@ -32,16 +33,7 @@ def folder() -> Path | None:
     chosen = os.environ.get("ARMBLOCKS_CACHE_DIR")
     if chosen is not None:
         return Path(chosen) if chosen else None
-    try:
-        if sys.platform == "win32":
-            local = os.environ.get("LOCALAPPDATA")
-            return (Path(local) if local else Path.home() / "AppData" / "Local") / "armblocks" / "Cache"
-        if sys.platform == "darwin":
-            return Path.home() / "Library" / "Caches" / "armblocks"
-        base = os.environ.get("XDG_CACHE_HOME")
-        return (Path(base) if base else Path.home() / ".cache") / "armblocks"
-    except RuntimeError:  # no home directory
-        return None
+    return cache_folder()
 
 
 def object_name(parts: Sequence[str]) -> str:

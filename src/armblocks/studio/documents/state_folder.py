@@ -10,12 +10,12 @@ import hashlib
 import json
 import os
 import secrets
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import time
 from typing import Any
 
+from armblocks import user_folders
 from armblocks.errors import FormatError
 from armblocks.files import read_bounded, write_atomically
 
@@ -93,22 +93,12 @@ class StateFolder:
 
 def state_base() -> Path:
     """Where programs of this system keep their state for a user; raises ``FormatError`` if nowhere."""
-    try:
-        return _state_base()
-    except RuntimeError as error:
+    folder = user_folders.state_folder()
+    if folder is None:
         raise FormatError(
             "the studio has no place for its journals: this user has no home folder",
             where="armblocks studio",
             allowed="a home folder, or a folder in XDG_STATE_HOME",
             fix="set XDG_STATE_HOME to a folder of this user",
-        ) from error
-
-
-def _state_base() -> Path:
-    if sys.platform == "win32":
-        local = os.environ.get("LOCALAPPDATA")
-        return (Path(local) if local else Path.home() / "AppData" / "Local") / "armblocks" / "Studio"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "armblocks" / "studio"
-    base = os.environ.get("XDG_STATE_HOME")
-    return (Path(base) if base else Path.home() / ".local" / "state") / "armblocks" / "studio"
+        )
+    return folder / "studio"

@@ -1,0 +1,51 @@
+"""The folders of the user are those in which earlier versions kept their files, on each system."""
+
+import os
+from pathlib import Path
+
+import pytest
+from platformdirs.api import PlatformDirsABC
+from platformdirs.macos import MacOS
+from platformdirs.unix import Unix
+from platformdirs.windows import Windows
+
+from armblocks import user_folders
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the paths of Unix are asked for")
+@pytest.mark.parametrize(
+    ("system", "cache", "state"),
+    [
+        (Unix, ".cache/armblocks", ".local/state/armblocks"),
+        (MacOS, "Library/Caches/armblocks", "Library/Application Support/armblocks"),
+    ],
+)
+def test_the_places_of_unix(
+    system: type[PlatformDirsABC], cache: str, state: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("XDG_CACHE_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    asked = system("armblocks", appauthor=False)
+    assert (asked.user_cache_path, asked.user_state_path) == (tmp_path / cache, tmp_path / state)
+
+
+def test_the_places_of_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    folders = {"CSIDL_LOCAL_APPDATA": "local"}
+    monkeypatch.setattr("platformdirs.windows.get_win_folder", folders.__getitem__)
+    asked = Windows("armblocks", appauthor=False)
+    assert Path(asked.user_cache_dir) == Path("local/armblocks/Cache")
+    assert Path(asked.user_state_dir) == Path("local/armblocks")
+
+
+def test_a_variable_moves_them_and_without_a_home_there_are_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("platformdirs.PlatformDirs", Unix)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)
+    assert user_folders.cache_folder() == tmp_path / "armblocks"
+    assert user_folders.state_folder() is None
+    monkeypatch.setattr("platformdirs.user_state_path", lambda *_, **__: Path("~/.local/state/armblocks"))
+    assert user_folders.state_folder() is None
