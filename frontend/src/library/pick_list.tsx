@@ -81,7 +81,10 @@ export function PickList({
             aria-selected={index === chosen}
             tabIndex={-1}
             onClick={() => pick(index)}
-            onMouseMove={() => setChosen(index)}
+            onMouseMove={({ movementX, movementY }) => {
+              // Browsers also report a move where the list changes under a pointer that rests.
+              if (movementX || movementY) setChosen(index)
+            }}
           >
             {face}
             <span className="what">
