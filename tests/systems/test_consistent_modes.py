@@ -199,6 +199,16 @@ def test_the_chattering_block_is_named_and_not_one_that_switched_before() -> Non
     assert "early" not in str(raised.value)
 
 
+@pytest.mark.parametrize("initial", [-2.0, 0.3, 2.0])
+def test_a_backlash_that_starts_beyond_its_play_is_pushed_before_the_input_turns_back(initial: float) -> None:
+    builder = DiagramBuilder("play")
+    play = builder.add("play", Backlash(initial=initial), builder.add("input", Ramp(initial=0.5, slope=-1.0)))
+    builder.add("hit", HitCrossing(offset=-0.1), play)
+    result = ab.simulate(builder.build(), stop_time=2.0)
+    pushed = np.clip(initial, 0.0, 1.0)
+    np.testing.assert_allclose(result["play/y"], np.minimum(pushed, 1.0 - result.time), atol=1e-12)
+
+
 def test_a_quantizer_that_steps_up_and_down_within_its_hysteresis_is_named() -> None:
     builder = DiagramBuilder("chatter")
     place = builder.add("place", Integrator())

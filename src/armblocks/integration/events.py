@@ -79,7 +79,6 @@ class Events:
                 f.counts[left] = remaining
                 iteration.again_when((same.value == 0.0) & (remaining > 0))
             f.counts[left] = 0
-            self._remember_modes()
 
     def _follow_at_start(self) -> None:
         """Modes that follow the signals, before anything with a memory is asked."""
