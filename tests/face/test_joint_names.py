@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import armblocks as ab
-from armblocks.blocks import Constant, Gain, JTraj, Mux, Rne, RobotPlot, Scope
+from armblocks.blocks import Constant, CumulativeSum, Gain, JTraj, Mux, Rne, RobotPlot, Scope
 from armblocks.diagram import diagram_views
 from armblocks.diagram.entry_names import entry_names
 from armblocks.pictures.picture import text_marks
@@ -93,5 +93,7 @@ def test_a_signal_of_two_robots_has_no_names_and_a_mux_parts_them() -> None:
     both = builder.add("both", Mux(inputs=2), builder.add("a", Constant()), builder.add("b", Constant()))
     builder.add("third", RobotPlot(robot=robot(*JOINTS)), both)
     shapes = {"q/y": (2,), "both/y": (2,), "a/y": (), "b/y": (), "one/poses": (4, 4, 4)}
+    builder.add("sums", CumulativeSum(), both)  # its entries are no longer those of single joints
+    shapes["sums/y"] = (2,)
     assert entry_names(builder.build(), shapes) == {"both/y": JOINTS}
     assert entry_names(ab.load_diagram("van_der_pol_pid"), {}) == {}

@@ -145,6 +145,9 @@ class CumulativeSum(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the running sums"),)
 
+    def output_shapes(self, inputs: Shapes) -> Shapes:
+        return {"y": inputs["u"]}
+
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
