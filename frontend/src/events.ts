@@ -132,7 +132,7 @@ function runStarted(event: EventOf<'run_started'>): void {
 function runProgressed(event: EventOf<'run_progress'>): void {
   const { run } = useStudio.getState()
   runs.progressed(event)
-  // How far a run that goes on has come may wait; what else is told of it may not.
+  // Progress of a run may be shown later; all other messages about it are handled at once.
   if (
     run?.run === event.run &&
     (event.state !== 'running' || run.state !== 'running' || isFree(performance.now()))

@@ -19,7 +19,8 @@ const SETTLED_BAND = 0.02
 
 /**
  * Measures of the straight lines between the samples, from one instant to another. Mean and RMS weigh by
- * time, so that uneven samples do not shift them: over a stretch the integral of y² is dt (a² + ab + b²) / 3.
+ * time, so that uneven samples do not shift them: between samples a and b the integral of y² is
+ * dt (a² + ab + b²) / 3.
  */
 export function measures(
   trace: { time: Float64Array; values: Float64Array },

@@ -21,7 +21,8 @@ export const MOST_TRACES = 32
 
 /**
  * The traces of some signals of a run. An element of a vector has the colour of its number in every view, so
- * a joint is known by its colour; scalars are told apart by theirs. What would look alike is dashed.
+ * that a joint has one colour everywhere; scalars have different colours. Traces that would look alike are
+ * dashed.
  */
 export function tracesOf(samples: RunSamples, paths: { path: string; label: string }[]): Trace[] {
   const taken = new Map<string, number>()
@@ -66,16 +67,16 @@ export interface Extremes {
   width: number
   drawn: Drawn
   /**
-   * Of each trace the sample at which its last stretch begins, and the row of that stretch: all before them
-   * stands.
+   * For each trace, the first sample of its last interval and the row of that interval: all rows before it
+   * are final.
    */
   rows: number[]
   ends: number[]
 }
 
 /**
- * The least and the greatest value of each trace in each of `width` stretches of a window of time: no more
- * points than can be seen, and no peak is lost. What `before` knows of the same window is not looked at
+ * The least and the greatest value of each trace in each of `width` equal intervals of a time window: no more
+ * points than can be seen, and no peak is lost. Rows of the same window that `before` holds are not computed
  * again.
  */
 export function extremes(

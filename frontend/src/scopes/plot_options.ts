@@ -10,7 +10,7 @@ const FONT = '11px "Inter Variable", system-ui, sans-serif'
 export const LEAST_PX = 60
 
 /**
- * How uPlot draws the traces; `unit` says what stands beside the vertical axis, `band` is a band about zero.
+ * How uPlot draws the traces; `unit` is the label of the vertical axis, `band` a band about zero.
  */
 export function plotOptions(
   element: HTMLElement,

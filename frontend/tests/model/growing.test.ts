@@ -16,7 +16,7 @@ test('extremes that grow with a run are those of the whole run', () => {
   }
 })
 
-test('no peak is lost, and each stretch has two points at most', () => {
+test('no peak is lost, and each interval has two points at most', () => {
   const { drawn } = extremes([until(5000)], 0, 5, 50)
   const shown = (drawn[1] as (number | undefined)[]).filter((value) => value !== undefined)
   expect(shown.length).toBeLessThanOrEqual(100)

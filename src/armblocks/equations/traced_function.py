@@ -23,8 +23,9 @@ class TracedFunction:
     column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signatures`).
 
     ``rounded``: products among the expressions that are numbers of their own, such as signals. Numerics round
-    them, also where a sum follows that could be fused with them. A signal then has the same bits in every
-    function of a system, and a sum of signals is that of the numbers that are recorded.
+    them, also where a sum follows that could be fused with them. Such a signal has the same bits in every
+    function of a system, and a sum of signals is that of the numbers that are recorded. Products inside a
+    block are still fused where nothing else of the same function needs them.
     """
 
     name: str

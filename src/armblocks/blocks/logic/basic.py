@@ -85,7 +85,9 @@ class RelationalOperator(Block):
 class LogicalOperator(Block):
     """A gate, element by element: y = u1 AND u2 AND … and the like; NOT has one input.
 
-    XOR is true where an odd count of inputs is; NAND, NOR and NXOR are the opposites.
+    XOR is true where an odd count of inputs is; NAND, NOR and NXOR are the opposites. An input is true where
+    it is not 0. A gate has no events: where a continuous signal leaves 0, compare it first (CompareToZero),
+    so that its change is located.
     """
 
     title: ClassVar[str] = "Logical Operator"
