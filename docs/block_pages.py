@@ -6,6 +6,8 @@ import inspect
 import re
 from collections.abc import Iterable, Iterator
 
+from light_pictures import lightened
+
 import armblocks as ab
 from armblocks.blocks import BLOCKS
 from armblocks.diagram import (
@@ -255,7 +257,7 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
     lines += [
         "<details><summary>The same as a file</summary>",
         "",
-        "```json",
+        "```text",  # colours would take three times the space
         data.rstrip(),
         "```",
         "",
@@ -268,7 +270,7 @@ def worked_example(kind: type[Block], diagram: Diagram) -> list[str]:
 def figure_html(figure: Figure) -> str:
     """A figure of the report, for these pages."""
     shape = "narrow" if figure.narrow else "wide"
-    drawn = svg_inline(figure.picture, f"plot-{figure.name}")
+    drawn = svg_inline(lightened(figure.picture), f"plot-{figure.name}")
     return f'<figure class="{shape}">{drawn}</figure>\n'
 
 

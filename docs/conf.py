@@ -15,13 +15,15 @@ project = "armblocks"
 author = "The armblocks developers"
 copyright = "The armblocks developers"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build"]
 
 html_theme = "furo"
 html_title = "armblocks"
 html_show_sourcelink = False
+html_copy_source = False
+html_show_search_summary = False  # it would be fetched, which browsers refuse to pages of the disk
 html_static_path = ["reference/static"]
 html_css_files = ["pictures.css"]
 

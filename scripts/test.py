@@ -35,7 +35,7 @@ STEPS: dict[str, tuple[str | object, ...]] = {
     "format": (BINARIES / "ruff", "format", "--check", *SOURCES),
     "types": (BINARIES / "pyright", "--warnings"),
     "layers": (BINARIES / "lint-imports", "--no-cache"),
-    "docs": (PYTHON, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "docs", "docs/_build/html"),
+    "docs": (PYTHON, "docs/build_site.py"),
     "tests": (PYTHON, "-m", "pytest", "-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"),
 }
 BEFORE_ALL = ("page",)

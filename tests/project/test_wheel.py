@@ -1,4 +1,4 @@
-"""The wheel is pure Python, brings what is shipped, and runs without the checkout."""
+"""The wheel is pure Python, brings what is shipped and the documentation, and runs without the checkout."""
 
 import os
 import subprocess
@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 from hatchling.builders.wheel import WheelBuilder
+
+from armblocks.blocks import BLOCKS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -35,18 +37,40 @@ def test_the_wheel_brings_what_is_shipped(wheel: Path) -> None:
     assert "armblocks/py.typed" in names
 
 
+def test_the_wheel_brings_a_page_of_every_document_and_no_more_than_pages(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    documents = [path.stem for path in (ROOT / "docs").glob("*.md")]
+    blocks = [f"reference/blocks/{name}" for name in BLOCKS]
+    for page in ("index", "reference/blocks", "reference/shipped", *documents, *blocks):
+        assert f"armblocks/shipped/docs/{page}.html" in names
+    for left_out in ("_sources", ".doctrees", "_modules"):
+        assert not [name for name in names if f"docs/{left_out}" in name]
+
+
+SCRIPT = """
+import armblocks
+from armblocks.cli.main import app
+
+print(armblocks.__file__)
+app(["docs", "--path", "Gain"], standalone_mode=False)
+app(["run", "kr180model", "--no-figures"], standalone_mode=False)
+"""
+
+
 def test_the_wheel_runs_without_the_checkout(wheel: Path, tmp_path: Path) -> None:
-    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
-    script = "import armblocks, sys; print(armblocks.__file__); from armblocks.cli.main import main; main()"
+    site = tmp_path / "site"
+    zipfile.ZipFile(wheel).extractall(site)
     done = subprocess.run(
-        [sys.executable, "-c", script, "run", "kr180model", "--no-figures"],
+        [sys.executable, "-c", SCRIPT],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
+        env={**os.environ, "PYTHONPATH": str(site)},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         encoding="utf-8",
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(str(tmp_path / "site"))
+    module, page, *_ = done.stdout.splitlines()
+    assert Path(module) == site / "armblocks" / "__init__.py"
+    assert Path(page) == site / "armblocks" / "shipped" / "docs" / "reference" / "blocks" / "Gain.html"
     assert (tmp_path / "kr180model-report" / "report.html").is_file()

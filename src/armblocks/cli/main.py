@@ -12,7 +12,20 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from armblocks.cli import bench, blocks, convert, diagram, diff, linearize, listing, run, show, studio, trim
+from armblocks.cli import (
+    bench,
+    blocks,
+    convert,
+    diagram,
+    diff,
+    docs,
+    linearize,
+    listing,
+    run,
+    show,
+    studio,
+    trim,
+)
 from armblocks.cli.terminal import debugging, messages_console, show_error, tidy_warnings
 from armblocks.errors import ArmblocksError
 
@@ -57,6 +70,7 @@ app.command("convert")(convert.convert)
 app.command("show")(show.show)
 app.command("list")(listing.list_names)
 app.command("blocks")(blocks.describe_blocks)
+app.command("docs")(docs.docs)
 app.command("bench")(bench.bench)
 app.command("studio")(studio.studio)
 

@@ -1,0 +1,84 @@
+"""Build the documentation into ``docs/_build/html``: ``python3 docs/build_site.py``.
+
+Nothing is done where the pages are there and their sources are as they were (a stamp tells). A wheel of
+armblocks brings these pages, and ``armblocks docs`` opens them. Sphinx and its theme are the extra ``docs``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent
+ROOT = DOCS.parent
+SITE = DOCS / "_build" / "html"
+STAMP = DOCS / "_build" / "built-from"
+DOCTREES = DOCS / "_build" / "doctrees"
+SOURCES = ("docs", "src/armblocks", "robots", "examples", "libraries")
+"""The blocks, the robots, the examples and the docstrings are on the pages, too."""
+NOT_SOURCES = ("docs/_build", "docs/reference", "src/armblocks/studio/web")
+"""Folders that are built themselves."""
+LEFT_OUT = ("debug.css", "file.png", "plus.png", "minus.png", "skeleton.css")
+"""Files of the theme that no page uses."""
+
+
+def needed() -> bool:
+    """Whether there is something to build."""
+    there = STAMP.is_file() and (SITE / "index.html").is_file()
+    return not there or STAMP.read_text(encoding="utf-8") != digest()
+
+
+def digest() -> str:
+    """Changes with every source of the pages."""
+    found = hashlib.sha256()
+    for path in _sources():
+        found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return found.hexdigest()
+
+
+def _sources() -> Iterator[Path]:
+    built = [ROOT / name for name in NOT_SOURCES]
+    for name in SOURCES:
+        for path in sorted((ROOT / name).rglob("*")):
+            inside = any(path.is_relative_to(folder) for folder in built)
+            if path.is_file() and not inside and "__pycache__" not in path.parts:
+                yield path
+
+
+def build() -> None:
+    """Build the pages, a warning being an error; raises ``SystemExit`` with the reason where that fails."""
+    print("   build the documentation (about a minute)", flush=True, file=sys.stderr)
+    STAMP.unlink(missing_ok=True)
+    shutil.rmtree(SITE, ignore_errors=True)  # Sphinx keeps pages whose documents are gone
+    before = digest()
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-j", "auto"]
+    command += ["-b", "html", "-d", str(DOCTREES), str(DOCS), str(SITE)]
+    # In a build of a wheel, armblocks itself is not installed.
+    paths = [str(ROOT / "src"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
+    done = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr)
+    if done.returncode != 0:
+        raise SystemExit(
+            "The documentation could not be built; the reason stands above.\n"
+            "Everything else of armblocks needs no pages: ARMBLOCKS_SKIP_DOCS=1 pip install .\n"
+            f"The tools for the pages: pip install --editable '{ROOT}[docs]'"
+        )
+    for name in LEFT_OUT:
+        (SITE / "_static" / name).unlink(missing_ok=True)
+    shutil.rmtree(SITE / "_sources", ignore_errors=True)
+    STAMP.write_text(before, encoding="utf-8")
+
+
+def main() -> None:
+    """Build the pages if they are not there as they should be."""
+    if needed():
+        build()
+
+
+if __name__ == "__main__":
+    main()

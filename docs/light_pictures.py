@@ -1,0 +1,55 @@
+"""Figures with fewer points: the pages show hundreds of them, and travel in the wheel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armblocks.pictures.picture import Group, Mark, Picture, Polyline
+
+TOLERANCE = 0.1
+"""px: no left-out point is farther from the line that is drawn."""
+FEWEST = 24
+"""Lines with fewer points stay as they are."""
+
+
+def lightened(picture: Picture) -> Picture:
+    """The same picture, its long lines with as few points as the tolerance allows."""
+    return replace(picture, marks=[_lighter(mark) for mark in picture.marks])
+
+
+def _lighter(mark: Mark) -> Mark:
+    if isinstance(mark, Group):
+        return replace(mark, marks=tuple(_lighter(inner) for inner in mark.marks))
+    if isinstance(mark, Polyline):
+        points = np.asarray(mark.points, dtype=np.float64)
+        if len(points) > FEWEST and np.isfinite(points).all():
+            return replace(mark, points=points[kept_points(points)])
+    return mark
+
+
+def kept_points(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points of a line (N, 2) stay (N,): those at its ends, and those where it bends.
+
+    Source: Douglas and Peucker, "Algorithms for the reduction of the number of points", 1973.
+    """
+    kept = np.zeros(len(points), dtype=np.bool_)
+    kept[[0, -1]] = True
+    open_spans = [(0, len(points) - 1)]
+    while open_spans:
+        first, last = open_spans.pop()
+        if last - first < 2:
+            continue
+        inner = points[first + 1 : last] - points[first]
+        chord = points[last] - points[first]
+        squared = chord @ chord
+        along = np.clip(inner @ chord / squared, 0.0, 1.0) if squared else np.zeros(len(inner))
+        distances = np.linalg.norm(inner - along[:, None] * chord, axis=1)
+        farthest = int(distances.argmax())
+        if distances[farthest] > TOLERANCE:
+            middle = first + 1 + farthest
+            kept[middle] = True
+            open_spans += [(first, middle), (middle, last)]
+    return kept
