@@ -1,4 +1,4 @@
-import type { Request, ServerEvent } from './messages'
+import type { ReplyTo, Request, ServerEvent } from './messages'
 import { keepUnsent, unsent } from './unsent'
 
 /** Why the server refused a request. */
@@ -112,9 +112,9 @@ export class Connection {
   }
 
   /** Ask the server for something; the promise fails with a Refusal. */
-  ask<T = unknown>(request: Request): Promise<T> {
+  ask<R extends Request>(request: R): Promise<ReplyTo<R>> {
     const number = ++this.number
-    return new Promise<T>((resolve, reject) => {
+    return new Promise<ReplyTo<R>>((resolve, reject) => {
       this.waiting.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
       this.keep()
       if (this.flowing || request.kind === 'attach' || request.kind === 'robot_attach')

@@ -71,7 +71,7 @@ export function openMask(block?: string): void {
 
 /** The files of the project folder as they are now, and those used last. */
 export async function projectFiles(): Promise<{ files: string[]; recent: string[] }> {
-  return (await ask<{ files: string[]; recent: string[] }>({ kind: 'files' })) ?? { files: [], recent: [] }
+  return (await ask({ kind: 'files' })) ?? { files: [], recent: [] }
 }
 
 /** Save under the present name; asks for one where there is none. */

@@ -165,7 +165,7 @@ async function showDocumentAgain(welcome: EventOf<'welcome'>): Promise<void> {
   if (last) {
     const { document, inside, path, example } = last
     useStudio.setState({ returned: true })
-    const found = await ask<string>({ kind: 'attach', document, inside, path, example })
+    const found = await ask({ kind: 'attach', document, inside, path, example })
     if (found !== undefined) {
       line.resend()
       return

@@ -1,8 +1,9 @@
-/* Made from src/armblocks/studio/protocol/messages.py by scripts/studio_types.py: do not edit. */
+/* Made from src/armblocks/studio/protocol/messages by scripts/studio_types.py: do not edit. */
 
 export interface Messages {
   envelope: Envelope;
   server: ServerMessage;
+  replies: Replies;
 }
 /**
  * A request with its number.
@@ -10,63 +11,69 @@ export interface Messages {
 export interface Envelope {
   number: number;
   request:
-    | Open
-    | New
-    | Attach
-    | Look
-    | Change
-    | Undo
-    | Redo
     | ArrangeBlocks
-    | Reload
-    | KeepMine
-    | Save
-    | Ping
-    | Files
     | AskMask
-    | AskOutline
-    | Copy
-    | Find
+    | Attach
+    | Change
     | Close
-    | Recover
-    | Run
     | Control
-    | SetSpeed
+    | Copy
+    | Drop
+    | Files
+    | Find
+    | KeepMine
+    | Look
+    | New
+    | Open
+    | AskOutline
+    | Ping
+    | Pose
+    | Recover
+    | Redo
+    | Reload
     | Rewind
+    | RobotAttach
+    | RobotBodies
+    | RobotChange
+    | RobotForm
+    | RobotKeepMine
+    | RobotOfBlock
+    | RobotOpen
+    | RobotPicture
+    | RobotPose
+    | RobotRead
+    | RobotRedo
+    | RobotReload
+    | RobotSave
+    | RobotUndo
+    | Run
+    | Save
+    | Scene
+    | SetSpeed
     | Tune
     | TypedValue
     | TypedSettings
-    | Scene
-    | Pose
-    | RobotOpen
-    | RobotOfBlock
-    | RobotAttach
-    | RobotChange
-    | RobotUndo
-    | RobotRedo
-    | RobotReload
-    | RobotKeepMine
-    | RobotSave
-    | RobotForm
-    | RobotBodies
-    | RobotPose
-    | RobotRead
-    | RobotPicture
-    | Drop;
+    | Undo;
 }
 /**
- * Open a file of the project, or the shipped example of this name.
+ * Lay the blocks out anew, from left to right.
  */
-export interface Open {
-  kind: "open";
-  path?: string;
-  example?: string;
+export interface ArrangeBlocks {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  document: string;
+  kind: "arrange";
+  inside?: string[];
 }
 /**
- * Begin an empty drawing.
+ * Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it.
  */
-export interface New {
-  kind: "new";
+export interface AskMask {
+  kind: "ask_mask";
+  document: string;
+  inside?: string[];
+  block?: string;
 }
 /**
  * Show a document again: after a reload, after the line was down, or in a second page.
@@ -80,14 +87,6 @@ export interface Attach {
   inside?: string[];
   path?: string | null;
   example?: string;
-}
-/**
- * Look at the sheet inside a subsystem; the empty path is the whole model.
- */
-export interface Look {
-  kind: "look";
-  document: string;
-  inside: string[];
 }
 /**
  * Carry out an edit.
@@ -333,89 +332,20 @@ export interface Describe {
   text: string;
 }
 /**
- * Take the last edit back.
+ * Put a document away; ``discard`` where it has edits that no file holds.
  */
-export interface Undo {
-  key?: string;
-  base?: number | null;
-  author?: string;
+export interface Close {
+  kind: "close";
   document: string;
-  kind: "undo";
+  discard?: boolean;
 }
 /**
- * Do again what was undone.
+ * Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant.
  */
-export interface Redo {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  document: string;
-  kind: "redo";
-}
-/**
- * Lay the blocks out anew, from left to right.
- */
-export interface ArrangeBlocks {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  document: string;
-  kind: "arrange";
-  inside?: string[];
-}
-/**
- * Take what the file holds now, as one step that can be undone.
- */
-export interface Reload {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  document: string;
-  kind: "reload";
-}
-/**
- * Leave the file that has changed on the disk as it is until the next save, which overwrites it.
- */
-export interface KeepMine {
-  kind: "keep_mine";
-  document: string;
-}
-/**
- * Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile.
- */
-export interface Save {
-  kind: "save";
-  document: string;
-  path?: string;
-  overwrite?: boolean;
-}
-/**
- * Ask for nothing but an answer: the page thereby knows that the line is up.
- */
-export interface Ping {
-  kind: "ping";
-}
-/**
- * Ask for the files of the project folder as they are now, those used last first among ``recent``.
- */
-export interface Files {
-  kind: "files";
-}
-/**
- * Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it.
- */
-export interface AskMask {
-  kind: "ask_mask";
-  document: string;
-  inside?: string[];
-  block?: string;
-}
-/**
- * Ask for the tree of sheets, an :class:`Outline`.
- */
-export interface AskOutline {
-  kind: "outline";
-  document: string;
+export interface Control {
+  run: string;
+  kind: "control";
+  action: "pause" | "resume" | "step" | "back" | "stop";
 }
 /**
  * Ask for blocks and notes of a sheet as text, which :class:`PasteBlocks` puts on a sheet again.
@@ -428,6 +358,20 @@ export interface Copy {
   notes?: string[];
 }
 /**
+ * Open a file that was dropped on the page: a script, a robot or a diagram. Nothing of it is run.
+ */
+export interface Drop {
+  kind: "drop";
+  name: string;
+  content: string;
+}
+/**
+ * Ask for the files of the project folder as they are now.
+ */
+export interface Files {
+  kind: "files";
+}
+/**
  * Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`.
  */
 export interface Find {
@@ -436,12 +380,56 @@ export interface Find {
   text: string;
 }
 /**
- * Put a document away; ``discard`` where it has edits that no file holds.
+ * Leave the file that has changed on the disk as it is until the next save, which overwrites it.
  */
-export interface Close {
-  kind: "close";
+export interface KeepMine {
+  kind: "keep_mine";
   document: string;
-  discard?: boolean;
+}
+/**
+ * Look at the sheet inside a subsystem; the empty path is the whole model.
+ */
+export interface Look {
+  kind: "look";
+  document: string;
+  inside: string[];
+}
+/**
+ * Begin an empty drawing.
+ */
+export interface New {
+  kind: "new";
+}
+/**
+ * Open a file of the project, or the shipped example of this name.
+ */
+export interface Open {
+  kind: "open";
+  path?: string;
+  example?: string;
+}
+/**
+ * Ask for the tree of sheets, an :class:`Outline`.
+ */
+export interface AskOutline {
+  kind: "outline";
+  document: string;
+}
+/**
+ * Ask for nothing but an answer: the page thereby knows that the line is up.
+ */
+export interface Ping {
+  kind: "ping";
+}
+/**
+ * Ask where the links of a block's robot are at joint coordinates ``q`` (rad, m).
+ */
+export interface Pose {
+  kind: "pose";
+  document: string;
+  inside?: string[];
+  block: string;
+  q: number[];
 }
 /**
  * Say what becomes of a drawing or a robot that a journal gives back.
@@ -455,108 +443,32 @@ export interface Recover {
   action: "open" | "keep_both" | "discard";
 }
 /**
- * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
- *
- * ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
+ * Do again what was undone.
  */
-export interface Run {
-  kind: "run";
+export interface Redo {
+  key?: string;
+  base?: number | null;
+  author?: string;
   document: string;
-  speed?: number | null;
-  tuned?: {
-    [k: string]: unknown;
-  };
+  kind: "redo";
 }
 /**
- * Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant.
+ * Take what the file holds now, as one step that can be undone.
  */
-export interface Control {
-  kind: "control";
-  run: string;
-  action: "pause" | "resume" | "step" | "back" | "stop";
-}
-/**
- * Change the speed of a run; ``None``: as fast as possible.
- */
-export interface SetSpeed {
-  kind: "speed";
-  run: string;
-  speed?: number | null;
+export interface Reload {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  document: string;
+  kind: "reload";
 }
 /**
  * Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay.
  */
 export interface Rewind {
+  run: string;
   kind: "rewind";
-  run: string;
   time: number;
-}
-/**
- * Change a tunable parameter of a run that is under way.
- */
-export interface Tune {
-  kind: "tune";
-  run: string;
-  parameter: string;
-  value: unknown;
-}
-/**
- * Ask what a text typed into a parameter's field means: its value, or what is wrong with it.
- */
-export interface TypedValue {
-  kind: "typed";
-  document?: string;
-  inside?: string[];
-  block?: string;
-  type: string;
-  parameter: string;
-  text: string;
-}
-/**
- * Ask what is wrong with settings while they are typed: a text for each that is, by name.
- */
-export interface TypedSettings {
-  kind: "typed_settings";
-  document: string;
-  values: {
-    [k: string]: number | string | null;
-  };
-}
-/**
- * Ask for the bodies of the robot that a block shows.
- */
-export interface Scene {
-  kind: "scene";
-  document: string;
-  inside?: string[];
-  block: string;
-}
-/**
- * Ask where the links of a block's robot are at joint coordinates ``q`` (rad, m).
- */
-export interface Pose {
-  kind: "pose";
-  document: string;
-  inside?: string[];
-  block: string;
-  q: number[];
-}
-/**
- * Open a robot: a file of the project, a shipped one, or a new one where both are empty.
- */
-export interface RobotOpen {
-  kind: "robot_open";
-  path?: string;
-  shipped?: string;
-}
-/**
- * Open the robot that a block uses: its file, or a copy of it.
- */
-export interface RobotOfBlock {
-  kind: "robot_of_block";
-  document: string;
-  inside?: string[];
-  block: string;
 }
 /**
  * Show a robot that is open already: after a reload, after the line was down, or in a second page.
@@ -569,6 +481,13 @@ export interface RobotAttach {
   robot: string;
   path?: string | null;
   shipped?: string;
+}
+/**
+ * Ask for the bodies of an open robot.
+ */
+export interface RobotBodies {
+  kind: "robot_bodies";
+  robot: string;
 }
 /**
  * Carry out an edit.
@@ -633,34 +552,10 @@ export interface SetConvention {
   keep_arm: boolean;
 }
 /**
- * Take the last edit back.
+ * Ask which tables a robot has and what stands in their columns.
  */
-export interface RobotUndo {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  robot: string;
-  kind: "robot_undo";
-}
-/**
- * Do again what was undone.
- */
-export interface RobotRedo {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  robot: string;
-  kind: "robot_redo";
-}
-/**
- * Take what the file holds now, as one step that can be undone.
- */
-export interface RobotReload {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  robot: string;
-  kind: "robot_reload";
+export interface RobotForm {
+  kind: "robot_form";
 }
 /**
  * Leave the file that has changed on the disk until the next save, which overwrites it.
@@ -670,26 +565,36 @@ export interface RobotKeepMine {
   robot: string;
 }
 /**
- * Write the robot's file; ``path`` gives it another. ``overwrite``: also where the disk has changed.
+ * Open the robot that a block uses: its file, or a copy of it.
  */
-export interface RobotSave {
-  kind: "robot_save";
-  robot: string;
+export interface RobotOfBlock {
+  kind: "robot_of_block";
+  document: string;
+  inside?: string[];
+  block: string;
+}
+/**
+ * Open a robot: a file of the project, a shipped one, or a new one where both are empty.
+ */
+export interface RobotOpen {
+  kind: "robot_open";
   path?: string;
-  overwrite?: boolean;
+  shipped?: string;
 }
 /**
- * Ask which tables a robot has and what stands in their columns.
+ * Ask for a drawing, as SVG, of an open robot at ``q``, or of that of a block where ``block`` is said.
  */
-export interface RobotForm {
-  kind: "robot_form";
-}
-/**
- * Ask for the bodies of an open robot.
- */
-export interface RobotBodies {
-  kind: "robot_bodies";
-  robot: string;
+export interface RobotPicture {
+  kind: "robot_picture";
+  robot?: string;
+  document?: string;
+  inside?: string[];
+  block?: string;
+  /**
+   * @maxItems 1000
+   */
+  q: number[];
+  theme: "light" | "dark";
 }
 /**
  * Ask where the links of an open robot are at ``q``.
@@ -722,132 +627,150 @@ export interface RobotRead {
   qdd: number[];
 }
 /**
- * Ask for a drawing, as SVG, of an open robot at ``q``, or of that of a block where ``block`` is said.
+ * Do again what was undone.
  */
-export interface RobotPicture {
-  kind: "robot_picture";
-  robot?: string;
+export interface RobotRedo {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  robot: string;
+  kind: "robot_redo";
+}
+/**
+ * Take what the file holds now, as one step that can be undone.
+ */
+export interface RobotReload {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  robot: string;
+  kind: "robot_reload";
+}
+/**
+ * Write the robot's file; ``path`` gives it another. ``overwrite``: also where the disk has changed.
+ */
+export interface RobotSave {
+  kind: "robot_save";
+  robot: string;
+  path?: string;
+  overwrite?: boolean;
+}
+/**
+ * Take the last edit back.
+ */
+export interface RobotUndo {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  robot: string;
+  kind: "robot_undo";
+}
+/**
+ * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
+ *
+ * ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
+ */
+export interface Run {
+  kind: "run";
+  document: string;
+  speed?: number | null;
+  tuned?: {
+    [k: string]: unknown;
+  };
+}
+/**
+ * Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile.
+ */
+export interface Save {
+  kind: "save";
+  document: string;
+  path?: string;
+  overwrite?: boolean;
+}
+/**
+ * Ask for the bodies of the robot that a block shows.
+ */
+export interface Scene {
+  kind: "scene";
+  document: string;
+  inside?: string[];
+  block: string;
+}
+/**
+ * Change the speed of a run; ``None``: as fast as possible.
+ */
+export interface SetSpeed {
+  run: string;
+  kind: "speed";
+  speed?: number | null;
+}
+/**
+ * Change a tunable parameter of a run that is under way.
+ */
+export interface Tune {
+  run: string;
+  kind: "tune";
+  parameter: string;
+  value: unknown;
+}
+/**
+ * Ask what a text typed into a parameter's field means: its value, or what is wrong with it.
+ */
+export interface TypedValue {
+  kind: "typed";
   document?: string;
   inside?: string[];
   block?: string;
-  /**
-   * @maxItems 1000
-   */
-  q: number[];
-  theme: "light" | "dark";
+  type: string;
+  parameter: string;
+  text: string;
 }
 /**
- * Open a file that was dropped on the page: a script, a robot or a diagram. Nothing of it is run.
+ * Ask what is wrong with settings while they are typed: a text for each that is, by name.
  */
-export interface Drop {
-  kind: "drop";
-  name: string;
-  content: string;
+export interface TypedSettings {
+  kind: "typed_settings";
+  document: string;
+  values: {
+    [k: string]: number | string | null;
+  };
 }
 /**
- * Only for the page's types: everything that the server sends as text.
+ * Take the last edit back.
+ */
+export interface Undo {
+  key?: string;
+  base?: number | null;
+  author?: string;
+  document: string;
+  kind: "undo";
+}
+/**
+ * Only for the types of the front end: everything that the server sends as text.
  */
 export interface ServerMessage {
   event:
-    | Reply
-    | Welcome
-    | Documents
-    | Opened
     | Changed
     | Checked
+    | Documents
+    | Opened
+    | Reply
+    | RobotShown
+    | RobotOpened
+    | RunProgress
+    | RunRewound
     | RunStarted
     | RunTuned
-    | RunRewound
-    | RunProgress
-    | RobotShown
-    | RobotOpened;
-  values?: Opening | RobotTables | Readings | Outline | Found | SetMask | null;
+    | Welcome;
 }
 /**
- * The answer to a request: ``fault`` where it was refused.
+ * A document went from one version to another.
  */
-export interface Reply {
-  kind: "reply";
-  number: number;
-  value?: {
-    [k: string]: unknown;
-  };
-  fault?: Fault | null;
-}
-/**
- * Why a request was refused, in the parts of an ``ArmblocksError``.
- */
-export interface Fault {
-  what: string;
-  where: string;
-  allowed: string;
-  fix: string;
-}
-/**
- * The first message: the library, the examples, the files and the documents that are open.
- */
-export interface Welcome {
-  kind: "welcome";
-  version: string;
-  library: BlockType[];
-  robots: string[];
-  solvers: SolverChoice[];
-  settings: SettingRule[];
-  examples: {
-    [k: string]: string;
-  };
-  files: string[];
-  recent: string[];
-  documents: DocumentState[];
-  recoveries: Recovery[];
-}
-/**
- * A type of block in the library palette. ``face`` is the drawing of one with the default parameters.
- */
-export interface BlockType {
-  type: string;
-  title: string;
-  family: string;
-  summary: string;
-  documentation: string;
-  width: number;
-  height: number;
-  face: string;
-  inputs: string[];
-  outputs: string[];
-  parameters: ParameterRule[];
-}
-/**
- * One parameter of a type of block, as its dialog needs it.
- */
-export interface ParameterRule {
-  name: string;
-  kind: string;
-  doc: string;
-  unit: string;
-  default: unknown;
-  tunable: boolean;
-  choices: string[];
-  allowed: string;
-}
-/**
- * A solver that a model may ask for.
- */
-export interface SolverChoice {
-  name: string;
-  title: string;
-  adaptive: boolean;
-  stiff: boolean;
-}
-/**
- * One setting of a run, as the dialog of configuration parameters needs it.
- */
-export interface SettingRule {
-  name: string;
-  title: string;
-  unit: string;
-  doc: string;
-  default: number | string | null;
+export interface Changed {
+  kind: "changed";
+  state: DocumentState;
+  before: number;
+  change: SheetChange;
 }
 /**
  * Where a document stands.
@@ -871,59 +794,19 @@ export interface DocumentState {
   };
 }
 /**
- * A drawing or a robot that was not saved when the studio ended, as its journal gives it back.
- *
- * ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
- * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
- * ``parts`` how many blocks or links it has. ``disk`` says whether the file is still the one that was
- * edited. ``missing`` says what could not be read.
+ * From one version of the drawing to the next.
  */
-export interface Recovery {
-  holds: "diagram" | "robot";
-  document: string;
-  title: string;
-  path: string | null;
-  began: number;
-  last: number;
-  edits: number;
-  parts: number;
-  disk: "same" | "changed" | "gone";
-  missing: string;
-}
-/**
- * The documents that are open and those that wait to be recovered, whenever either has changed.
- */
-export interface Documents {
-  kind: "documents";
-  documents: DocumentState[];
-  recoveries: Recovery[];
-}
-/**
- * A whole document, for a page that shows it from now on, and the run that the server has of it.
- */
-export interface Opened {
-  kind: "opened";
-  state: DocumentState;
-  inside: string[];
-  sheet: Sheet;
-  run?: string | null;
-}
-/**
- * The whole drawing.
- */
-export interface Sheet {
-  name: string;
-  description: string;
+export interface SheetChange {
   blocks: {
-    [k: string]: SheetBlock;
+    [k: string]: SheetBlock | null;
   };
-  wires: Wire[];
-  notes: {
+  wires_added: Wire[];
+  wires_removed: Wire[];
+  notes?: {
     [k: string]: SheetNote;
-  };
-  logged: string[];
-  linked: string[];
-  link: string;
+  } | null;
+  description?: string | null;
+  logged?: string[] | null;
 }
 /**
  * A block as it stands on the sheet. ``face`` is SVG in the block's own px; its colours are classes.
@@ -962,28 +845,17 @@ export interface PortSpot {
   dy: number;
 }
 /**
- * A document went from one version to another.
+ * One parameter of a type of block, as its dialog needs it.
  */
-export interface Changed {
-  kind: "changed";
-  state: DocumentState;
-  before: number;
-  change: SheetChange;
-}
-/**
- * From one version of the drawing to the next.
- */
-export interface SheetChange {
-  blocks: {
-    [k: string]: SheetBlock | null;
-  };
-  wires_added: Wire[];
-  wires_removed: Wire[];
-  notes?: {
-    [k: string]: SheetNote;
-  } | null;
-  description?: string | null;
-  logged?: string[] | null;
+export interface ParameterRule {
+  name: string;
+  kind: string;
+  doc: string;
+  unit: string;
+  default: unknown;
+  tunable: boolean;
+  choices: string[];
+  allowed: string;
 }
 /**
  * What the background check found in one version of a document; ``wires`` by source port.
@@ -1016,87 +888,79 @@ export interface WireKind {
   bus?: boolean;
 }
 /**
- * A run has begun: what it records and how it is to be shown.
+ * The documents that are open and those that wait to be recovered, whenever either has changed.
  */
-export interface RunStarted {
-  kind: "run_started";
+export interface Documents {
+  kind: "documents";
+  documents: DocumentState[];
+  recoveries: Recovery[];
+}
+/**
+ * A drawing or a robot that was not saved when the studio ended, as its journal gives it back.
+ *
+ * ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
+ * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
+ * ``parts`` how many blocks or links it has. ``disk`` says whether the file is still the one that was
+ * edited. ``missing`` says what could not be read.
+ */
+export interface Recovery {
+  holds: "diagram" | "robot";
   document: string;
-  run: string;
-  stop_time: number;
-  channels: Channel[];
-  views: ViewOf[];
-  aliases: {
-    [k: string]: string;
-  };
-  tunables: Tunable[];
-  stride: number;
-}
-/**
- * One recorded signal of a run and where its numbers lie in the columns of a frame.
- *
- * ``entries`` are names of the entries of a vector, such as joints; empty where they are numbered.
- */
-export interface Channel {
-  name: string;
-  shape: number[];
-  unit: string;
-  entries: string[];
-}
-/**
- * A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``.
- */
-export interface ViewOf {
-  block: string;
-  kind: string;
-  signals: string[];
-  labels: string[];
   title: string;
+  path: string | null;
+  began: number;
+  last: number;
+  edits: number;
+  parts: number;
+  disk: "same" | "changed" | "gone";
+  missing: string;
 }
 /**
- * A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
- *
- * ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
+ * A whole document, for a page that shows it from now on, and the run that the server has of it.
  */
-export interface Tunable {
-  path: string;
-  value: unknown;
-  unit: string;
-  doc: string;
-  low: number | null;
-  high: number | null;
+export interface Opened {
+  kind: "opened";
+  state: DocumentState;
+  inside: string[];
+  sheet: Sheet;
+  run?: string | null;
 }
 /**
- * From this instant (s) on a parameter of a run has this value.
+ * The whole drawing.
  */
-export interface RunTuned {
-  kind: "run_tuned";
-  run: string;
-  time: number;
-  parameter: string;
-  value: unknown;
+export interface Sheet {
+  name: string;
+  description: string;
+  blocks: {
+    [k: string]: SheetBlock;
+  };
+  wires: Wire[];
+  notes: {
+    [k: string]: SheetNote;
+  };
+  logged: string[];
+  linked: string[];
+  link: string;
 }
 /**
- * A run stands at an earlier instant (s) again: only the first ``count`` samples are still true.
+ * The answer to a request: ``fault`` where it was refused.
  */
-export interface RunRewound {
-  kind: "run_rewound";
-  run: string;
-  time: number;
-  count: number;
-}
-/**
- * Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that.
- */
-export interface RunProgress {
-  kind: "run_progress";
-  run: string;
-  state: "running" | "paused" | "done" | "stopped" | "failed";
-  time: number;
-  real_time_factor: number;
-  message: string;
+export interface Reply {
+  kind: "reply";
+  number: number;
+  value?: {
+    [k: string]: unknown;
+  };
   fault?: Fault | null;
-  solver?: string;
-  reason?: string;
+}
+/**
+ * Why a request was refused, in the parts of an ``ArmblocksError``.
+ */
+export interface Fault {
+  what: string;
+  where: string;
+  allowed: string;
+  fix: string;
 }
 /**
  * An open robot as it is now: sent to every page that shows it, after every change.
@@ -1170,6 +1034,260 @@ export interface RobotSpot {
   name: string;
 }
 /**
+ * Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that.
+ */
+export interface RunProgress {
+  kind: "run_progress";
+  run: string;
+  state: "running" | "paused" | "done" | "stopped" | "failed";
+  time: number;
+  real_time_factor: number;
+  message: string;
+  fault?: Fault | null;
+  solver?: string;
+  reason?: string;
+}
+/**
+ * A run stands at an earlier instant (s) again: only the first ``count`` samples are still true.
+ */
+export interface RunRewound {
+  kind: "run_rewound";
+  run: string;
+  time: number;
+  count: number;
+}
+/**
+ * A run has begun: what it records and how it is to be shown.
+ */
+export interface RunStarted {
+  kind: "run_started";
+  document: string;
+  run: string;
+  stop_time: number;
+  channels: Channel[];
+  views: ViewOf[];
+  aliases: {
+    [k: string]: string;
+  };
+  tunables: Tunable[];
+  stride: number;
+}
+/**
+ * One recorded signal of a run and where its numbers lie in the columns of a frame.
+ *
+ * ``entries`` are names of the entries of a vector, such as joints; empty where they are numbered.
+ */
+export interface Channel {
+  name: string;
+  shape: number[];
+  unit: string;
+  entries: string[];
+}
+/**
+ * A picture that a sink asks for. ``robot`` is the key of its scene where the kind is ``robot``.
+ */
+export interface ViewOf {
+  block: string;
+  kind: string;
+  signals: string[];
+  labels: string[];
+  title: string;
+}
+/**
+ * A parameter that can be changed while the run goes on; ``path`` is ``block.parameter``.
+ *
+ * ``low`` and ``high`` bound its numbers as the block declares it; ``None`` where nothing does.
+ */
+export interface Tunable {
+  path: string;
+  value: unknown;
+  unit: string;
+  doc: string;
+  low: number | null;
+  high: number | null;
+}
+/**
+ * From this instant (s) on a parameter of a run has this value.
+ */
+export interface RunTuned {
+  kind: "run_tuned";
+  run: string;
+  time: number;
+  parameter: string;
+  value: unknown;
+}
+/**
+ * The first message: the library, the examples, the files and the documents that are open.
+ */
+export interface Welcome {
+  kind: "welcome";
+  version: string;
+  library: BlockType[];
+  robots: string[];
+  solvers: SolverChoice[];
+  settings: SettingRule[];
+  examples: {
+    [k: string]: string;
+  };
+  files: string[];
+  recent: string[];
+  documents: DocumentState[];
+  recoveries: Recovery[];
+}
+/**
+ * A type of block in the library palette. ``face`` is the drawing of one with the default parameters.
+ */
+export interface BlockType {
+  type: string;
+  title: string;
+  family: string;
+  summary: string;
+  documentation: string;
+  width: number;
+  height: number;
+  face: string;
+  inputs: string[];
+  outputs: string[];
+  parameters: ParameterRule[];
+}
+/**
+ * A solver that a model may ask for.
+ */
+export interface SolverChoice {
+  name: string;
+  title: string;
+  adaptive: boolean;
+  stiff: boolean;
+}
+/**
+ * One setting of a run, as the dialog of configuration parameters needs it.
+ */
+export interface SettingRule {
+  name: string;
+  title: string;
+  unit: string;
+  doc: string;
+  default: number | string | null;
+}
+export interface Replies {
+  arrange: number;
+  ask_mask: SetMask;
+  attach: string;
+  change: number;
+  close: null;
+  control: null;
+  copy: string;
+  drop: Opening;
+  files: FileList;
+  find: Found[];
+  keep_mine: null;
+  look: string;
+  new: string;
+  open: Opening | string;
+  outline: Outline;
+  ping: null;
+  pose: number[][][];
+  recover: string | null;
+  redo: number;
+  reload: number;
+  rewind: null;
+  robot_attach: Opening;
+  robot_bodies: RobotScene;
+  robot_change: number;
+  robot_form: RobotTables;
+  robot_keep_mine: null;
+  robot_of_block: Opening;
+  robot_open: Opening;
+  robot_picture: string;
+  robot_pose: number[][][];
+  robot_read: Readings;
+  robot_redo: number;
+  robot_reload: number;
+  robot_save: string;
+  robot_undo: number;
+  run: string;
+  save: string;
+  scene: RobotScene;
+  speed: null;
+  tune: null;
+  typed: unknown;
+  typed_settings: {
+    [k: string]: string;
+  };
+  undo: number;
+}
+/**
+ * Files of the project folder; ``recent`` are those used last, the latest first.
+ */
+export interface FileList {
+  files: string[];
+  recent: string[];
+}
+/**
+ * A block that was sought; ``match`` is the value that fits, ``""`` where name or type does.
+ */
+export interface Found {
+  inside: string[];
+  name: string;
+  title: string;
+  match: string;
+}
+/**
+ * The sheets of a model as a tree.
+ */
+export interface Outline {
+  name: string;
+  blocks: number;
+  subsystems: Outline[];
+}
+/**
+ * Bodies, joints and size of a robot.
+ *
+ * ``reach`` (m) of the arm; ``foot`` (m): how far the bodies of the base reach below its frame. There are
+ * ``rows`` poses: of base, links and tool.
+ */
+export interface RobotScene {
+  name: string;
+  reach: number;
+  foot: number;
+  rows: number;
+  bodies: SceneBody[];
+  joints: SceneJoint[];
+  [k: string]: unknown;
+}
+/**
+ * A body of a robot, which moves with a ``row`` of the poses: 0 is the base, then come the links.
+ *
+ * ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) of its triangles: base64 of little-endian float32.
+ */
+export interface SceneBody {
+  row: number;
+  material: "paint" | "joint" | "flange" | "base";
+  corners: string;
+  normals: string;
+  [k: string]: unknown;
+}
+/**
+ * A joint: the link of ``row`` moves against that of ``carrier``.
+ *
+ * ``frame`` is its pose in the frame of ``carrier`` and ``moving`` its pose in the link's own frame, (16,)
+ * row by row; z is the joint's axis. The x of ``moving`` has turned from that of ``frame`` by q + ``offset``
+ * (of a prismatic joint: its origin has moved so far). ``limits`` are in rad or m, ``radius`` (m) is that of
+ * the drum that is drawn on the joint.
+ */
+export interface SceneJoint {
+  name: string;
+  row: number;
+  turns: boolean;
+  limits: [number, number] | null;
+  carrier: number;
+  frame: number[];
+  moving: number[];
+  offset: number;
+  radius: number;
+  [k: string]: unknown;
+}
+/**
  * The answer to ``robot_form``.
  */
 export interface RobotTables {
@@ -1203,21 +1321,4 @@ export interface Readings {
   torque: number[];
   singular: string;
   limits: string[];
-}
-/**
- * The sheets of a model as a tree.
- */
-export interface Outline {
-  name: string;
-  blocks: number;
-  subsystems: Outline[];
-}
-/**
- * A block that was sought; ``match`` is the value that fits, ``""`` where name or type does.
- */
-export interface Found {
-  inside: string[];
-  name: string;
-  title: string;
-  match: string;
 }

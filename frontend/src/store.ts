@@ -2,7 +2,7 @@ import { create } from 'zustand'
 import { Connection, Refusal, type Line } from './connection'
 import { changed as viewsChanged } from './frames'
 import { newKey } from './keys'
-import type { EventOf, Request } from './messages'
+import type { EventOf, ReplyTo, Request } from './messages'
 import type {
   BlockType,
   Channel,
@@ -122,9 +122,9 @@ export function refuse({ what, where, fix }: Pick<Fault, 'what' | 'where' | 'fix
 }
 
 /** Ask the server; a refusal becomes a notice, and the promise then gives undefined. */
-export async function ask<T = unknown>(request: Request): Promise<T | undefined> {
+export async function ask<R extends Request>(request: R): Promise<ReplyTo<R> | undefined> {
   try {
-    return await line.ask<T>(request)
+    return await line.ask(request)
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
     refuse(error)
@@ -143,7 +143,7 @@ function alteration(document: OpenDocument) {
 }
 
 /** Carry out an edit of the document on the screen; where it is refused the sheet is shown as it is. */
-export async function change(edit: Edit): Promise<unknown> {
+export async function change(edit: Edit): Promise<number | undefined> {
   const { document } = useStudio.getState()
   if (!document) return undefined
   const { inside } = document

@@ -8,7 +8,7 @@ from typing import Any
 
 from armblocks.diagram import Diagram, DiagramBlock, ParameterKind
 from armblocks.formats import load_robot
-from armblocks.studio.protocol import edit_messages as do
+from armblocks.studio.protocol.messages import sheet_edits as do
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.document import Document
 

@@ -14,7 +14,7 @@ from armblocks.blocks import BLOCKS, Gain
 from armblocks.diagram import Diagram, Note, diagram_difference, formula, mask_parameter
 from armblocks.errors import DiagramError, FormatError, InputError
 from armblocks.formats import diagram_from_bytes, load_diagram, load_robot
-from armblocks.studio.protocol.edit_messages import (
+from armblocks.studio.protocol.messages.sheet_edits import (
     BendWires,
     MoveBlocks,
     PasteBlocks,

@@ -8,14 +8,14 @@ import copy
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
 from armblocks.diagram import Diagram
 from armblocks.formats import diagram_to_bytes, load_robot, write_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.message import Request, messages_of
 from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.hub import Hub
 
@@ -150,17 +150,6 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
     ]
 
 
-def kinds(union: Any) -> set[str]:
-    """The kinds of all requests that the server knows."""
-    found: set[str] = set()
-    for member in get_args(union):
-        if hasattr(member, "model_fields"):
-            found.add(member.model_fields["kind"].default)
-        else:
-            found |= kinds(member)
-    return found
-
-
 def spoilt(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The request with each value in it, at any depth, in turn replaced by something hostile or left out."""
 
@@ -226,7 +215,7 @@ def test_every_kind_of_message_answers_hostile_values_in_words(folder: Path) -> 
             return told[-1]
 
         robot = (await send({"kind": "robot_open", "path": "arm.json"}))["value"]["robots"][0]["robot"]
-        assert {request["kind"] for request in requests("", "")} == kinds(say.Request)
+        assert {request["kind"] for request in requests("", "")} == set(messages_of(Request))
         for place in range(len(requests("", ""))):
             document = (await send({"kind": "open", "example": "van_der_pol_pid"}))["value"]
             request = requests(document, robot)[place]

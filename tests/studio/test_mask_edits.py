@@ -17,7 +17,7 @@ from armblocks.diagram import Diagram, DiagramBlock, DiagramBuilder, formula
 from armblocks.diagram.expression_language import Formula
 from armblocks.errors import ArmblocksError, DiagramError, InputError, UnknownNameError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio.protocol.edit_messages import BreakLink, MaskParameter, SetMask, SetParameters
+from armblocks.studio.protocol.messages.sheet_edits import BreakLink, MaskParameter, SetMask, SetParameters
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.mask_edits import mask_of, renamed_in
 from armblocks.studio.sheet.placing import placed

@@ -14,8 +14,8 @@ from crashed_disk import Disk, going
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import diagram_to_bytes, load_robot
 from armblocks.studio.documents import open_files
-from armblocks.studio.protocol import messages as say
-from armblocks.studio.protocol.edit_messages import (
+from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     Edit,
     MoveBlocks,

@@ -18,7 +18,7 @@ import armblocks as ab
 from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats import DocumentKind, kind_of_data, load_robot, read_robots, write_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.robot_messages import MOST_DROPPED
+from armblocks.studio.protocol.messages.robots import MOST_DROPPED
 from armblocks.studio.robots.readings import readings, singularity
 from armblocks.studio.server.hub import Hub, Page
 

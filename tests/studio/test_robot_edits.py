@@ -18,7 +18,7 @@ from armblocks.formats import list_robots, load_robot, write_robot
 from armblocks.robot import FrictionModel, JointLimits, Link, Robot, standard_dh
 from armblocks.studio.documents.history import History
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.robot_edit_messages import RobotEdit
+from armblocks.studio.protocol.messages.robot_edits import RobotEdit
 from armblocks.studio.robots.columns import ROBOT_COLUMNS, Quantity
 from armblocks.studio.robots.edits import angle_value, robot_applied, robot_summary
 from armblocks.studio.robots.link_columns import LINK_COLUMNS

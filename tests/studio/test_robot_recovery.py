@@ -12,9 +12,9 @@ from crashed_disk import Disk, going
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
 from armblocks.studio.documents import open_files
-from armblocks.studio.protocol import messages as say
-from armblocks.studio.protocol import robot_messages as say_robot
-from armblocks.studio.protocol.robot_edit_messages import SetCell
+from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages import robots as say_robot
+from armblocks.studio.protocol.messages.robot_edits import SetCell
 from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
 
 

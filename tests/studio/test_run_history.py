@@ -14,7 +14,7 @@ from armblocks.blocks import BLOCKS
 from armblocks.errors import ArmblocksError
 from armblocks.face.model import CompiledDiagram
 from armblocks.formats import diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio.protocol import run_messages as say
+from armblocks.studio.protocol.messages import runs as say
 from armblocks.studio.runs.history import RunHistory
 from armblocks.studio.runs.process import RunProcess
 from armblocks.studio.runs.tunables import tunables

@@ -13,7 +13,7 @@ from run_frames import read_frame
 
 import armblocks as ab
 from armblocks.formats import diagram_to_bytes, load_robot
-from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.messages import runs as say
 from armblocks.studio.runs import worker as run_worker
 from armblocks.studio.runs.pace import Pace
 

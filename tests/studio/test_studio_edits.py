@@ -13,7 +13,7 @@ from armblocks.blocks import BLOCKS, Gain
 from armblocks.diagram import Diagram, DiagramBlock, Placement, diagram_views, formula, mask_parameter
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.formats import diagram_from_bytes, diagram_to_bytes, load_diagram, load_robot
-from armblocks.studio.protocol.edit_messages import (
+from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     BendWires,
     Connect,

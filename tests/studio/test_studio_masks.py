@@ -14,7 +14,7 @@ from armblocks.diagram import DiagramBlock
 from armblocks.errors import ArmblocksError, DiagramError, FormatError, InputError
 from armblocks.formats import load_diagram, load_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.edit_messages import BreakLink, SetParameters
+from armblocks.studio.protocol.messages.sheet_edits import BreakLink, SetParameters
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.placing import placed
 from armblocks.studio.sheet.shown import sheet

@@ -12,8 +12,8 @@ from armblocks.diagram import Diagram
 from armblocks.errors import ArmblocksError, InputError
 from armblocks.formats import load_robot
 from armblocks.studio.documents.aspects import changed_aspects, clash
-from armblocks.studio.protocol import messages as say
-from armblocks.studio.protocol.edit_messages import (
+from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     Connect,
     Edit,

@@ -13,8 +13,8 @@ from sheet_edits import MAKERS, random_edit
 
 from armblocks.errors import ArmblocksError
 from armblocks.formats import diagram_to_bytes, load_robot
-from armblocks.studio.protocol import messages as say
-from armblocks.studio.protocol.edit_messages import Edit, summary
+from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages.sheet_edits import Edit, summary
 from armblocks.studio.sheet.document import Document
 
 BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")

@@ -68,7 +68,7 @@ class Talk:
                 await self.news.wait()
 
     def pid(self, run: str) -> int:
-        pid = self.hub.runs[run]._worker.process.pid  # pyright: ignore[reportPrivateUsage]
+        pid = self.hub.runs.processes[run]._worker.process.pid  # pyright: ignore[reportPrivateUsage]
         assert pid is not None
         return pid
 
@@ -158,14 +158,14 @@ def test_a_worker_that_breaks_is_told_and_the_next_run_works(
         document = await talk.ask("open", example="falling_pendulum")
         with monkeypatch.context() as patch:
             in_worker(patch, death)
-            talk.hub.workers.prepare()
+            talk.hub.runs.workers.prepare()
             run = await talk.ask("run", document=document)
             told = await talk.until(run, "failed", "done")
             assert told["state"] == "failed"
             assert told["fault"]["what"] == words
             assert told["fault"]["where"] == "run"
             assert told["fault"]["fix"]
-            talk.hub.workers.end()  # the next one was made as the first
+            talk.hub.runs.workers.end()  # the next one was made as the first
         assert await talk.ask("ping") is None
         await talk.ask("arrange", document=document, key="1")
         again = await talk.ask("run", document=document)
@@ -217,7 +217,7 @@ def test_no_run_lasts_for_ever_also_while_it_is_paused(tmp_path: Path) -> None:
         await talk.until(run, "running")
         await talk.ask("control", run=run, action="pause")
         await talk.until(run, "paused")
-        talk.hub.runs[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
+        talk.hub.runs.processes[run]._until = monotonic() + 0.2  # pyright: ignore[reportPrivateUsage]
         await talk.ask("control", run=run, action="back")
         told = await talk.until(run, "failed")
         assert (
@@ -305,7 +305,7 @@ def test_a_report_whose_process_breaks_is_refused_in_words(
         run = await talk.ask("run", document=document)
         await talk.until(run, "done")
         with pytest.raises(SimulationError) as refused:
-            await talk.hub.report(document)
+            await talk.hub.runs.report(document)
         assert refused.value.what == words
 
     talk(tmp_path, talking)

@@ -8,7 +8,7 @@ async function copied(): Promise<string | undefined> {
   const blocks = [...selection].filter((name) => document?.blocks[name])
   const notes = [...selection].filter((name) => document?.notes[name])
   if (!document || !(blocks.length || notes.length)) return undefined
-  return ask<string>({
+  return ask({
     kind: 'copy',
     document: document.state.document,
     inside: document.inside,

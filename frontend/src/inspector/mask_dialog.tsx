@@ -4,7 +4,7 @@ import { useEffect, useState } from 'react'
 import { Refusal } from '../connection'
 import { show, useDialogs } from '../dialogs'
 import { newKey } from '../keys'
-import type { MaskParameter, SetMask } from '../protocol'
+import type { MaskParameter } from '../protocol'
 import { ask, attempt, freeName, useStudio } from '../store'
 import { valueText } from './value_text'
 
@@ -64,13 +64,11 @@ function Mask({ onClose }: { onClose: () => void }) {
   useEffect(() => {
     const { document } = useStudio.getState()
     if (!document) return
-    void ask<SetMask>({ kind: 'ask_mask', document: document.state.document, inside, block }).then(
-      (found) => {
-        if (!found) return onClose()
-        setRows(found.parameters.map(rowOf))
-        setFace(found.name ?? '')
-      },
-    )
+    void ask({ kind: 'ask_mask', document: document.state.document, inside, block }).then((found) => {
+      if (!found) return onClose()
+      setRows(found.parameters.map(rowOf))
+      setFace(found.name ?? '')
+    })
   }, [inside, block, onClose])
   if (!rows) return null
   const readable = rows.every(isReadable)

@@ -19,7 +19,7 @@ export function Explorer() {
   useEffect(() => {
     if (!document) return
     let current = true
-    line.ask<Outline>({ kind: 'outline', document }).then(
+    line.ask({ kind: 'outline', document }).then(
       (found) => current && setOutline(found),
       () => undefined,
     )

@@ -17,9 +17,7 @@ export function Find() {
     if (!opened || !document || !typed.trim()) return
     let current = true
     const timer = setTimeout(() => {
-      void ask<Found[]>({ kind: 'find', document, text: typed }).then(
-        (answer) => current && setFound(answer ?? []),
-      )
+      void ask({ kind: 'find', document, text: typed }).then((answer) => current && setFound(answer ?? []))
     }, WAIT_MS)
     return () => {
       current = false

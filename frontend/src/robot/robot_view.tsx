@@ -25,10 +25,10 @@ export default function RobotView() {
     }
     let current = true
     void stage()
-    void ask<RobotScene>({ kind: 'scene', document, inside, block }).then(async (scene) => {
+    void ask({ kind: 'scene', document, inside, block }).then(async (scene) => {
       if (!scene || !current) return
       const q = scene.joints.map(({ limits }) => (limits ? Math.min(Math.max(0, limits[0]), limits[1]) : 0))
-      const poses = await ask<number[][][]>({ kind: 'pose', document, inside, block, q })
+      const poses = await ask({ kind: 'pose', document, inside, block, q })
       if (current && poses) setShown({ scene, rest: poses, q })
     })
     return () => {

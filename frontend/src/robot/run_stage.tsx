@@ -20,7 +20,7 @@ export default function RunStage({ document, inside, block, scene, rest, q }: Ru
   const poses = useMemo(() => listed(rest), [rest])
   const drawing = useCallback(
     () =>
-      ask<string>({
+      ask({
         kind: 'robot_picture',
         document,
         inside,

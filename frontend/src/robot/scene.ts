@@ -1,37 +1,9 @@
 import { BufferAttribute, BufferGeometry, Matrix4 } from 'three'
+import type { RobotScene, SceneJoint } from '../protocol'
 
-/**
- * A joint as the server describes it: where it stands in the frame that carries it, and in that of its own
- * link.
- */
-export interface SceneJoint {
-  name: string
-  row: number
-  turns: boolean
-  limits: [number, number] | null
-  carrier: number
-  /** 4×4 row by row, in the carrier's frame: z is the joint's axis, x where the joint stands at zero. */
-  frame: number[]
-  /**
-   * The same in the link's own frame: how far its x has turned (its origin slid) is where the joint stands.
-   */
-  moving: number[]
-  offset: number
-  radius: number
-}
+export type { RobotScene, SceneJoint }
 
-/** What the server says of a robot's bodies: see `robot_scene.py`. */
-export interface RobotScene {
-  name: string
-  reach: number
-  /** How far the bodies of the base reach below its frame, m: there is the floor. */
-  foot: number
-  rows: number
-  bodies: { row: number; material: Material; corners: string; normals: string }[]
-  joints: SceneJoint[]
-}
-
-export type Material = 'paint' | 'joint' | 'flange' | 'base'
+export type Material = RobotScene['bodies'][number]['material']
 
 /** Where the rows of an arm are: 16 numbers each, row by row; undefined while it is not known. */
 export type Poses = (row: number, k: number) => number

@@ -31,7 +31,7 @@ function useFaults(document: string, values: Record<string, string | null>): Rec
   useEffect(() => {
     let current = true
     const timer = setTimeout(() => {
-      void ask<Record<string, string>>({
+      void ask({
         kind: 'typed_settings',
         document,
         values: JSON.parse(asked) as typeof values,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -82,7 +83,7 @@ def _arm(path: str, robot: Robot, q: ArrayLike | None = None) -> dict[str, Any]:
     at = [0.0] * len(robot.moving_links) if q is None else np.asarray(q, dtype=np.float64).tolist()
     return {
         "path": path,
-        "scene": scene_of(robot),
+        "scene": asdict(scene_of(robot)),
         "rest": link_frames_of(robot, at),
         "drawing": arm_picture_svg(robot, at, DRAWING_SIZE),
     }

@@ -61,7 +61,7 @@ export function robotOpened(opening: Opening): void {
   if (!first) return
   useDesk.setState({ current: first.robot, opening, readings: null })
   if (!useDesk.getState().tables)
-    void ask<RobotTables>({ kind: 'robot_form' }).then((tables) => tables && useDesk.setState({ tables }))
+    void ask({ kind: 'robot_form' }).then((tables) => tables && useDesk.setState({ tables }))
   readSoon()
 }
 
@@ -72,7 +72,7 @@ export function leaveEditor(): void {
 
 /** Bring a robot that is open to the screen. */
 export async function showRobot(robot: string): Promise<void> {
-  const opening = await ask<Opening>({ kind: 'robot_attach', robot })
+  const opening = await ask({ kind: 'robot_attach', robot })
   if (opening) robotOpened(opening)
 }
 
@@ -96,7 +96,7 @@ export async function attachAgain(): Promise<Opening | undefined> {
   const { robots, current } = useDesk.getState()
   const last = current ? null : (JSON.parse(sessionStorage.getItem(PLACE) ?? 'null') as Name | null)
   const attach = async ({ robot, path, shipped }: Name) => {
-    const opening = await ask<Opening>({ kind: 'robot_attach', robot, path, shipped })
+    const opening = await ask({ kind: 'robot_attach', robot, path, shipped })
     if (!opening && robot === current) leaveEditor()
     return opening
   }
@@ -171,7 +171,7 @@ async function readOn(): Promise<void> {
     const now = current && joints[current]
     if (!now) break
     try {
-      const readings = await line.ask<Readings>({ kind: 'robot_read', robot: current, ...now })
+      const readings = await line.ask({ kind: 'robot_read', robot: current, ...now })
       if (useDesk.getState().current === current) useDesk.setState({ readings })
     } catch (error) {
       // A joint came or went meanwhile: the next form asks again. What cannot be read shows nothing.

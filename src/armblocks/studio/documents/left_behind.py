@@ -11,7 +11,7 @@ from armblocks.studio.documents.file_journal import JournaledFile, journaled_fil
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.journal import in_use
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.messages import documents as say
 
 
 class LeftBehind:

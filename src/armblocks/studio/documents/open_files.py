@@ -25,8 +25,8 @@ from armblocks.studio.documents.journal import SYNC_SECONDS
 from armblocks.studio.documents.left_behind import LeftBehind
 from armblocks.studio.documents.project_folder import Disk, Fingerprint, ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol import messages as say
 from armblocks.studio.protocol.alteration import Alteration
+from armblocks.studio.protocol.messages import documents as say
 
 MOST_OPEN = 100
 MOST_KEYS = 1000
@@ -121,7 +121,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
         return self.add(self.kind.new(), key=key)
 
     def attach(self, key: str, path: str | None = None, origin: str = "") -> OpenedT:
-        """What a page showed before, see :class:`~armblocks.studio.protocol.messages.Attach`."""
+        """What a page showed before, see :class:`~armblocks.studio.protocol.messages.documents.Attach`."""
         with contextlib.suppress(UnknownNameError):
             return self[key]
         if key in self.left:

@@ -1,9 +1,10 @@
-"""A page that is connected: how to reach it, and what it shows."""
+"""The pages that are connected: how to reach each, and what it shows."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -55,3 +56,36 @@ class Page:
         """Send a message or a frame as it is."""
         with contextlib.suppress(*GONE):
             await (self.send_text(said) if isinstance(said, str) else self.send_bytes(said))
+
+
+class Pages:
+    """The pages that are connected to one server."""
+
+    def __init__(self) -> None:
+        self._connected: set[Page] = set()
+
+    def __contains__(self, page: Page) -> bool:
+        return page in self._connected
+
+    def __iter__(self) -> Iterator[Page]:
+        return iter(list(self._connected))
+
+    def add(self, page: Page) -> None:
+        """A page has come."""
+        self._connected.add(page)
+
+    def discard(self, page: Page) -> None:
+        """A page has gone."""
+        self._connected.discard(page)
+
+    def showing(self, document: str) -> list[Page]:
+        """The pages that show a document."""
+        return [page for page in self if document in page.shows]
+
+    async def tell(self, event: Message) -> None:
+        """Tell every page."""
+        await asyncio.gather(*(page.tell(event) for page in self))
+
+    async def tell_of(self, document: str, event: Message) -> None:
+        """Tell every page that shows a document."""
+        await asyncio.gather(*(page.tell(event) for page in self.showing(document)))

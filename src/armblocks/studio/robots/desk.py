@@ -8,7 +8,7 @@ import dataclasses
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from armblocks import formats
 from armblocks.errors import ArmblocksWarning, FormatError, InputError
@@ -16,15 +16,15 @@ from armblocks.rendering.arm_drawing import arm_picture_svg
 from armblocks.robot import Robot
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol import robot_messages as say
-from armblocks.studio.protocol.messages import Recover
+from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.messages import robots as say
+from armblocks.studio.protocol.messages.documents import Recover
+from armblocks.studio.protocol.page import Page
+from armblocks.studio.protocol.robot_scene import RobotScene
 from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
 from armblocks.studio.robots.readings import readings
 from armblocks.studio.robots.scene import link_frames_of, scene_of
 from armblocks.studio.robots.tables import robot_tables
-
-if TYPE_CHECKING:
-    from armblocks.studio.protocol.page import Page
 
 Result = TypeVar("Result")
 _PICTURE_SIZE = (760.0, 560.0)
@@ -65,36 +65,21 @@ class RobotDesk:
         """A page has gone; the robots stay open."""
         self._shows.pop(page, None)
 
-    async def carry_out(self, page: Page, request: say.RobotRequest) -> Any:
-        """Do what a page asks; the value goes into the reply. Raises ``ArmblocksError``."""
-        match request:
-            case say.RobotOpen():
-                return await self._open(page, request)
-            case say.RobotOfBlock():
-                return await self._open_of_block(page, request)
-            case say.RobotAttach():
-                found = self.robots.attach(request.robot, request.path, request.shipped)
-                return await self._show(page, [found], come=False)
-            case say.RobotChange() | say.RobotUndo() | say.RobotRedo() | say.RobotReload():
-                return await self._change(request)
-            case say.RobotKeepMine():
-                found = self.robots[request.robot]
-                self.robots.keep_mine(found)
-                return await self.tell(found)
-            case say.RobotSave():
-                return await self._save(request)
-            case say.RobotForm():
-                return robot_tables()
-            case say.RobotBodies():
-                return scene_of(self.robots[request.robot].robot)
-            case say.RobotPose():
-                return link_frames_of(self.robots[request.robot].robot, request.q)
-            case say.RobotRead():
-                return await self._read(request)
-            case say.RobotPicture():
-                return await self._picture(request)
-            case say.Drop():
-                return await self._drop(page, request)
+    def register(self, answers: Answers) -> None:
+        """Register what answers the requests about robots."""
+        answers.on(say.RobotOpen, self._open)
+        answers.on(say.RobotOfBlock, self._open_of_block)
+        answers.on(say.RobotAttach, self._attach)
+        for alteration in (say.RobotChange, say.RobotUndo, say.RobotRedo, say.RobotReload):
+            answers.on(alteration, self._change)
+        answers.on(say.RobotKeepMine, self._keep_mine)
+        answers.on(say.RobotSave, self._save)
+        answers.on(say.RobotForm, self._form)
+        answers.on(say.RobotBodies, self._bodies)
+        answers.on(say.RobotPose, self._pose)
+        answers.on(say.RobotRead, self._read)
+        answers.on(say.RobotPicture, self._picture)
+        answers.on(say.Drop, self._drop)
 
     async def tell(self, found: OpenRobot) -> None:
         """Tell every page that shows a robot how it stands."""
@@ -123,6 +108,10 @@ class RobotDesk:
         if come:
             await page.tell(say.RobotOpened(opening=opening))
         return opening
+
+    async def _attach(self, page: Page, request: say.RobotAttach) -> say.Opening:
+        found = self.robots.attach(request.robot, request.path, request.shipped)
+        return await self._show(page, [found], come=False)
 
     async def _open(self, page: Page, request: say.RobotOpen) -> say.Opening:
         if request.shipped:
@@ -193,8 +182,13 @@ class RobotDesk:
 
     # -- changing and saving ---------------------------------------------------------------------------------
 
+    async def _keep_mine(self, _: Page, request: say.RobotKeepMine) -> None:
+        found = self.robots[request.robot]
+        self.robots.keep_mine(found)
+        await self.tell(found)
+
     async def _change(
-        self, request: say.RobotChange | say.RobotUndo | say.RobotRedo | say.RobotReload
+        self, _: Page, request: say.RobotChange | say.RobotUndo | say.RobotRedo | say.RobotReload
     ) -> int:
         found = self.robots[request.robot]
         if isinstance(request, say.RobotReload):
@@ -204,7 +198,7 @@ class RobotDesk:
         await self.tell(found)
         return found.document.version
 
-    async def _save(self, request: say.RobotSave) -> str:
+    async def _save(self, _: Page, request: say.RobotSave) -> str:
         found = self.robots[request.robot]
         try:
             path = await self.robots.save(found, request.path, overwrite=request.overwrite)
@@ -216,13 +210,22 @@ class RobotDesk:
 
     # -- looking ---------------------------------------------------------------------------------------------
 
-    async def _read(self, request: say.RobotRead) -> say.Readings:
+    async def _form(self, _: Page, request: say.RobotForm) -> say.RobotTables:
+        return robot_tables()
+
+    async def _bodies(self, _: Page, request: say.RobotBodies) -> RobotScene:
+        return scene_of(self.robots[request.robot].robot)
+
+    async def _pose(self, _: Page, request: say.RobotPose) -> list[list[list[float]]]:
+        return link_frames_of(self.robots[request.robot].robot, request.q)
+
+    async def _read(self, _: Page, request: say.RobotRead) -> say.Readings:
         found = self.robots[request.robot]
         async with found.reading:  # of many that come while one compiles, each finds it compiled
             arm = found.arm
             return await asyncio.to_thread(readings, arm, request.q, request.qd, request.qdd)
 
-    async def _picture(self, request: say.RobotPicture) -> str:
+    async def _picture(self, _: Page, request: say.RobotPicture) -> str:
         robot = (
             self._drawings.block_robot(request.document, request.inside, request.block)
             if request.block

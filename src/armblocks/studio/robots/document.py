@@ -8,7 +8,7 @@ from armblocks.errors import ArmblocksWarning
 from armblocks.robot import Link, Robot
 from armblocks.studio.documents.aspects import Aspect
 from armblocks.studio.documents.edited import Edited, Outcome
-from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.columns import ROBOT_COLUMNS
 from armblocks.studio.robots.edits import robot_applied, robot_summary
 from armblocks.studio.robots.link_columns import LINK_COLUMNS

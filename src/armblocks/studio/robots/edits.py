@@ -16,7 +16,7 @@ from typing import Literal
 from armblocks.errors import InputError, RobotError
 from armblocks.robot import DhConvention, DhRow, Link, Robot, link_from_dh, serial_chain
 from armblocks.robot.dh_conversion import converted, reread
-from armblocks.studio.protocol.robot_edit_messages import (
+from armblocks.studio.protocol.messages.robot_edits import (
     AddJoint,
     MoveJoint,
     RemoveJoint,

@@ -10,7 +10,7 @@ from armblocks.robot import Robot
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.document import RobotDocument
 from armblocks.studio.robots.robot_kind import RobotKind
 from armblocks.studio.robots.tables import robot_shown

@@ -13,7 +13,7 @@ from armblocks.face.arm import Arm
 from armblocks.robot import Robot
 from armblocks.robot.geometry import reach
 from armblocks.spatial import Transform
-from armblocks.studio.protocol.robot_messages import Readings
+from armblocks.studio.protocol.messages.robots import Readings
 
 SINGULAR = 1e-6
 """Of the least singular value against the greatest: below it the arm is singular but for rounding."""

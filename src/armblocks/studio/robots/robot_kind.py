@@ -15,7 +15,7 @@ from armblocks.errors import ArmblocksWarning
 from armblocks.robot import Robot, standard_dh
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.document import RobotDocument
 
 RobotPerformed = say.RobotChange | say.RobotUndo | say.RobotRedo

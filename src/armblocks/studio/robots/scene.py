@@ -1,11 +1,10 @@
-"""A robot as the page draws it: bodies once, then only poses. The page knows no kinematics."""
+"""A robot as front ends draw it: bodies once, then only poses. Front ends know no kinematics."""
 
 from __future__ import annotations
 
 import base64
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,53 +13,45 @@ from armblocks.errors import InputError
 from armblocks.robot import Link, Robot
 from armblocks.robot.geometry import drum_radii, link_frames, reach, robot_bodies
 from armblocks.spatial import Transform, rotation_about, trotx
+from armblocks.studio.protocol.robot_scene import RobotScene, SceneBody, SceneJoint
 
 
-def scene_of(robot: Robot) -> dict[str, Any]:
-    """Bodies, joints and size of a robot.
-
-    ``bodies``: for each the ``row`` of ``link_poses`` that it moves with (0 the base, then the links), its
-    ``material``, and its triangles: ``corners`` (F, 3, 3) m and unit ``normals`` (F, 3, 3) as base64 of
-    little-endian float32. ``joints``: name, row, whether it turns, limits (rad or m), and where the joint
-    stands: ``frame`` in the frame of row ``carrier``, ``moving`` in the link's own, each a pose (16,) row by
-    row whose z is the joint's axis; the x of ``moving`` has turned from that of ``frame`` by q + ``offset``
-    (its origin has slid so far). ``radius`` m: of the drum that is drawn on the joint. ``reach`` m; ``foot``
-    m: how far the base's bodies reach below its frame.
-    """
+def scene_of(robot: Robot) -> RobotScene:
+    """Bodies, joints and size of a robot."""
     rows: dict[str | None, int] = {link.name: row for row, link in enumerate(robot.links, start=1)}
     rows[None] = 0
     radii = drum_radii(robot)
     bodies = robot_bodies(robot)
     feet = [float(body.mesh.corners[..., 2].min()) for body in bodies if body.row == 0]
-    return {
-        "name": robot.name,
-        "reach": reach(robot),
-        "foot": max(0.0, -min(feet, default=0.0)),
-        "rows": len(robot.links) + 2,
-        "bodies": [
-            {
-                "row": body.row,
-                "material": body.mesh.material.value,
-                "corners": _packed(body.mesh.corners),
-                "normals": _packed(body.mesh.normals),
-            }
+    return RobotScene(
+        name=robot.name,
+        reach=reach(robot),
+        foot=max(0.0, -min(feet, default=0.0)),
+        rows=len(robot.links) + 2,
+        bodies=[
+            SceneBody(
+                row=body.row,
+                material=body.mesh.material.value,
+                corners=_packed(body.mesh.corners),
+                normals=_packed(body.mesh.normals),
+            )
             for body in bodies
         ],
-        "joints": [
-            {
-                "name": link.name,
-                "row": rows[link.name],
-                "turns": bool(link.joint.turn),
-                "limits": list(link.joint.limits.position) if link.joint.limits.position else None,
-                "carrier": rows[link.parent],
-                "frame": (link.before @ _along(link)).matrix.ravel().tolist(),
-                "moving": (link.after.inverse() @ _along(link)).matrix.ravel().tolist(),
-                "offset": link.joint.offset,
-                "radius": radii[link.name],
-            }
+        joints=[
+            SceneJoint(
+                name=link.name,
+                row=rows[link.name],
+                turns=bool(link.joint.turn),
+                limits=link.joint.limits.position,
+                carrier=rows[link.parent],
+                frame=(link.before @ _along(link)).matrix.ravel().tolist(),
+                moving=(link.after.inverse() @ _along(link)).matrix.ravel().tolist(),
+                offset=link.joint.offset,
+                radius=radii[link.name],
+            )
             for link in robot.moving_links
         ],
-    }
+    )
 
 
 def _along(link: Link) -> Transform:
@@ -72,7 +63,7 @@ def _along(link: Link) -> Transform:
     return Transform(rotation=rotation_about((-y / sine, x / sine, 0.0), math.atan2(sine, z)))
 
 
-def link_frames_of(robot: Robot, q: Sequence[float]) -> list[Any]:
+def link_frames_of(robot: Robot, q: Sequence[float]) -> list[list[list[float]]]:
     """Poses of base, links and tool at ``q``, (L+2, 4, 4); raises ``InputError`` for a wrong count."""
     if len(q) != len(robot.moving_links):
         raise InputError(

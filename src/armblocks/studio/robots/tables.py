@@ -8,7 +8,7 @@ from typing import Literal
 from armblocks.robot import DhConvention, Link, Robot, doubts, inertia_findings, serial_chain
 from armblocks.studio.documents.history import History
 from armblocks.studio.documents.project_folder import Disk
-from armblocks.studio.protocol import robot_messages as say
+from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
 from armblocks.studio.robots.link_columns import (
     DYNAMICS,

@@ -14,16 +14,17 @@ from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from threading import Thread
 from time import monotonic
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import TypeAdapter
 
 from armblocks.errors import InputError
-from armblocks.studio.protocol import run_messages as say
+from armblocks.studio.protocol.message import AnyOf
+from armblocks.studio.protocol.messages import runs as say
 from armblocks.studio.runs.workers import Worker
 
 TellRun = Callable[[say.Message | bytes], Awaitable[None]]
-_EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(say.RunEvent)
+_EVENTS: TypeAdapter[say.RunEvent] = TypeAdapter(Annotated[say.RunEvent, AnyOf()])
 STOP_SECONDS = 0.8
 """A worker that has not stopped by itself after this long is ended."""
 SILENT_SECONDS = 600.0
@@ -64,7 +65,7 @@ class RunProcess:
             Thread(target=going, args=(self._worker.pipe,), daemon=True).start()
         self._passing = self._loop.create_task(self._pass_on())
 
-    def obey(self, request: say.Control | say.SetSpeed | say.Rewind | say.Tune) -> None:
+    def obey(self, request: say.RunCommand) -> None:
         """Pass a command on to the worker; raises ``InputError`` where the run has ended."""
         if self.state in ENDED:
             raise InputError("the run has ended", where="run", fix="start the model again")

@@ -7,7 +7,7 @@ import dataclasses
 from armblocks.equations import SimulationOptions
 from armblocks.simulation.rosenbrock import ROSENBROCK_TABLEAUX
 from armblocks.simulation.tableaux import TABLEAUX
-from armblocks.studio.protocol.messages import SettingRule, SolverChoice
+from armblocks.studio.protocol.messages.studio import SettingRule, SolverChoice
 
 _RULES = (
     ("stop_time", "Stop time", "s", "The run goes from 0 to this time."),

@@ -8,7 +8,7 @@ import numpy as np
 
 from armblocks.diagram import Diagram
 from armblocks.diagram.mask_tuning import tunable_parameters
-from armblocks.studio.protocol.run_messages import Tunable
+from armblocks.studio.protocol.messages.runs import Tunable
 from armblocks.studio.sheet.parameter_values import parameter_json
 
 LONGEST = 64

@@ -31,8 +31,8 @@ from armblocks.face.diagram_run import DiagramRun
 from armblocks.face.model import CompiledDiagram
 from armblocks.simulation import SimulationResult
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol import run_messages as say
 from armblocks.studio.protocol.frames import sample_frame, thinned
+from armblocks.studio.protocol.messages import runs as say
 from armblocks.studio.runs.history import RunHistory
 from armblocks.studio.runs.pace import Pace
 from armblocks.studio.runs.tunables import tunables

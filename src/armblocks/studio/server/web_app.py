@@ -136,7 +136,7 @@ class Answers:
         """The report of the last run of a document."""
         hub = await self.hub.here()
         try:
-            data = await hub.report(request.path_params["document"])
+            data = await hub.runs.report(request.path_params["document"])
         except ArmblocksError as error:
             return PlainTextResponse(str(error), 404)
         return Response(data, media_type="text/html")

@@ -9,7 +9,7 @@ from armblocks.diagram import Bus, Diagram, PortRef, flatten_hierarchy, infer_sh
 from armblocks.diagram.check import check_diagram
 from armblocks.diagram.hierarchy import joined, levels_of
 from armblocks.errors import AlgebraicLoopError, ArmblocksError, DiagramError
-from armblocks.studio.protocol.sheet_messages import Finding, WireKind
+from armblocks.studio.protocol.messages.sheets import Finding, WireKind
 
 _QUOTED = re.compile(r"block '([^']+)'")
 

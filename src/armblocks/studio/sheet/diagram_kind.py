@@ -15,7 +15,7 @@ from armblocks.diagram import Diagram
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 from armblocks.studio.sheet.placing import placed

@@ -8,8 +8,8 @@ from dataclasses import replace
 from armblocks.diagram import Diagram
 from armblocks.studio.documents.aspects import Aspect, changed_aspects
 from armblocks.studio.documents.edited import Edited, Outcome
-from armblocks.studio.protocol import messages as say
-from armblocks.studio.protocol.edit_messages import Edit, ModelEdit, summary
+from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages.sheet_edits import Edit, ModelEdit, summary
 from armblocks.studio.sheet.clipping import ReadDiagram
 from armblocks.studio.sheet.edits import applied
 from armblocks.studio.sheet.nesting import check_own, inside, with_inside

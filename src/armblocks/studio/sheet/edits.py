@@ -31,7 +31,7 @@ from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
 from armblocks.drawing.diagram_layout import standing_box
 from armblocks.errors import DiagramError, UnknownNameError
-from armblocks.studio.protocol.edit_messages import (
+from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     BendWires,
     BreakLink,

@@ -13,7 +13,7 @@ from armblocks.diagram.diagram import block_in_scope
 from armblocks.diagram.mask import formula_names
 from armblocks.diagram.parameter import REQUIRED, Value
 from armblocks.errors import DiagramError, InputError, UnknownNameError
-from armblocks.studio.protocol.edit_messages import MaskParameter, SetMask
+from armblocks.studio.protocol.messages.sheet_edits import MaskParameter, SetMask
 from armblocks.studio.sheet.nesting import with_block
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_json, parameter_value
 

@@ -9,7 +9,7 @@ from pathlib import PurePath
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol import messages as say
+from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.sheet.diagram_kind import DiagramKind
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.parameter_values import ResolveRobot

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from armblocks.diagram import Block, Diagram, DiagramBlock, ParameterKind
-from armblocks.studio.protocol.sheet_messages import Found, Outline
+from armblocks.studio.protocol.messages.sheets import Found, Outline
 from armblocks.studio.sheet.parameter_values import parameter_json
 
 MOST_FOUND = 50

@@ -16,8 +16,8 @@ from armblocks.errors import ArmblocksError
 from armblocks.formats import load_robot
 from armblocks.pictures.picture import Picture
 from armblocks.pictures.svg import svg_marks
-from armblocks.studio.protocol.edit_messages import Place, SheetNote, Wire
-from armblocks.studio.protocol.sheet_messages import (
+from armblocks.studio.protocol.messages.sheet_edits import Place, SheetNote, Wire
+from armblocks.studio.protocol.messages.sheets import (
     BlockType,
     ParameterRule,
     PortSpot,

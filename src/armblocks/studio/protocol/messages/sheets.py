@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from armblocks.studio.protocol.edit_messages import Place, SheetNote, Wire
-from armblocks.studio.protocol.message import Message
+from pydantic import Field
+
+from armblocks.studio.protocol.message import Event, Message, Request
+from armblocks.studio.protocol.messages.sheet_edits import Place, SetMask, SheetNote, Wire
 
 
 class PortSpot(Message):
@@ -137,3 +139,68 @@ class BlockType(Message):
     outputs: list[str]
     """Ports that it has with the default parameters."""
     parameters: list[ParameterRule]
+
+
+class AskOutline(Request[Outline]):
+    """Ask for the tree of sheets, an :class:`Outline`."""
+
+    kind: Literal["outline"] = "outline"
+    document: str
+
+
+class Copy(Request[str]):
+    """Ask for blocks and notes of a sheet as text, which :class:`PasteBlocks` puts on a sheet again."""
+
+    kind: Literal["copy"] = "copy"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    blocks: list[str]
+    notes: list[str] = Field(default_factory=list[str])
+
+
+class AskMask(Request[SetMask]):
+    """Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it."""
+
+    kind: Literal["ask_mask"] = "ask_mask"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    block: str = ""
+
+
+class Find(Request[list[Found]]):
+    """Ask for blocks of all sheets by words of their names, types and values: a list of :class:`Found`."""
+
+    kind: Literal["find"] = "find"
+    document: str
+    text: Annotated[str, Field(max_length=200)]
+
+
+class TypedValue(Request[Any]):
+    """Ask what a text typed into a parameter's field means: its value, or what is wrong with it."""
+
+    kind: Literal["typed"] = "typed"
+    document: str = ""
+    inside: list[str] = Field(default_factory=list[str])
+    block: str = ""
+    """The block, where it is on a sheet: formulas may name parameters of the sheet's mask."""
+    type: str
+    parameter: str
+    text: str
+
+
+class TypedSettings(Request[dict[str, str]]):
+    """Ask what is wrong with settings while they are typed: a text for each that is, by name."""
+
+    kind: Literal["typed_settings"] = "typed_settings"
+    document: str
+    values: dict[str, float | str | None]
+
+
+class Checked(Event):
+    """What the background check found in one version of a document; ``wires`` by source port."""
+
+    kind: Literal["checked"] = "checked"
+    document: str
+    version: int
+    findings: list[Finding]
+    wires: dict[str, WireKind]

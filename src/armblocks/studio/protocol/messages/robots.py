@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from armblocks.studio.protocol.alteration import Alteration
-from armblocks.studio.protocol.message import Message
-from armblocks.studio.protocol.robot_edit_messages import RobotEdit
+from armblocks.studio.protocol.message import Event, Message, Request
+from armblocks.studio.protocol.messages.robot_edits import RobotEdit
+from armblocks.studio.protocol.robot_scene import RobotScene
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Joints = Annotated[list[Number], Field(max_length=1000)]
@@ -17,10 +18,88 @@ Joints = Annotated[list[Number], Field(max_length=1000)]
 MOST_DROPPED = 5 * 2**20
 """Bytes of a file that is dropped on the page."""
 
+# -- what is shown of robots --------------------------------------------------------------------------------
+
+
+class CellColumn(Message):
+    """A column of a table, or a field of the robot."""
+
+    name: str
+    title: str
+    doc: str
+    quantity: Literal["number", "angle", "coordinate", "rate", "text", "choice"]
+    unit: str
+    optional: bool
+    choices: list[str]
+    group: str
+
+
+class RobotTables(Message):
+    """The answer to ``robot_form``."""
+
+    kinematics: list[CellColumn]
+    dynamics: list[CellColumn]
+    robot: list[CellColumn]
+
+
+class LinkRow(Message):
+    """A link as the tables show it: values by column in SI units, ``None`` where there is none."""
+
+    name: str
+    parent: str | None
+    turns: bool
+    """Whether its joint coordinate is an angle."""
+    moves: bool
+    variable: str
+    """The column in whose place the joint coordinate stands."""
+    cells: dict[str, float | str | None]
+    locked: dict[str, str]
+    """Columns in which nothing can be typed, with the reason."""
+
+
+class RobotFinding(Message):
+    """What no real arm could have, at the columns of a link that say it."""
+
+    link: str
+    columns: list[str]
+    what: str
+    fix: str
+
+
+class RobotSpot(Message):
+    """Names of a robot that was opened."""
+
+    robot: str
+    name: str
+
+
+class Opening(Message):
+    """The answer to what opens: the robots or the diagram of a file, and what was said about it."""
+
+    robots: list[RobotSpot]
+    document: str
+    notes: list[str]
+
+
+class Readings(Message):
+    """What an arm does in one configuration; m, rad, N m, world axes."""
+
+    pose: list[list[float]]
+    position: list[float]
+    rpy: list[float]
+    """Roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    jacobian: list[list[float]]
+    manipulability: float
+    gravload: list[float]
+    torque: list[float]
+    singular: str
+    limits: list[str]
+
+
 # -- requests ------------------------------------------------------------------------------------------------
 
 
-class RobotOpen(Message):
+class RobotOpen(Request[Opening]):
     """Open a robot: a file of the project, a shipped one, or a new one where both are empty."""
 
     kind: Literal["robot_open"] = "robot_open"
@@ -28,7 +107,7 @@ class RobotOpen(Message):
     shipped: str = ""
 
 
-class RobotOfBlock(Message):
+class RobotOfBlock(Request[Opening]):
     """Open the robot that a block uses: its file, or a copy of it."""
 
     kind: Literal["robot_of_block"] = "robot_of_block"
@@ -37,7 +116,7 @@ class RobotOfBlock(Message):
     block: str
 
 
-class RobotAttach(Message):
+class RobotAttach(Request[Opening]):
     """Show a robot that is open already: after a reload, after the line was down, or in a second page.
 
     Where the server was started anew and does not know it, it comes from its journal, or else from the file
@@ -87,14 +166,14 @@ class RobotReload(RobotAlteration):
     kind: Literal["robot_reload"] = "robot_reload"
 
 
-class RobotKeepMine(Message):
+class RobotKeepMine(Request[None]):
     """Leave the file that has changed on the disk until the next save, which overwrites it."""
 
     kind: Literal["robot_keep_mine"] = "robot_keep_mine"
     robot: str
 
 
-class RobotSave(Message):
+class RobotSave(Request[str]):
     """Write the robot's file; ``path`` gives it another. ``overwrite``: also where the disk has changed."""
 
     kind: Literal["robot_save"] = "robot_save"
@@ -103,20 +182,20 @@ class RobotSave(Message):
     overwrite: bool = False
 
 
-class RobotForm(Message):
+class RobotForm(Request[RobotTables]):
     """Ask which tables a robot has and what stands in their columns."""
 
     kind: Literal["robot_form"] = "robot_form"
 
 
-class RobotBodies(Message):
+class RobotBodies(Request[RobotScene]):
     """Ask for the bodies of an open robot."""
 
     kind: Literal["robot_bodies"] = "robot_bodies"
     robot: str
 
 
-class RobotPose(Message):
+class RobotPose(Request[list[list[list[float]]]]):
     """Ask where the links of an open robot are at ``q``."""
 
     kind: Literal["robot_pose"] = "robot_pose"
@@ -124,7 +203,7 @@ class RobotPose(Message):
     q: Joints
 
 
-class RobotRead(Message):
+class RobotRead(Request[Readings]):
     """Ask what an open robot does at ``q, qd, qdd``."""
 
     kind: Literal["robot_read"] = "robot_read"
@@ -134,7 +213,7 @@ class RobotRead(Message):
     qdd: Joints
 
 
-class RobotPicture(Message):
+class RobotPicture(Request[str]):
     """Ask for a drawing, as SVG, of an open robot at ``q``, or of that of a block where ``block`` is said."""
 
     kind: Literal["robot_picture"] = "robot_picture"
@@ -146,7 +225,26 @@ class RobotPicture(Message):
     theme: Literal["light", "dark"]
 
 
-class Drop(Message):
+class Scene(Request[RobotScene]):
+    """Ask for the bodies of the robot that a block shows."""
+
+    kind: Literal["scene"] = "scene"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    block: str
+
+
+class Pose(Request[list[list[list[float]]]]):
+    """Ask where the links of a block's robot are at joint coordinates ``q`` (rad, m)."""
+
+    kind: Literal["pose"] = "pose"
+    document: str
+    inside: list[str] = Field(default_factory=list[str])
+    block: str
+    q: list[float]
+
+
+class Drop(Request[Opening]):
     """Open a file that was dropped on the page: a script, a robot or a diagram. Nothing of it is run."""
 
     kind: Literal["drop"] = "drop"
@@ -155,73 +253,10 @@ class Drop(Message):
     """The bytes of the file as base64."""
 
 
-RobotRequest = (
-    RobotOpen
-    | RobotOfBlock
-    | RobotAttach
-    | RobotChange
-    | RobotUndo
-    | RobotRedo
-    | RobotReload
-    | RobotKeepMine
-    | RobotSave
-    | RobotForm
-    | RobotBodies
-    | RobotPose
-    | RobotRead
-    | RobotPicture
-    | Drop
-)
-
-# -- answers and events --------------------------------------------------------------------------------------
+# -- events --------------------------------------------------------------------------------------------------
 
 
-class CellColumn(Message):
-    """A column of a table, or a field of the robot."""
-
-    name: str
-    title: str
-    doc: str
-    quantity: Literal["number", "angle", "coordinate", "rate", "text", "choice"]
-    unit: str
-    optional: bool
-    choices: list[str]
-    group: str
-
-
-class RobotTables(Message):
-    """The answer to ``robot_form``."""
-
-    kinematics: list[CellColumn]
-    dynamics: list[CellColumn]
-    robot: list[CellColumn]
-
-
-class LinkRow(Message):
-    """A link as the tables show it: values by column in SI units, ``None`` where there is none."""
-
-    name: str
-    parent: str | None
-    turns: bool
-    """Whether its joint coordinate is an angle."""
-    moves: bool
-    variable: str
-    """The column in whose place the joint coordinate stands."""
-    cells: dict[str, float | str | None]
-    locked: dict[str, str]
-    """Columns in which nothing can be typed, with the reason."""
-
-
-class RobotFinding(Message):
-    """What no real arm could have, at the columns of a link that say it."""
-
-    link: str
-    columns: list[str]
-    what: str
-    fix: str
-
-
-class RobotShown(Message):
+class RobotShown(Event):
     """An open robot as it is now: sent to every page that shows it, after every change."""
 
     kind: Literal["robot"] = "robot"
@@ -248,38 +283,8 @@ class RobotShown(Message):
     """What was said when the file was read."""
 
 
-class RobotSpot(Message):
-    """Names of a robot that was opened."""
-
-    robot: str
-    name: str
-
-
-class Opening(Message):
-    """The answer to what opens: the robots or the diagram of a file, and what was said about it."""
-
-    robots: list[RobotSpot]
-    document: str
-    notes: list[str]
-
-
-class RobotOpened(Message):
+class RobotOpened(Event):
     """A page has opened robots: they come to its screen. It was told of each before."""
 
     kind: Literal["robot_opened"] = "robot_opened"
     opening: Opening
-
-
-class Readings(Message):
-    """What an arm does in one configuration; m, rad, N m, world axes."""
-
-    pose: list[list[float]]
-    position: list[float]
-    rpy: list[float]
-    """Roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    jacobian: list[list[float]]
-    manipulability: float
-    gravload: list[float]
-    torque: list[float]
-    singular: str
-    limits: list[str]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
-from armblocks.studio.protocol.message import Fault, Message
+from armblocks.studio.protocol.message import Event, Fault, Message, Request
 
 # -- what is shown of a run ----------------------------------------------------------------------------------
 
@@ -50,7 +50,7 @@ class Tunable(Message):
 # -- requests ------------------------------------------------------------------------------------------------
 
 
-class Run(Message):
+class Run(Request[str]):
     """Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
 
     ``tuned``: values of tunable parameters, ``block.parameter``, that are tried without being in the model.
@@ -62,35 +62,37 @@ class Run(Message):
     tuned: dict[str, Any] = Field(default_factory=dict[str, Any])
 
 
-class Control(Message):
+class RunCommand(Request[None]):
+    """A request to a run that is under way."""
+
+    run: str
+
+
+class Control(RunCommand):
     """Say how a run goes on. ``step`` and ``back`` go to the next and to the last recorded instant."""
 
     kind: Literal["control"] = "control"
-    run: str
     action: Literal["pause", "resume", "step", "back", "stop"]
 
 
-class Rewind(Message):
+class Rewind(RunCommand):
     """Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay."""
 
     kind: Literal["rewind"] = "rewind"
-    run: str
     time: float
 
 
-class SetSpeed(Message):
+class SetSpeed(RunCommand):
     """Change the speed of a run; ``None``: as fast as possible."""
 
     kind: Literal["speed"] = "speed"
-    run: str
     speed: float | None = Field(default=None, gt=0, le=1000)
 
 
-class Tune(Message):
+class Tune(RunCommand):
     """Change a tunable parameter of a run that is under way."""
 
     kind: Literal["tune"] = "tune"
-    run: str
     parameter: str
     value: Any
 
@@ -98,7 +100,11 @@ class Tune(Message):
 # -- events --------------------------------------------------------------------------------------------------
 
 
-class RunStarted(Message):
+class RunEvent(Event):
+    """What the process of a run has to say, besides its samples."""
+
+
+class RunStarted(RunEvent):
     """A run has begun: what it records and how it is to be shown."""
 
     kind: Literal["run_started"] = "run_started"
@@ -113,7 +119,7 @@ class RunStarted(Message):
     """Of so many recorded instants the page gets the extremes of each signal, as two; 1: it gets all."""
 
 
-class RunTuned(Message):
+class RunTuned(RunEvent):
     """From this instant (s) on a parameter of a run has this value."""
 
     kind: Literal["run_tuned"] = "run_tuned"
@@ -123,7 +129,7 @@ class RunTuned(Message):
     value: Any
 
 
-class RunRewound(Message):
+class RunRewound(RunEvent):
     """A run stands at an earlier instant (s) again: only the first ``count`` samples are still true."""
 
     kind: Literal["run_rewound"] = "run_rewound"
@@ -132,7 +138,7 @@ class RunRewound(Message):
     count: int
 
 
-class RunProgress(Message):
+class RunProgress(RunEvent):
     """Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that."""
 
     kind: Literal["run_progress"] = "run_progress"
@@ -144,7 +150,3 @@ class RunProgress(Message):
     fault: Fault | None = None
     solver: str = ""
     reason: str = ""
-
-
-RunEvent = Annotated[RunStarted | RunTuned | RunRewound | RunProgress, Field(discriminator="kind")]
-"""What the process of a run has to say, besides its samples."""

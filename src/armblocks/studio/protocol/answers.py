@@ -1,0 +1,34 @@
+"""Which part of the server answers which request."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from armblocks.studio.protocol.message import ReplyT, Request
+
+if TYPE_CHECKING:
+    from armblocks.studio.protocol.page import Page
+
+RequestT = TypeVar("RequestT", bound=Request[Any])
+Answer = Callable[["Page", RequestT], Awaitable[Any]]
+
+
+class Answers:
+    """One handler for each class of requests. A test checks that every request has one of its reply type."""
+
+    def __init__(self) -> None:
+        self._handlers: dict[type[Request[Any]], Answer[Any]] = {}
+
+    def on(self, request: type[RequestT], answer: Answer[RequestT]) -> None:
+        """Register what answers the requests of a class: its value goes into the reply."""
+        self._handlers[request] = answer
+
+    async def to(self, page: Page, request: Request[ReplyT]) -> ReplyT:
+        """The value of the reply to a request. Raises ``ArmblocksError`` where it is refused."""
+        return await self._handlers[type(request)](page, request)
+
+    @property
+    def handlers(self) -> Mapping[type[Request[Any]], Answer[Any]]:
+        """What answers each class of requests."""
+        return self._handlers

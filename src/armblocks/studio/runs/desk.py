@@ -1,0 +1,136 @@
+"""The runs of the open diagrams: at most one of each, in a process of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import Callable
+
+from armblocks import formats
+from armblocks.errors import InputError, UnknownNameError
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.message import Message
+from armblocks.studio.protocol.messages import runs as say
+from armblocks.studio.protocol.page import Page, Pages
+from armblocks.studio.runs.process import RunProcess
+from armblocks.studio.runs.record import RunRecord
+from armblocks.studio.runs.report import report_of
+from armblocks.studio.runs.workers import Workers
+from armblocks.studio.sheet.open_documents import OpenDocument
+from armblocks.studio.sheet.parameter_values import ResolveRobot
+
+PAGE_SECONDS = 1.5
+"""A page that has its document draws for so long: the process for its first run is made after that."""
+
+
+class RunDesk:
+    """Starts runs, passes commands on to them, and tells every page that shows their diagram."""
+
+    def __init__(
+        self,
+        folder: ProjectFolder,
+        pages: Pages,
+        drawing: Callable[[str], OpenDocument],
+        resolve_robot: ResolveRobot,
+    ) -> None:
+        self.processes: dict[str, RunProcess] = {}
+        self.workers = Workers()
+        self._folder = folder
+        self._pages = pages
+        self._drawing = drawing
+        self._resolve_robot = resolve_robot
+        self._records: dict[str, RunRecord] = {}
+        self._telling: set[asyncio.Task[None]] = set()
+
+    def register(self, answers: Answers) -> None:
+        """Register what answers the requests about runs."""
+        answers.on(say.Run, self._run)
+        for command in (say.Control, say.SetSpeed, say.Rewind, say.Tune):
+            answers.on(command, self._command)
+
+    def of(self, document: str) -> str | None:
+        """The key of the run of a diagram, ``None`` where there is none."""
+        return next((run.key for run in self.processes.values() if run.document == document), None)
+
+    def shown(self, page: Page, document: str) -> None:
+        """A page has just come to a diagram: tell it of the run, and make the process of the next one."""
+        if (run := self.of(document)) is not None:
+            self._tell_later(page, run, 0)
+        self.workers.prepare(after=PAGE_SECONDS)
+
+    async def report(self, document: str) -> bytes:
+        """The report of the last run of a diagram as an HTML page; raises ``ArmblocksError``."""
+        key = self._drawing(document).key
+        jobs = [run.job for run in self.processes.values() if run.document == key]
+        if not jobs:
+            raise InputError("there is no run to report", where="report", fix="run the model first")
+        return await report_of(jobs[-1])
+
+    def close(self) -> None:
+        """End every run."""
+        for task in self._telling:
+            task.cancel()
+        for run in self.processes.values():
+            run.end()
+        for record in self._records.values():
+            record.close()
+        self.workers.end()
+
+    # -- requests --------------------------------------------------------------------------------------------
+
+    async def _run(self, _: Page, request: say.Run) -> str:
+        found = self._drawing(request.document)
+        key, record = secrets.token_hex(8), RunRecord()
+
+        async def tell(event: Message | bytes) -> None:
+            said = event if isinstance(event, bytes) else event.model_dump_json()
+            record.append(said)
+            for page in [page for page in self._pages.showing(found.key) if key not in page.hears]:
+                if page.behind:
+                    self._tell_later(page, key, len(record) - 1)
+                else:
+                    await page.send(said)
+
+        worker = await self.workers.take()
+        for other in list(self.processes.values()):
+            if other.document == found.key:
+                other.end()
+                del self.processes[other.key]
+                self._records.pop(other.key).close()
+        job = {
+            "diagram": formats.diagram_to_bytes(
+                found.document.diagram, self._resolve_robot, folder=self._folder.root
+            ).decode(),
+            "folder": str(self._folder.root),
+            "speed": request.speed,
+            "tuned": request.tuned,
+        }
+        run = RunProcess(key, found.key, worker, tell)
+        self.processes[key], self._records[key] = run, record
+        run.start(job)
+        return run.key
+
+    async def _command(self, _: Page, request: say.RunCommand) -> None:
+        if request.run not in self.processes:
+            raise UnknownNameError("run", request.run, self.processes)
+        self.processes[request.run].obey(request)
+
+    # -- telling ---------------------------------------------------------------------------------------------
+
+    def _tell_later(self, page: Page, run: str, said: int) -> None:
+        """Tell a page what a run has said but for the first ``said``, as fast as it listens: one that has
+        just come, or that is behind. Until it has caught up it gets nothing else of the run.
+        """
+        page.hears[run] = said
+        telling = asyncio.get_running_loop().create_task(self._tell(page, run))
+        self._telling.add(telling)
+        telling.add_done_callback(self._telling.discard)
+
+    async def _tell(self, page: Page, run: str) -> None:
+        record = self._records[run]
+        while page.hears[run] < len(record) and self._records.get(run) is record and page in self._pages:
+            page.hears[run] += 1
+            await page.send(record[page.hears[run] - 1])
+            await page.room()
+        del page.hears[run]

@@ -1,0 +1,78 @@
+"""Questions about the sheets of open diagrams that change nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from armblocks.blocks import BLOCKS
+from armblocks.diagram import Diagram, ParameterFormula
+from armblocks.diagram.mask import formula_value
+from armblocks.diagram.parameter import Value
+from armblocks.errors import UnknownNameError
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.answers import Answers
+from armblocks.studio.protocol.messages import sheets as say
+from armblocks.studio.protocol.messages.sheet_edits import SetMask
+from armblocks.studio.protocol.page import Page
+from armblocks.studio.sheet.clipping import clipped
+from armblocks.studio.sheet.mask_edits import mask_of
+from armblocks.studio.sheet.nesting import inside
+from armblocks.studio.sheet.open_documents import OpenDocument
+from armblocks.studio.sheet.outline import find, outline
+from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_json, parameter_value
+from armblocks.studio.sheet.typed_settings import setting_faults
+
+
+class SheetQueries:
+    """Answers what front ends ask about diagrams."""
+
+    def __init__(
+        self, folder: ProjectFolder, drawing: Callable[[str], OpenDocument], resolve_robot: ResolveRobot
+    ) -> None:
+        self._folder = folder
+        self._drawing = drawing
+        self._resolve_robot = resolve_robot
+
+    def register(self, answers: Answers) -> None:
+        """Register what answers these requests."""
+        answers.on(say.AskOutline, self._outline)
+        answers.on(say.AskMask, self._mask)
+        answers.on(say.Copy, self._copy)
+        answers.on(say.Find, self._find)
+        answers.on(say.TypedValue, self._typed_value)
+        answers.on(say.TypedSettings, self._typed_settings)
+
+    def _sheet(self, document: str, path: Sequence[str] = ()) -> Diagram:
+        return inside(self._drawing(document).document.diagram, path)
+
+    async def _outline(self, _: Page, request: say.AskOutline) -> say.Outline:
+        return outline(self._sheet(request.document))
+
+    async def _mask(self, _: Page, request: say.AskMask) -> SetMask:
+        path = [*request.inside, request.block] if request.block else request.inside
+        return mask_of(self._sheet(request.document, path)).model_copy(update={"block": request.block})
+
+    async def _copy(self, _: Page, request: say.Copy) -> str:
+        sheet = self._sheet(request.document, request.inside)
+        return clipped(sheet, request.blocks, request.notes, self._resolve_robot, self._folder.root)
+
+    async def _find(self, _: Page, request: say.Find) -> list[say.Found]:
+        return find(self._sheet(request.document), request.text)
+
+    async def _typed_settings(self, _: Page, request: say.TypedSettings) -> dict[str, str]:
+        return setting_faults(self._sheet(request.document).settings, request.values)
+
+    async def _typed_value(self, _: Page, request: say.TypedValue) -> Any:
+        known, scope = BLOCKS[request.type].parameters(), dict[str, Value]()
+        if request.document:
+            level = self._sheet(request.document, request.inside)
+            known, scope = level.block(request.block).own_parameters(), dict(level.mask_values)
+        rules = {rule.name: rule for rule in known}
+        if request.parameter not in rules:
+            raise UnknownNameError(f"parameter of {request.type}", request.parameter, rules)
+        rule = rules[request.parameter]
+        value = parameter_value(rule, request.text, request.type, self._resolve_robot, scope)
+        if isinstance(value, ParameterFormula):
+            value = formula_value(rule, value.text, scope, request.type)
+        return parameter_json(value)

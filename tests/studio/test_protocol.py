@@ -1,0 +1,33 @@
+"""Requests, their replies and what answers them: nothing of it is listed by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import pytest
+
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.message import Request, messages_of, reply_type
+from armblocks.studio.server.hub import Hub
+
+
+def test_every_request_is_answered_with_the_reply_that_it_declares(tmp_path: Path) -> None:
+    handlers = Hub(ProjectFolder(tmp_path)).answers.handlers
+    assert set(handlers) == set(messages_of(Request).values())
+    replies = {request: get_type_hints(handler)["return"] for request, handler in handlers.items()}
+    wrong = {request: reply for request, reply in replies.items() if reply != expected(request)}
+    assert wrong == {}
+
+
+def expected(request: type[Request[Any]]) -> Any:
+    declared = reply_type(request)
+    return type(None) if declared is None else declared
+
+
+def test_a_request_without_a_reply_type_is_refused() -> None:
+    class Silent(Request):  # pyright: ignore[reportMissingTypeArgument]
+        """A request that does not say which value its reply has."""
+
+    with pytest.raises(TypeError, match="Silent does not say which reply it has"):
+        reply_type(Silent)
