@@ -74,7 +74,7 @@ def test_missing_folder_is_named(tmp_path: Path) -> None:
 
 
 def test_folder_in_the_files_place_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match="a folder stands where the file should go"):
+    with pytest.raises(FormatError, match="the path is an existing folder"):
         write_atomically(tmp_path, b"")
 
 

@@ -4,14 +4,14 @@
 
     ArmblocksError(ValueError)
     ├── InputError            a call was given a wrong shape, dtype, value or option
-    ├── UnknownNameError      a name that is not in a list of known names (the nearest is said)
+    ├── UnknownNameError a name that is not in a list of known names; suggests the nearest
     ├── RobotError            a robot description that contradicts itself
     ├── DiagramError          a diagram that cannot be built
     │   └── AlgebraicLoopError
     ├── FormatError           a file that cannot be read or written (file:line)
-    ├── MissingLibraryError   a library that an extra of the package brings is not installed
+    ├── MissingLibraryError a library of an optional extra is not installed
     ├── CompileError          equations that the compiler cannot translate
-    └── SimulationError       a run that could not go on (partial results are kept)
+    └── SimulationError a run that failed (it keeps the results up to that time)
 
     ArmblocksWarning(UserWarning)
     ├── InertiaWarning        an inertia that no body can have
@@ -40,7 +40,7 @@ def compose_message(what: str, where: str = "", allowed: str = "", fix: str = ""
 
 
 class ArmblocksError(ValueError):
-    """Base of all errors that name what, where, what is allowed and what to do.
+    """Base class of all errors. A message has the parts what, where, allowed and fix.
 
     ``what`` one sentence with the user's own names and the value found; ``where`` a file:line, block
     path, robot/link or parameter; ``allowed`` the rule or the valid names; ``fix`` one action.
@@ -54,12 +54,12 @@ class ArmblocksError(ValueError):
         super().__init__(compose_message(what, where, allowed, fix))
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the parts: a process pool sends an error back so."""
+        """Pickle the parts, so that a process pool can return the error."""
         return _unpickled, (type(self), self.args), self.__dict__
 
 
 def _unpickled(kind: type[ArmblocksError], args: tuple[object, ...]) -> ArmblocksError:
-    """An error with its text as it was; ``__init__``, which composes the text, takes other arguments."""
+    """Restore an unpickled error from its text; ``__init__`` would take the parts of the text."""
     return kind.__new__(kind, *args)
 
 
@@ -68,13 +68,13 @@ class InputError(ArmblocksError):
 
 
 LONGEST_NAME = 60
-"""Characters of a name in a message that is none."""
+"""Maximum number of characters of an unknown name in a message."""
 LONGEST_LIST = 200
-"""Characters of a list of names in a message; of a longer one, the names nearest to the one in question."""
+"""Maximum number of characters of a list of names in a message. A longer list is cut to the nearest names."""
 
 
 class UnknownNameError(ArmblocksError):
-    """A name that is not among the ``known`` ones; says the nearest and lists them, as far as is legible."""
+    """A name that is not in ``known``. The message suggests the nearest name and lists the known names."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str], *, where: str = "") -> None:
         self.kind = kind
@@ -92,7 +92,7 @@ class UnknownNameError(ArmblocksError):
 
 
 def _legible(names: Sequence[str], wanted: str) -> str:
-    """All names if they are few, else those most like the wanted one and how many more there are."""
+    """All names if they are few, else the names most similar to the wanted one and the number of others."""
     if not names:
         return "none exist"
     if len(whole := ", ".join(names)) <= LONGEST_LIST:
@@ -112,10 +112,10 @@ def _legible(names: Sequence[str], wanted: str) -> str:
 
 
 def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, object]) -> None:
-    """Raise for arguments that the constructor of a dataclass does not have.
+    """Raise an error for arguments that the constructor of a dataclass does not accept.
 
     Its ``__new__`` calls this, so that the error names the nearest field, before ``__init__`` raises Python's
-    own. ``InputError`` where values are given without a name, ``UnknownNameError`` for another name.
+    own. Raises ``InputError`` for positional arguments and ``UnknownNameError`` for unknown keywords.
     """
     known: Mapping[str, dataclasses.Field[Any]] = getattr(kind, "__dataclass_fields__", {})
     if not values and named.keys() <= known.keys():
@@ -125,7 +125,7 @@ def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, ob
         if name not in known:
             raise UnknownNameError("argument", name, fields, where=kind.__name__)
     raise InputError(
-        f"{len(values)} arguments are given without their names",
+        f"{len(values)} arguments are given without names",
         where=kind.__name__,
         allowed=f"arguments by name: {', '.join(fields) or 'none'}",
         fix=f"write {kind.__name__}({fields[0]}=…)" if fields else f"write {kind.__name__}()",
@@ -133,7 +133,7 @@ def check_arguments(kind: type, values: Sequence[object], named: Mapping[str, ob
 
 
 class RobotError(ArmblocksError):
-    """A robot description that contradicts itself, or lacks what the request needs."""
+    """A robot description that is inconsistent, or lacks data that the call needs."""
 
 
 class DiagramError(ArmblocksError):
@@ -141,9 +141,9 @@ class DiagramError(ArmblocksError):
 
 
 class AlgebraicLoopError(DiagramError):
-    """Signals that depend on each other at the same instant in a way that cannot be solved.
+    """An algebraic loop that cannot be solved: signals that depend on each other at the same time.
 
-    ``loop`` lists them in the direction in which they flow; ``why`` says what stands in the way.
+    ``loop`` lists the signals in signal-flow order; ``why`` is the reason why the loop cannot be solved.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class FormatError(ArmblocksError):
 
 
 class MissingLibraryError(ArmblocksError):
-    """A library that an extra of the package brings is not installed."""
+    """A library of an optional extra is not installed."""
 
     def __init__(self, library: str, extra: str, use: str, *, where: str = "") -> None:
         self.library = library
@@ -182,11 +182,11 @@ class MissingLibraryError(ArmblocksError):
 
 
 class CompileError(ArmblocksError):
-    """Equations that the compiler cannot translate."""
+    """Equations that the compiler does not support."""
 
 
 class SimulationError(ArmblocksError):
-    """A run that could not go on. ``partial`` holds the result up to the last good time, if any."""
+    """A run that failed. ``partial`` holds the result up to the last valid time, or ``None``."""
 
     def __init__(
         self, what: str, *, where: str = "", allowed: str = "", fix: str = "", partial: object = None
@@ -196,12 +196,12 @@ class SimulationError(ArmblocksError):
 
 
 class ArmblocksWarning(UserWarning):
-    """Base of all warnings: the result is usable, but something deserves a look."""
+    """Base class of all warnings: the result is usable but should be checked."""
 
 
 class InertiaWarning(ArmblocksWarning):
-    """An inertia that no rigid body can have (negative, or against the triangle inequality)."""
+    """An inertia that no rigid body can have: negative, or violating the triangle inequality."""
 
 
 class LimitWarning(ArmblocksWarning):
-    """A joint beyond its range or speed: joint, time and value are in the text."""
+    """A joint exceeded its position or speed limit. The text has joint, time and value."""

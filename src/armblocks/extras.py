@@ -1,4 +1,4 @@
-"""Libraries that come with an extra of the package: imported where they are used, named where missing.
+"""Libraries of optional extras: imported at first use, with an error that names the extra if one is missing.
 
 The core of armblocks (robots, diagrams, runs, reports, command line) works without any of them.
 """
@@ -18,14 +18,14 @@ LIBRARIES = {
     "notebook": ("anywidget", "traitlets"),
     "studio": ("pydantic", "starlette", "uvicorn", "websockets"),
 }
-"""What each extra brings, by the names under which the libraries are imported."""
+"""The libraries of each extra, by import name."""
 
 
 @contextmanager
 def from_extra(extra: str, use: str) -> Generator[None]:
-    """Within the block, libraries of ``extra`` are imported for ``use``, words such as ``"Parquet files"``.
+    """Context in which libraries of ``extra`` are imported for ``use``, such as ``"Parquet files"``.
 
-    Raises ``MissingLibraryError`` where one is not installed. Other failures of an import pass unchanged.
+    Raises ``MissingLibraryError`` where a library is not installed. Other import errors pass unchanged.
     """
     try:
         yield
@@ -37,14 +37,14 @@ def from_extra(extra: str, use: str) -> Generator[None]:
 
 
 def require(extra: str, use: str) -> None:
-    """Raise ``MissingLibraryError`` where a library of ``extra`` is not installed; nothing is imported."""
+    """Raise ``MissingLibraryError`` where a library of ``extra`` is not installed. Imports nothing."""
     for library in LIBRARIES[extra]:
         if not installed(library):
             raise MissingLibraryError(library, extra, use)
 
 
 def installed(library: str) -> bool:
-    """Whether a library is there to be imported."""
+    """Whether a library is installed."""
     try:
         return importlib.util.find_spec(library) is not None
     except ModuleNotFoundError:

@@ -1,4 +1,4 @@
-"""Whole files, written all or nothing and read within a cap: the only code that knows how."""
+"""Atomic writing of files, and reading of files up to a size limit."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from armblocks.errors import FormatError
 
 
 def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.stat_result:
-    """Replace the file at ``path`` by ``data``, so that a reader or a crash sees the old file or the new one.
+    """Replace the file at ``path`` by ``data``, atomically: readers see the old file or the new one.
 
-    Returns what the disk says of the new file: who finds another size, time or number there later knows that
-    somebody else has written. ``mode``: the permissions of a file that is new, less the user's umask.
+    Returns the ``stat`` of the new file: another size, time or inode later means that another program has
+    written it. ``mode``: the permissions of a new file, less the user's umask.
 
-    The bytes go to a new file in the same folder, reach the disk (``fsync``), and take the name in one step;
-    then the folder's entry reaches the disk too. A symbolic link stays a link: its target is replaced. The
-    permissions of a file that was there are kept.
+    The bytes are written to a temporary file in the same folder and flushed (``fsync``). A rename then
+    replaces the old file, and the folder entry is flushed too. A symbolic link stays a link: its target is
+    replaced. The permissions of an existing file are kept.
 
     Source: Pillai et al., "All File Systems Are Not Created Equal", OSDI 2014: a rename without both
     ``fsync`` calls is not safe.
 
     Raises ``FormatError`` where the folder is missing, is not a folder or cannot be written, where ``path``
-    is a folder, and where the disk refuses the data. The old file is then still whole.
+    is a folder, and where writing fails. The old file is then unchanged.
     """
     target = _writable_target(path)
     folder = target.parent
@@ -45,9 +45,9 @@ def write_atomically(path: str | Path, data: bytes, *, mode: int = 0o666) -> os.
 
 
 class GrowingFile:
-    """A file that is written bit by bit, beside its place, and takes its name when it is complete.
+    """A file that is written in parts under a temporary name and renamed when it is complete.
 
-    Until then an older file of that name stays as it is. Raises ``FormatError`` as
+    Until then an existing file of that name is unchanged. Raises ``FormatError`` as
     :func:`write_atomically` does.
     """
 
@@ -62,7 +62,7 @@ class GrowingFile:
             raise _cannot_write(self._shown, error) from error
 
     def finish(self) -> None:
-        """All is written: the file gets its name."""
+        """Rename the complete file to its final name."""
         try:
             self.stream.flush()
             os.fsync(self.stream.fileno())
@@ -76,7 +76,7 @@ class GrowingFile:
             raise _cannot_write(self._shown, error) from error
 
     def abandon(self) -> None:
-        """Leave nothing behind."""
+        """Delete the temporary file."""
         with contextlib.suppress(OSError):
             self.stream.close()
         with contextlib.suppress(OSError):
@@ -84,12 +84,12 @@ class GrowingFile:
 
 
 def read_bounded(path: str | Path, limit: int) -> bytes:
-    """All bytes of the file at ``path``, of which it may hold at most ``limit``.
+    """The bytes of the file at ``path``, at most ``limit`` of them.
 
     Raises ``FormatError`` where the file is missing, is a folder, cannot be read or is larger.
     """
     try:
-        # Not the size that the folder tells: a device or a growing file lies about it.
+        # Read and count: the size in the folder entry is wrong for devices and growing files.
         with Path(path).open("rb") as stream:
             data = stream.read(limit + 1)
     except FileNotFoundError as error:
@@ -112,7 +112,7 @@ def read_bounded(path: str | Path, limit: int) -> bytes:
 
 
 def _write_through(path: Path, data: bytes, mode: int) -> os.stat_result:
-    """Create ``path`` with the permissions that the user's umask leaves, and return when the disk has it."""
+    """Create ``path`` with ``mode`` less the user's umask, write the data and flush it to the disk."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
     with os.fdopen(descriptor, "wb") as stream:
         stream.write(data)
@@ -122,7 +122,7 @@ def _write_through(path: Path, data: bytes, mode: int) -> os.stat_result:
 
 
 def sync_folder(folder: Path) -> None:
-    """Bring a folder's entries to the disk. Windows has no such call and orders its renames itself."""
+    """Flush a folder's entries to the disk. Windows has no such call and orders renames itself."""
     if os.name == "nt":
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -133,7 +133,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _writable_target(path: str | Path) -> Path:
-    """Where a file of that name goes: its target, where it is a link."""
+    """The path to write: the target, if ``path`` is a symbolic link."""
     if "\0" in str(path):
         raise FormatError("the path holds a NUL character", where=repr(str(path)), fix="choose another name")
     target = Path(os.path.realpath(path))
@@ -145,9 +145,7 @@ def _writable_target(path: str | Path) -> Path:
             fix="create the folder, or choose another",
         )
     if target.is_dir():
-        raise FormatError(
-            "a folder stands where the file should go", where=str(path), fix="choose another name"
-        )
+        raise FormatError("the path is an existing folder", where=str(path), fix="choose another name")
     return target
 
 
@@ -155,5 +153,5 @@ def _cannot_write(path: str, error: OSError) -> FormatError:
     return FormatError(
         f"the file cannot be written ({error.strerror or error})",
         where=path,
-        fix="check the folder's permissions and free space; a file that was there is unchanged",
+        fix="check the folder's permissions and free space; an existing file is unchanged",
     )

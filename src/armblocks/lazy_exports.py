@@ -1,7 +1,7 @@
-"""Names that are imported when first used, so that ``import armblocks`` costs next to nothing.
+"""Lazy imports of exported names, so that ``import armblocks`` is fast.
 
 A package states its names twice: for type checkers as plain imports under ``TYPE_CHECKING``, and for the
-interpreter as a table for :func:`lazy_exports`. A test holds the two against each other.
+interpreter as a table for :func:`lazy_exports`. A test compares the two.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any
 def lazy_exports(package: str, homes: Mapping[str, str]) -> Callable[[str], object]:
     """The module-level ``__getattr__`` (PEP 562) of ``package``.
 
-    ``homes`` says for each name the module that defines it; a name whose home is ``package.name`` is that
-    module itself. What has been looked up once is an ordinary attribute from then on.
+    ``homes`` maps each name to the module that defines it. A name whose module is ``package.name`` is that
+    module itself. After the first lookup a name is an ordinary attribute.
     """
 
     def find(name: str) -> object:
@@ -32,10 +32,10 @@ def lazy_exports(package: str, homes: Mapping[str, str]) -> Callable[[str], obje
 
 
 def shown_by(module: str, function: str) -> Callable[[Any], str]:
-    """A method by which a notebook asks a value to show itself: it calls ``function`` of ``module``.
+    """A notebook display method (``_repr_html_`` and the like) that calls ``function`` of ``module``.
 
-    Descriptions stand below all that draws them and import none of it. They name the function that draws
-    them, and it is imported when a notebook asks for the first time.
+    Description classes belong to a layer below the drawing code and must not import it. They name the drawing
+    function, which is imported at the first call.
     """
 
     def show(self: object) -> str:

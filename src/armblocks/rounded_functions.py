@@ -1,14 +1,14 @@
 """Elementary functions of numbers, rounded to the nearest double: the same bits on every machine.
 
-Numbers that are computed before anything is compiled (constants in formulas, angles between the axes of a
-robot, the poles of a filter) become part of the code. The C library's functions, which :mod:`math`, NumPy and
-CasADi call, differ in the last place from one library or processor to the next; these do not. They work with
-whole numbers: a real number ``x`` is ``round(x 2**bits)``, with 192 bits more than the argument's size asks
-for, so that in effect the result is correctly rounded. A call takes 10 to 200 microseconds.
+Numbers that are computed before compilation (constants in formulas, angles between the axes of a robot, the
+poles of a filter) become constants of the code. The C library's functions, which :mod:`math`, NumPy and
+CasADi call, differ in the last place from one library or processor to the next; these do not. They use
+integer arithmetic: a real number ``x`` is ``round(x 2**bits)``, with 192 bits more than the magnitude of the
+argument needs, so that the result is correctly rounded in practice. A call takes 10 to 200 microseconds.
 
-Zeros keep their sign, infinities and NaN are served as C99 (Annex F) says: an argument outside of the domain
-gives NaN, a pole an infinity; nothing raises. The series are those of Abramowitz and Stegun, Handbook of
-Mathematical Functions, 4.2 to 4.6 and 7.1; the reduction of their arguments is that of R. P. Brent, Fast
+Signed zeros, infinities and NaN follow C99 (Annex F): an argument outside the domain gives NaN, a pole gives
+an infinity, and no function raises. The series are those of Abramowitz and Stegun, Handbook of Mathematical
+Functions, 4.2 to 4.6 and 7.1; the reduction of their arguments is that of R. P. Brent, Fast
 multiple-precision evaluation of elementary functions, J. ACM 23(2), 1976.
 """
 
@@ -21,11 +21,11 @@ from functools import lru_cache
 
 INFINITY, NAN = math.inf, math.nan
 _SPARE = 192
-"""Bits beyond those that the size of an argument asks for."""
+"""Extra bits beyond those that the magnitude of an argument needs."""
 
 
 def _spare(x: float) -> int:
-    """Bits of a fixed-point number that leave ``x`` and ``x**2`` with :data:`_SPARE` of them."""
+    """Number of fraction bits for which ``x`` and ``x**2`` keep :data:`_SPARE` extra bits."""
     return _SPARE + 2 * abs(math.frexp(x)[1])
 
 
@@ -35,7 +35,7 @@ def _fixed(x: float | Fraction, bits: int) -> int:
 
 
 def _rounded(value: int, bits: int, sign_of: float = 0.0) -> float:
-    """``value 2**-bits`` rounded to nearest; a zero has the sign of ``sign_of``."""
+    """``value 2**-bits`` rounded to nearest; a zero result takes the sign of ``sign_of``."""
     try:
         found = value / (1 << bits) if bits >= 0 else float(value << -bits)
     except OverflowError:
@@ -87,7 +87,7 @@ def _odd_series(x: int, bits: int, sign: int) -> int:
 
 
 def _exponential(x: int, bits: int) -> tuple[int, int]:
-    """``exp x = m 2**k`` with ``m`` about 1: gives m and k. The argument is halved, the result squared."""
+    """``exp x = m 2**k`` with ``m`` about 1: returns m and k, by halving the argument and squaring."""
     k = x // _ln2(bits)
     halvings, more = 12, bits + 32
     r = ((x - k * _ln2(bits)) << 32) >> halvings
@@ -190,7 +190,7 @@ def atan2(y: float, x: float) -> float:
         return y
     small, large = sorted((across, along))
     bits = _SPARE + 2 * max(0, math.frexp(large)[1] - math.frexp(small or large)[1])
-    # Beyond 2**-1100 the quotient lies far below the smallest double, or it does not show beside pi.
+    # Below 2**-1100 the quotient underflows, or is negligible when added to pi.
     bits = min(bits, _SPARE + 2 * 1100)
     (top, scale), (bottom, other) = small.as_integer_ratio(), (large or 1.0).as_integer_ratio()
     angle = _arc_tangent(((top * other) << bits) // (scale * bottom), bits)
@@ -249,7 +249,7 @@ def expm1(x: float) -> float:
 
 def _both_exponentials(x: float) -> tuple[int, int, int]:
     """``e**x`` and ``e**-x`` for ``|x| <= 800``, and their bits."""
-    bits = _spare(x) + int(3.0 * abs(x))  # the smaller one has digits, too
+    bits = _spare(x) + int(3.0 * abs(x))  # enough bits for the smaller result, too
     value = _shifted(*_exponential(_fixed(x, bits), bits))
     return value, _quotient(1, value, 2 * bits), bits
 
@@ -332,11 +332,11 @@ def atanh(x: float) -> float:
 
 
 def power(x: float, y: float) -> float:
-    """``x**y``; a negative number has whole powers only."""
+    """``x**y``; NaN for a negative base with a fractional exponent."""
     if y == 0.0 or x == 1.0:
         return 1.0
     if not (math.isfinite(x) and math.isfinite(y)) or x == 0.0:
-        # Limits only, which no library computes.
+        # Only special cases, where math.pow is exact on every platform.
         try:
             return math.pow(x, y)
         except ValueError:  # a negative power of zero
@@ -396,4 +396,4 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
         *(exp, expm1, log, log10, log1p, power, hypot, erf),
     )
 }
-"""All of them by name."""
+"""All functions by name."""

@@ -1,4 +1,4 @@
-"""The folders that a system has for the files that programs keep for their user."""
+"""The cache folder and the data folder of the current user."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ NAME = "armblocks"
 
 
 def cache_folder() -> Path | None:
-    """The folder for what can be computed again; ``None`` where the user has no home folder."""
-    from platformdirs import user_cache_path  # takes 10 ms, which a start without a cache saves
+    """The folder for files that can be recomputed; ``None`` where the user has no home folder."""
+    from platformdirs import user_cache_path  # takes 10 ms, needless without a cache
 
     return _absolute(lambda: user_cache_path(NAME, appauthor=False))
 
 
 def state_folder() -> Path | None:
-    """The folder for what is to survive a restart; ``None`` where the user has no home folder."""
+    """The folder for files that must survive a restart; ``None`` where the user has no home folder."""
     from platformdirs import user_state_path
 
     return _absolute(lambda: user_state_path(NAME, appauthor=False))
 
 
 def _absolute(find: Callable[[], Path]) -> Path | None:
-    """Without a home folder some versions of platformdirs raise, others answer with a path from ``~``."""
+    """Without a home folder some versions of platformdirs raise an error, others return a path with ``~``."""
     try:
         folder = find()
     except RuntimeError:

@@ -152,5 +152,5 @@ def test_what_does_not_fit_is_said() -> None:
         builder.build()
     builder = DiagramBuilder("d")
     builder.add("norm", Norm(), builder.add("a", Constant(value=U)))
-    with pytest.raises(DiagramError, match=r"the 2-norm of a matrix of shape \(3, 4\) is asked for"):
+    with pytest.raises(DiagramError, match=r"the 2-norm of a matrix of shape \(3, 4\) is not supported"):
         builder.build()

@@ -116,9 +116,11 @@ def test_equations_that_do_not_decide_the_rest_are_refused() -> None:
     """Index 2: x1' = x2, 0 = x1 - u."""
     shapes = {"B": ((0.0,), (-1.0,)), "C": ((1.0, 0.0),), "D": ((0.0,),)}
     E = ((1.0, 0.0), (0.0, 0.0))
-    with pytest.raises(InputError, match=r"E has rank 1 of 2, and its 1 algebraic equations do not decide"):
+    with pytest.raises(
+        InputError, match=r"E has rank 1 of 2, and its 1 algebraic equations do not determine"
+    ):
         DescriptorStateSpace(E=E, A=((0.0, 1.0), (1.0, 0.0)), **shapes)
-    with pytest.raises(InputError, match=r"E is \(2, 2\), A is \(2, 2\), B is \(1, 1\).*make the five"):
+    with pytest.raises(InputError, match=r"E is \(2, 2\), A is \(2, 2\), B is \(1, 1\).*correct the shapes"):
         DescriptorStateSpace(E=E, A=np.eye(2), B=((1.0,),), C=((1.0, 0.0),), D=((0.0,),))
     with pytest.raises(InputError, match=r"DescriptorStateSpace.initial: initial has shape \(3,\)"):
         DescriptorStateSpace(E=E, A=np.eye(2), **shapes, initial=(1.0, 2.0, 3.0))

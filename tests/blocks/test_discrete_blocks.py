@@ -181,7 +181,7 @@ def test_a_counter_starts_again() -> None:
 
 
 def test_matrices_that_do_not_fit_are_refused() -> None:
-    with pytest.raises(InputError, match=r"DiscreteStateSpace: A is \(1, 1\), B is \(2, 1\).*fit each other"):
+    with pytest.raises(InputError, match=r"DiscreteStateSpace: A is \(1, 1\), B is \(2, 1\).*the shapes"):
         DiscreteStateSpace(B=[[1.0], [2.0]])
     with pytest.raises(InputError, match=r"DiscreteStateSpace.initial: initial has shape \(2,\)"):
         DiscreteStateSpace(initial=[1.0, 2.0])

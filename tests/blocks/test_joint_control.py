@@ -103,5 +103,5 @@ def test_stops_push_and_never_pull() -> None:
 def test_what_does_not_fit_is_said(puma560: Robot) -> None:
     with pytest.raises(DiagramError, match=r"the Jacobian has shape \(6, 4\).*choose 'pseudo' or 'damped'"):
         evaluate(JacobianInverse(), np.ones((6, 4)))
-    with pytest.raises(InputError, match=r"ComputedTorque: Kp has 2 gains. Allowed: 6, as 'puma560'"):
+    with pytest.raises(InputError, match=r"ComputedTorque: Kp has 2 gains. Allowed: 6, one for each joint"):
         ComputedTorque(robot=puma560, Kp=[1, 2])

@@ -94,7 +94,7 @@ def test_a_circle() -> None:
 def test_what_does_not_fit_is_said() -> None:
     with pytest.raises(InputError, match=r"3 points make 2 segments but 1 durations are given"):
         MultiSegment(durations=[1.0])
-    with pytest.raises(InputError, match=r"corners of 2 s do not fit into a segment of 1 s"):
+    with pytest.raises(InputError, match=r"blends of 2 s do not fit into a segment of 1 s"):
         MultiSegment(blend=2.0)
     with pytest.raises(InputError, match=r"CirclePath.centre: the centre has 2 numbers"):
         CirclePath(centre=[0, 0])

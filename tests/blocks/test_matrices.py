@@ -87,7 +87,7 @@ def test_what_does_not_fit_is_said() -> None:
         evaluate(MatrixInverse(), A)
     with pytest.raises(DiagramError, match=r"the matrix has shape \(2, 2\) and the right side \(3,\)"):
         evaluate(LinearSolve(), np.eye(2), [1.0, 2.0, 3.0])
-    with pytest.raises(DiagramError, match=r"6 elements make no matrix of 4 rows"):
+    with pytest.raises(DiagramError, match=r"6 elements cannot form a matrix with 4 rows"):
         evaluate(Reshape(output="matrix", rows=4), A)
     with pytest.raises(DiagramError, match=r"the parts have shapes \(2, 3\), \(3, 3\)"):
         evaluate(MatrixConcatenate(), A, np.ones((3, 3)))

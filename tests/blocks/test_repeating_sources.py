@@ -111,7 +111,7 @@ def test_stairs_and_counters_count_ticks() -> None:
 
 @pytest.mark.parametrize("kind", [RepeatingSequence, RepeatingSequenceInterpolated])
 def test_a_sequence_begins_at_zero(kind: type[Block]) -> None:
-    with pytest.raises(InputError, match=r"the first of the times is 0\.5\. Allowed: times that begin at 0"):
+    with pytest.raises(InputError, match=r"the first of the times is 0\.5\. Allowed: times that start at 0"):
         kind(times=[0.5, 1.0], values=[0.0, 1.0])
 
 

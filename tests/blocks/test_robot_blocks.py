@@ -95,7 +95,7 @@ def test_a_robot_plot_shows_its_robot(puma560: Robot) -> None:
 
 def test_start_values_have_one_number_for_each_joint(puma560: Robot) -> None:
     with pytest.raises(
-        InputError, match=r"ForwardDynamics.q0: q0 has 2 joints. Allowed: 6, as 'puma560' has"
+        InputError, match=r"ForwardDynamics.q0: q0 has 2 joints. Allowed: 6, one for each joint of 'puma560'"
     ):
         ForwardDynamics(robot=puma560, q0=[0.0, 0.0])
 

@@ -142,7 +142,7 @@ def test_roots_survive_a_file(tmp_path: Path) -> None:
 
 
 def test_systems_that_are_none_are_refused() -> None:
-    with pytest.raises(InputError, match=r"ZeroPole: there are 2 zeros and 1 poles.*cannot be simulated"):
+    with pytest.raises(InputError, match=r"ZeroPole: there are 2 zeros and 1 poles.*is not causal"):
         ZeroPole(zeros=[1.0, 2.0], poles=[-1.0])
     with pytest.raises(InputError, match="complex numbers in conjugate pairs"):
         ZeroPole(zeros=[], poles=[-1 + 2j, -1 - 3j])

@@ -195,7 +195,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         caught.value
     )
     (tmp_path / "out" / "report.html").mkdir(parents=True)
-    with pytest.raises(FormatError, match="a folder stands where the file should go"):
+    with pytest.raises(FormatError, match="the path is an existing folder"):
         write_report(tmp_path / "out", diagram, result)
 
 

@@ -322,7 +322,7 @@ def test_friction_that_drives_is_refused() -> None:
 
 
 def test_a_start_behind_a_hard_stop_is_refused() -> None:
-    with pytest.raises(InputError, match=r"joint 'upper' starts at 0\.7, behind its stop"):
+    with pytest.raises(InputError, match=r"joint 'upper' starts at 0\.7, beyond its stop"):
         ArmPlant(robot=pair(), stops="hard", q0=(0.7, 0.0))
     ArmPlant(robot=pair(), stops="elastic", q0=(0.7, 0.0))
 

@@ -150,7 +150,7 @@ def test_a_limit_of_the_position_needs_a_speed_of_zero() -> None:
     message = r"x has a limit, and dx is held between -inf and -1\.0\. Allowed: lower_speed <= 0"
     with pytest.raises(InputError, match=message):
         SecondOrderIntegratorLimited(initial=1.0, lower=0.0, upper_speed=-1.0)
-    with pytest.raises(InputError, match=r"where x has a limit, because x stands still there"):
+    with pytest.raises(InputError, match=r"where x has a limit, because the speed is 0 there"):
         SecondOrderIntegratorLimited(upper=(2.0, math.inf), lower_speed=(1.0, 1.0))
     SecondOrderIntegratorLimited(upper=(2.0, math.inf), lower_speed=(0.0, 1.0))
     SecondOrderIntegratorLimited(lower=0.0, lower_speed=1.0)

@@ -1,8 +1,8 @@
-"""All kinds of blocks: each folder of this package is a family, each class with a title in it is a kind.
+"""All block types: each subpackage is a family, and each class with a title is a block type.
 
-``BLOCKS`` is the library of all kinds, and each kind is a name of this package: ``from armblocks.blocks
-import Gain``. A new block is one class in a file of its family's folder; it is found there. Type checkers and
-editors know the names from ``__init__.pyi``, which ``scripts/block_names.py`` writes.
+``BLOCKS`` is the library of all block types, and each type is a name of this package: ``from armblocks.blocks
+import Gain``. A new block is one class in a file of its family's folder, where the library finds it. Type
+checkers and editors read the names from ``__init__.pyi``, which ``scripts/block_names.py`` writes.
 """
 
 import importlib
@@ -37,7 +37,7 @@ FAMILIES = (
     "lookup",
     "functions",
 )
-"""The families in the order of lists; within a family the kinds stand by the alphabet."""
+"""The families in the order in which lists show them; within a family the types are in alphabetical order."""
 
 _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
     "routing": (BusAssignment, BusCreator, BusSelector, From, Goto, Merge),
@@ -52,11 +52,11 @@ _KNOWN_TO_THE_DIAGRAM: dict[str, tuple[type[Block], ...]] = {
         TriggeredSubsystem,
     ),
 }
-"""The kinds that the passes over a diagram handle: the layer of the diagram defines them."""
+"""The block types that passes over a diagram handle themselves; the diagram layer defines them."""
 
 
 def _kinds_of(family: str) -> Iterator[type[Block]]:
-    """The kinds of one family. A class that several kinds share has no title of its own."""
+    """The block types of one family. A base class that several types share has no title."""
     yield from _KNOWN_TO_THE_DIAGRAM.get(family, ())
     folder = importlib.import_module(f"{__name__}.{family}")
     for file in pkgutil.iter_modules(folder.__path__, f"{folder.__name__}."):
@@ -71,7 +71,7 @@ def _kinds_of(family: str) -> Iterator[type[Block]]:
 BLOCKS = BlockLibrary(
     {family: sorted(_kinds_of(family), key=lambda kind: kind.type_name().casefold()) for family in FAMILIES}
 )
-"""Every kind of block by type name."""
+"""Every block type by type name."""
 
 globals().update(BLOCKS)
 globals()["__all__"] = ["BLOCKS", *BLOCKS]

@@ -1,7 +1,7 @@
 """Complex arithmetic with one rounding for each real operation: the same bits on every machine.
 
-Products and quotients of complex numbers in Python and NumPy are up to the compiler, which may contract a
-product and a sum into one rounding; their magnitudes and roots are the C library's.
+Complex products and quotients in Python and NumPy depend on the C compiler, which may fuse a product and a
+sum into one rounding. Their magnitudes and roots depend on the C library.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def magnitude(z: complex) -> float:
 
 
 def product(factors: Iterable[complex]) -> complex:
-    """The product of all factors, from left to right; 1 of none."""
+    """The product of all factors, from left to right; 1 if there are none."""
     re, im = 1.0, 0.0
     for factor in factors:
         re, im = re * factor.real - im * factor.imag, re * factor.imag + im * factor.real
@@ -39,7 +39,7 @@ def quotient(over: complex, under: complex) -> complex:
 
 
 def square_root(z: complex) -> complex:
-    """The root with a real part that is not negative; its imaginary part has the sign of that of ``z``."""
+    """The square root with a non-negative real part; its imaginary part has the sign of that of ``z``."""
     if z == 0.0:
         return complex(0.0, z.imag)
     large = math.sqrt((abs(z.real) + magnitude(z)) / 2.0)

@@ -1,4 +1,4 @@
-"""What the elementwise blocks of all families share: numbered ports, and shapes and units that spread."""
+"""Functions shared by elementwise blocks: numbered ports, broadcast shapes, common units."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from armblocks.equations import Shape
 
 
 def numbered_ports(letter: str, count: int, doc: str) -> tuple[Port, ...]:
-    """Ports ``u1, u2, …``; a single one is just ``u``."""
+    """Ports ``u1, u2, …``; a single port is named ``u``."""
     if count == 1:
         return (Port(letter, doc),)
     return tuple(Port(f"{letter}{k}", f"{doc} {k}") for k in range(1, count + 1))
 
 
 def parameters_shape(block: Block, *names: str) -> Shape:
-    """The common shape of array parameters; scalars spread. Raises ``InputError`` where they disagree."""
+    """The common shape of array parameters, with broadcasting. Raises ``InputError`` for other shapes."""
     return broadcast({name: shape_of(block.parameter_value(name)) for name in names})
 
 
 def common_unit(units: Mapping[str, str]) -> str:
-    """The unit that all have, or ``""``."""
+    """The common unit, or ``""``."""
     found = set(units.values())
     return found.pop() if len(found) == 1 else ""
 
 
 def unit_of_terms(units: Mapping[str, str]) -> Mapping[str, str]:
-    """The unit of each of some quantities that are added, compared or chosen from: that of the others."""
+    """Units of quantities that are added, compared or selected: all have the same unit."""
     return dict.fromkeys(units, common_unit({name: unit for name, unit in units.items() if unit}))

@@ -1,8 +1,8 @@
-"""Linear equations over symbols: Gaussian elimination whose pivots are chosen when the numbers are known.
+"""Linear equations with symbols: Gaussian elimination with pivots that are chosen at run time.
 
-Every exchange of rows is a choice in the traced equations, so that the result is as accurate as a numerical
-library's for every value of the signals. About n^3 operations for an (n, n) matrix: for the sizes of arms and
-controllers, not for hundreds of unknowns.
+Every row exchange is a conditional expression in the traced equations, so that the result is as accurate as
+that of a numerical library for every value of the signals. It takes about n^3 operations for an (n, n)
+matrix. It is meant for the sizes of arms and controllers, not for hundreds of unknowns.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ def solve(A: SX, B: SX) -> SX:
 
 
 def determinant(A: SX) -> SX:
-    """The determinant of A (n, n), from its triangular form: exactly 0 where a whole column cancels."""
+    """The determinant of A (n, n) from its triangular form; exactly 0 where all pivot candidates are 0."""
     n = A.shape[0]
     rows, sign = _triangular(A)
     product = sign
     for i in range(n):
         product = product * rows[i][i]
-    # Where a pivot is zero the rows below were divided by it; the determinant is zero whatever they hold.
+    # The rows below a zero pivot are not finite; the determinant is then zero.
     for i in range(n - 1):
         product = if_else(rows[i][i] == 0.0, 0.0, product)
     return product
 
 
 def _triangular(A: SX) -> tuple[list[SX], SX]:
-    """Rows of the upper triangular form, and the sign of the exchange of rows that leads there."""
+    """Rows of the upper triangular form, and the sign of the row permutation."""
     n = A.shape[0]
     rows = [A[i, :] for i in range(n)]
     sign = SX(1.0)

@@ -1,4 +1,4 @@
-"""Signals that several worked examples share."""
+"""Input signals of worked examples."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ CIRCLING = made("SineWave", phase=(pi / 2, 0.0)).named("circling")
 HALF_ANGLE = made(
     "SineWave", frequency=0.5, amplitude=(1.0, 0.0, 0.0, 1.0), phase=(pi / 2, 0.0, 0.0, 0.0)
 ).named("quaternion")
-"""The quaternion (cos t/2, 0, 0, sin t/2): a turn by t about z."""
+"""The quaternion (cos t/2, 0, 0, sin t/2): a rotation by t about z."""
 ZERO = made("Ground").named("zero")
 SPINNING_POSE = made("AngleAxis2T").by(
     angle=made("Ramp", slope=0.6).named("angle"),
     axis=made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
 )
-"""A pose that turns about z."""
+"""A pose that rotates about z."""
 HELIX_POSE = made("Xyz2T").by(
     x=made("SineWave", phase=pi / 2).named("x"),
     y=made("SineWave").named("y"),
     z=made("Ramp", slope=0.1).named("z"),
 )
-"""A pose that moves along a helix and does not turn."""
+"""A pose that moves along a helix without rotation."""
 
 
 def pose_along_x(x: Feed) -> Fed:
-    """A pose on the x axis that does not turn."""
+    """A pose that moves along the x axis without rotation."""
     return made("Xyz2T").by(x=x, y=ZERO, z=ZERO)
 
 
 def corner_of(T: Feed) -> Fed:
-    """The entries of a pose that a turn about z changes: [cos -sin; sin cos]."""
+    """The entries of a pose that a rotation about z changes: [cos -sin; sin cos]."""
     return made("SubMatrix", last_row=2, last_column=2).named("corner").by(u=T)
 
 

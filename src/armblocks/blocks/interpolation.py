@@ -1,8 +1,8 @@
-"""Interpolation in tables, traced: every method as weights of the table's entries.
+"""Traced interpolation in tables: every method computes weights of the table's entries.
 
 At a position u between the break points the value is the sum of ``weights[k] * table[k]``. The weights depend
-on u and the break points alone, so one contraction serves tables of any count of axes and any method, and the
-entries may stay tunable. At a break point one weight is exactly 1 and the others are exactly 0.
+on u and the break points alone, so one tensor contraction handles tables with any number of axes and any
+method, and the entries stay tunable. At a break point one weight is exactly 1 and the others are exactly 0.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from armblocks.blocks.splines import spline_slopes
 from armblocks.equations import Shape, flatten
 
 METHODS = ("linear", "nearest", "flat", "cubic")
-"""Straight lines; the nearest entry (halfway: the one above); the entry at or below; the cubic spline."""
+"""Piecewise linear; the nearest entry (halfway: the upper one); the entry at or below; the cubic spline."""
 EXTRAPOLATIONS = ("clip", "linear")
-"""Beyond the ends: the value of the end, or the straight line that touches there."""
+"""Extrapolation: the value at the end, or the tangent at the end."""
 
 Point = float | SX
 
@@ -35,7 +35,7 @@ def weights(
 
     Break points may be symbols where the method is not ``cubic``.
 
-    ``cell``, if given, says which of :func:`borders` are at or below u: the equations that hold.
+    ``cell``, if given, is the number of :func:`borders` at or below u and selects the equations.
     """
     ends = borders(points, method, extrapolation)
     if method in ("flat", "nearest"):
@@ -52,7 +52,7 @@ def weights(
         found = [at == float(k) for k in range(1, len(points))]
     if method == "linear":
         return linear_weights(inside, points, found)
-    fixed = [float(point) for point in points]  # a spline through positions that move is not offered
+    fixed = [float(point) for point in points]  # splines need constant break points
     weighted = _cubic_weights(inside, fixed)
     if extrapolation == "linear":
         slopes = spline_slopes(fixed, np.eye(len(fixed)))
@@ -63,7 +63,7 @@ def weights(
 
 
 def borders(points: Sequence[Point], method: str, extrapolation: str) -> list[Point]:
-    """The positions, rising, at which curve or slope jumps; a spline has none but where it is held."""
+    """The positions at which the curve or its derivative jumps; of a spline, only where it is clipped."""
     if method == "flat":
         return list(points[1:])
     if method == "nearest":
@@ -74,9 +74,11 @@ def borders(points: Sequence[Point], method: str, extrapolation: str) -> list[Po
 
 
 def linear_weights(u: SX, points: Sequence[Point], interval: Sequence[SX] | None = None) -> list[SX]:
-    """Hat functions; the first and the last interval go on beyond the ends. Break points may be symbols.
+    """Weights of linear interpolation (hat functions); the end intervals extend beyond the ends.
 
-    ``interval``, if given, marks the interval that u counts to with 1, all others with 0.
+    Break points may be symbols.
+
+    ``interval``, if given, is 1 for the interval of u and 0 for all others.
     """
     found = [SX(0.0) for _ in points]
     for k, inside in enumerate(interval or cells(u, points[1:-1])):
@@ -87,7 +89,7 @@ def linear_weights(u: SX, points: Sequence[Point], interval: Sequence[SX] | None
 
 
 def cells(u: SX, borders: Sequence[Point]) -> list[SX]:
-    """1 for the cell that u is in, else 0: one cell more than borders; a border belongs to the cell above."""
+    """1 for the cell of u, else 0; one cell more than borders; a border belongs to the cell above."""
     below = [u < border for border in borders]
     inner = [logic_and(logic_not(left), right) for left, right in pairwise(below)]
     return [below[0], *inner, logic_not(below[-1])] if below else [SX(1.0)]
@@ -107,7 +109,7 @@ def contract(table: SX, shape: Shape, weights_by_axis: Sequence[Sequence[SX]]) -
 
 
 def _cubic_weights(u: SX, points: Sequence[float]) -> list[SX]:
-    """Hermite's cubic on each interval, between values and slopes at its ends."""
+    """The cubic Hermite interpolant on each interval, from values and derivatives at its ends."""
     values = [SX(0.0) for _ in points]
     slopes = [SX(0.0) for _ in points]
     for k, inside in enumerate(cells(u, points[1:-1])):

@@ -1,4 +1,4 @@
-"""What linear blocks in continuous and discrete time have in common: matrices, coefficients, roots."""
+"""Base classes of linear blocks in continuous and discrete time: matrices, coefficients, roots."""
 
 from __future__ import annotations
 
@@ -30,10 +30,9 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class LinearBlock(Block):
-    """Four matrices that fit each other: what becomes of the state is A x + B u, the output is C x + D u.
+    """A linear system: the state's derivative or next value is A x + B u, the output C x + D u.
 
-    D belongs to the structure (it is not tunable), so that a zero in it leaves the output free of the input
-    and the block may stand in a loop.
+    D is not tunable: where D is zero the output has no feedthrough, and the block may close a loop.
     """
 
     A: ArrayLike = parameter(((0.5,),), dimensions=(2,), doc="the system matrix (n, n)")
@@ -54,7 +53,7 @@ class LinearBlock(Block):
                 f"A is {A}, B is {B}, C is {C}, D is {D}",
                 where=self.type_name(),
                 allowed="A (n, n), B (n, m), C (k, n), D (k, m)",
-                fix="make the four matrices fit each other",
+                fix="correct the shapes of the four matrices",
             )
         if shape_of(self.initial) not in ((), A[:1]):
             raise InputError(
@@ -83,9 +82,9 @@ class LinearBlock(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RationalBlock(Block):
-    """A quotient of two polynomials, in the direct form II; at rest at the start.
+    """A rational transfer function in direct form II, initially at rest.
 
-    Its state is u filtered by 1/denominator, the highest power first: its derivatives, or its last values.
+    Its states are u filtered by 1/denominator and its derivatives, highest first, or its last values.
     """
 
     numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, highest power first")
@@ -98,7 +97,7 @@ class RationalBlock(Block):
                 f"the denominator is {a.tolist()} and the numerator has {len(b)} coefficients",
                 where=self.type_name(),
                 allowed="a0 not zero, at least two a, and no more b than a",
-                fix="leave out leading zeros; more zeros than poles would ask for the input of the future",
+                fix="remove leading zeros; a transfer function with more zeros than poles is not causal",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -109,7 +108,7 @@ class RationalBlock(Block):
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         b, a = self._normalised(p)
-        # y = b0 u + sum (b_i - b0 a_i) x_i; a strictly proper system has no b0, so nothing feeds through.
+        # y = b0 u + sum (b_i - b0 a_i) x_i; a strictly proper system has no b0 and no feedthrough.
         return {"y": b[0] * u["u"] + dot(b[1:] - b[0] * a[1:], x["x"])}
 
     def initial_states(self, p: Signals) -> Signals:
@@ -117,11 +116,11 @@ class RationalBlock(Block):
 
     @property
     def degree(self) -> int:
-        """How many states there are."""
+        """Number of states."""
         return shape_of(self.denominator)[0] - 1
 
     def _coefficients(self, p: Signals) -> tuple[SX, SX]:
-        """Numerator and denominator of one length."""
+        """Numerator and denominator, padded to the same length."""
         missing = p["denominator"].numel() - p["numerator"].numel()
         return vertcat(SX(missing, 1), p["numerator"]), p["denominator"]
 
@@ -130,7 +129,7 @@ class RationalBlock(Block):
         return b / a[0], a / a[0]
 
     def _shifted(self, x: Signals, u: Signals, p: Signals) -> Signals:
-        """What comes of the state: u filtered by 1/denominator, then all that is there but its last."""
+        """The next state (or derivative): u filtered by 1/denominator, then the states without the last."""
         a = self._normalised(p)[1]
         return {"x": vertcat(u["u"] - dot(a[1:], x["x"]), x["x"])[: self.degree]}
 
@@ -143,7 +142,7 @@ FILTER_TYPES = ("low_pass", "high_pass", "band_pass", "band_stop")
 
 @dataclass(frozen=True, kw_only=True)
 class SectionsByRoots(Block):
-    """A chain of sections by zeros and poles, with a factor; continuous or sampled."""
+    """A cascade of sections from zeros, poles and a gain; continuous or sampled."""
 
     zeros: ArrayLike = parameter((1.0,), dimensions=(1, 2), tunable=False, roots=True, doc="z1 … zm, or none")
     poles: ArrayLike = parameter((0.0, -1.0), dimensions=(1, 2), tunable=False, roots=True, doc="p1 … pn")
@@ -166,7 +165,7 @@ class SectionsByRoots(Block):
 
     @property
     def system(self) -> LinearSystem:
-        """The sections, without the factor."""
+        """The sections, without the gain."""
         zeros, poles = roots_of(self)
         return realised(ZeroPoleGain(zeros=zeros, poles=poles, gain=1.0))
 
@@ -178,7 +177,7 @@ def roots_of(block: SectionsByRoots) -> tuple[Any, Any]:
 
 
 def section_output(system: LinearSystem, x: SX, u: SX) -> SX:
-    """The output C x + D u; without feedthrough the input has no part in it."""
+    """The output C x + D u; without feedthrough the input does not appear."""
     found = dot(SX(np.asarray(system.C)), x)
     return found + system.D * u if system.D else found
 
@@ -189,7 +188,7 @@ def section_change(system: LinearSystem, x: SX, u: SX) -> SX:
 
 
 def check_band(block: Block, filter_type: str, edge: float, upper_edge: float) -> None:
-    """Raise where the two edges of a band are not in order."""
+    """Raise ``InputError`` unless the lower edge of a band is below the upper edge."""
     if filter_type.startswith("band") and upper_edge <= edge:
         raise InputError(
             f"edge is {edge} and upper_edge is {upper_edge}",

@@ -1,8 +1,8 @@
-"""Linear systems from zeros and poles, and the filters that are known by their zeros and poles.
+"""Linear systems from zeros and poles, and filters that are defined by their zeros and poles.
 
-A system is realised as a chain of sections with one or two poles each: its polynomials are never multiplied
-out, which would spoil the poles of high orders. Every section is scaled so that its states are about as large
-as the input.
+A system is realised as a cascade of sections with one or two poles each. The polynomials are not multiplied
+out, because the poles of high-order polynomials are ill-conditioned. Every section is scaled so that its
+states have about the magnitude of the input.
 
 A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal Processing, 3rd edition, 2010, section 6.3 (cascades),
 7.2 and appendix B (filters, bilinear transformation).
@@ -47,7 +47,7 @@ class LinearSystem:
 def complex_roots(given: ArrayLike, where: str, name: str) -> Roots:
     """Zeros or poles, as (n,) real numbers or (n, 2) rows (real, imaginary).
 
-    Raises ``InputError`` where a complex one stands without its conjugate.
+    Raises ``InputError`` where a complex root lacks its conjugate.
     """
     values = np.asarray(given, dtype=np.float64)
     if values.ndim == 2 and values.shape[1] != 2:
@@ -64,7 +64,7 @@ def complex_roots(given: ArrayLike, where: str, name: str) -> Roots:
             f"{name} are {roots.tolist()}",
             where=where,
             allowed="complex numbers in conjugate pairs",
-            fix="add the missing ones",
+            fix="add the missing conjugates",
         )
     return roots
 
@@ -76,12 +76,12 @@ def check_proper(zeros: Roots, poles: Roots, where: str) -> None:
             f"there are {len(zeros)} zeros and {len(poles)} poles",
             where=where,
             allowed="at least one pole, and no more zeros than poles",
-            fix="use a Gain where there is no pole; more zeros than poles cannot be simulated",
+            fix="use a Gain where there is no pole; a system with more zeros than poles is not causal",
         )
 
 
 def realised(system: ZeroPoleGain) -> LinearSystem:
-    """The chain of sections."""
+    """The cascade of sections."""
     total = LinearSystem(A=np.zeros((0, 0)), B=np.zeros(0), C=np.zeros(0), D=1.0)
     scale = system.gain
     for zeros, poles in _sections(system.zeros, system.poles):
@@ -95,11 +95,11 @@ def _order(root: complex) -> tuple[float, float]:
 
 
 def _sections(zeros: Roots, poles: Roots) -> list[tuple[list[complex], list[complex]]]:
-    """Poles in ones and conjugate pairs, each with its share of the zeros: at most as many."""
+    """Real poles and conjugate pairs, each with at most as many zeros as poles."""
     pole_groups = _groups(poles)
     zero_groups = _groups(zeros)
     pairs = [group for group in zero_groups if len(group) == 2]
-    # A pair of zeros needs a place with two poles; real poles are put together where pairs of them lack.
+    # A pair of zeros needs a section with two poles; real poles are paired where conjugate pairs are too few.
     while sum(len(group) == 2 for group in pole_groups) < len(pairs):
         first, second = [group for group in pole_groups if len(group) == 1][:2]
         pole_groups = [group for group in pole_groups if group is not first and group is not second]
@@ -130,7 +130,7 @@ def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[Linear
     if len(poles) == 1:
         a, b, c = [[first.real]], [size], [rest[0] / size]
     elif first.imag:
-        # x1 + i x2 turns by itself
+        # x1 + i x2 rotates in the complex plane
         sigma, omega = first.real, first.imag
         a, b = [[sigma, omega], [-omega, sigma]], [size, 0.0]
         c = [rest[0] / size, -(rest[1] + rest[0] * sigma) / omega / size]
@@ -141,14 +141,14 @@ def _section(zeros: Sequence[complex], poles: Sequence[complex]) -> tuple[Linear
 
 
 def _polynomial(roots: Sequence[complex]) -> Matrix:
-    """Its coefficients from the highest power, 1, to the lowest; at most two roots, conjugate or real."""
+    """Coefficients of the monic polynomial, highest power first; at most two roots, conjugate or real."""
     if len(roots) == 2:
         return np.array([1.0, -(roots[0] + roots[1]).real, product(roots).real])
     return np.array([1.0, *(-root.real for root in roots)])
 
 
 def _in_series(one: LinearSystem, two: LinearSystem) -> LinearSystem:
-    """Two behind one."""
+    """The series connection of two systems."""
     n, m = len(one.B), len(two.B)
     A = np.zeros((n + m, n + m))
     A[:n, :n], A[n:, n:], A[n:, :n] = one.A, two.A, np.outer(two.B, one.C)
@@ -208,7 +208,7 @@ def shifted(base: ZeroPoleGain, kind: str, edge: float, upper_edge: float) -> Ze
 
 
 def warped(fraction: float) -> float:
-    """The frequency that the bilinear transformation of :func:`sampled` takes to this share of Nyquist's."""
+    """The prewarped frequency, which :func:`sampled` maps to this fraction of the Nyquist frequency."""
     return tan(math.pi * fraction / 2.0)
 
 
@@ -230,19 +230,19 @@ def _complex(real: Matrix, imaginary: Matrix) -> Roots:
 
 
 def _quotients(over: complex | Roots, under: Roots) -> Roots:
-    """Quotients by element; one dividend, or as many as divisors."""
+    """Elementwise quotients; one dividend, or as many as divisors."""
     pairs = zip(np.broadcast_to(over, under.shape).tolist(), under.tolist())
     return np.array([quotient(complex(a), b) for a, b in pairs], dtype=np.complex128)
 
 
 def _split(roots: Roots, centre: float) -> Roots:
-    """The two roots around ``centre`` that one root around 0 becomes."""
+    """The two roots around ``centre`` to which the band transformation maps one root around 0."""
     apart = np.array([square_root(product([root, root]) - centre * centre) for root in roots], complex)
     return np.concatenate([roots + apart, roots - apart])
 
 
 def _paired(roots: ArrayLike) -> Roots:
-    """The same roots, where what is conjugate but for rounding is exactly so, and what is real is so."""
+    """The roots without rounding errors of symmetry: exact conjugate pairs and exactly real roots."""
     given = np.asarray(roots, dtype=np.complex128)
     tolerance = np.array([1e-9 * magnitude(root) for root in given])
     real = given[np.abs(given.imag) <= tolerance].real + 0j

@@ -1,9 +1,9 @@
-"""Curves through many points: the interval is searched for and its ends are read, whatever the count.
+"""Tables with many points: a binary search finds the interval, and its end points are read by index.
 
-The equations of a short table name every point, which is quicker than a search up to ``SHORT`` points; those
-of a long one cost log n, to compile and to run. Positions and values have to be inputs of the run then, so
-that they lie one after another, and a run is not differentiated by them. Of a long cubic spline the
-inputs are what follows from positions and values (:mod:`.splines`).
+The equations of a short table contain every point, which is faster than a search for up to ``SHORT`` points.
+Those of a long table have a cost of log n, for compiling and for running. Its positions and values are run
+inputs, stored contiguously, and a run is not differentiated with respect to them. The run inputs of a long
+cubic spline are computed from positions and values (:mod:`.splines`).
 """
 
 from __future__ import annotations
@@ -20,17 +20,19 @@ SHORT = 16
 KNOTS = Parameter(
     name="knots", kind=ParameterKind.ARRAY, default=(), doc="positions of the spline, axis after axis"
 )
-SPLINE = Parameter(name="spline", kind=ParameterKind.ARRAY, default=(), doc="its values and slopes in turn")
-"""What a block with a long spline reads, instead of the positions and values from which both follow."""
+SPLINE = Parameter(
+    name="spline", kind=ParameterKind.ARRAY, default=(), doc="its values and derivatives, alternating"
+)
+"""Run inputs of a block with a long spline, in place of the positions and values."""
 
 
 def is_long(shape: Shape, method: str = "linear") -> bool:
-    """Whether a table of so many points along each of its axes is read by index."""
+    """Whether a table with this number of points along each axis is read by index."""
     return max(shape) > SHORT or (method != "cubic" and math.prod(shape) > 4 * SHORT)
 
 
 def inputs_with(block: Block, long: bool, table: str, *positions: str) -> tuple[Parameter, ...]:
-    """The inputs of the run of a block: its tunable parameters, and the positions of a long ``table``."""
+    """The run inputs of a block: its tunable parameters, and the positions of a long ``table``."""
     tunable = tuple(rule for rule in block.parameters() if rule.tunable)
     if is_spline(block, long):
         return (*(rule for rule in tunable if rule.name != table), KNOTS, SPLINE)
@@ -38,17 +40,17 @@ def inputs_with(block: Block, long: bool, table: str, *positions: str) -> tuple[
 
 
 def is_spline(block: Block, long: bool) -> bool:
-    """Whether a block reads values and slopes of a spline by index."""
+    """Whether a block reads values and derivatives of a spline by index."""
     return long and getattr(block, "method", "") == "cubic"
 
 
 def interval_of(u: SX, positions: SX) -> SX:
-    """The index of the interval that u counts to, from 0: the first and the last go on beyond the ends."""
+    """The index of the interval of u, from 0; the first and last interval extend beyond the ends."""
     return fmin(fmax(last_at_or_below(positions, u), 0.0), positions.numel() - 2.0)
 
 
 def line(u: SX, positions: SX, interval: SX, entry: Callable[[SX], SX]) -> SX:
-    """On the straight line of an interval, as :func:`interpolation.linear_weights` works it out."""
+    """The relative position in an interval, computed as in :func:`interpolation.linear_weights`."""
     begin, end = read_entry(positions, interval), read_entry(positions, interval + 1.0)
     share = (u - begin) / (end - begin)
     return (1.0 - share) * entry(interval) + share * entry(interval + 1.0)

@@ -1,7 +1,7 @@
-"""Blocks that look at their input once a period and give a course in continuous time until they look again.
+"""Blocks that sample their input once a period and have a continuous-time output between samples.
 
-T is the period, t_k = offset + k T is the k-th instant. What is looked at is the signal as the ticks and
-events of that instant have left it: after the event of the look itself a second one looks again.
+T is the period, t_k = offset + k T is the k-th sample time. The sampled value includes the effects of all
+ticks and events at t_k: a second event samples the input again after the first one.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from armblocks.diagram import (
     State,
 )
 
-COUNT = State("count", (), "how often the input has been looked at")
-FRESH = State("fresh", (), "1 until the input has been looked at again, else 0")
-INSTANT = Guard("instant", (), "t - the next instant", 1)
-AGAIN = Guard("again", (), "the input has been looked at", -1)
+COUNT = State("count", (), "number of samples taken")
+FRESH = State("fresh", (), "1 until the input has been sampled again, else 0")
+INSTANT = Guard("instant", (), "t - the next sample time", 1)
+AGAIN = Guard("again", (), "the input has been sampled", -1)
 
 
 def sample_time(p: Signals, count: SX) -> SX:
-    """The instant t_k: one product and one sum, as for the ticks of a clock."""
+    """The sample time t_k: one product and one sum, as for the ticks of a clock."""
     return p["offset"] + count * p["period"]
 
 
 def sampled(t: SX, x: Signals, p: Signals, e: Signals) -> tuple[SX, SX, Signals]:
-    """Whether a period begins, whether the input has to be looked at, and the states that say so next.
+    """Whether a period begins, whether to sample the input, and the next values of the states.
 
-    The start needs no event; it is settled in turns at the same instant, each of which looks again.
+    The start needs no event: every mode iteration at t = 0 samples the input again.
     """
     due = logic_or(e["instant"] > 0.0, t >= sample_time(p, x["count"]))
     same = logic_and(x["count"] > 0.0, t <= sample_time(p, x["count"] - 1.0))

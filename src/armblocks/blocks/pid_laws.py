@@ -1,8 +1,8 @@
-"""The laws of PID controllers, in continuous time and sampled, for one and two degrees of freedom.
+"""PID control laws, in continuous time and sampled, with one and two degrees of freedom.
 
-A law sees three errors, one for each action: with one degree of freedom they are all the input. As in
-Simulink, the ideal form multiplies the integral and the derivative gain by P, so that the states are in units
-of the output either way.
+A law takes three errors, one for each action. With one degree of freedom all three are the input. As in
+Simulink, the ideal form multiplies the integral and the derivative gain by P, so that the states have the
+unit of the output in both forms.
 
 K. J. Astrom, T. Hagglund, Advanced PID Control, 2006, sections 3.4 (set-point weighting) and 3.5 (windup,
 back-calculation and tracking).
@@ -27,7 +27,7 @@ METHODS = ("forward_euler", "backward_euler", "trapezoidal")
 
 @dataclass(frozen=True, kw_only=True)
 class Errors:
-    """What each of the three actions acts upon."""
+    """The errors of the three actions."""
 
     proportional: SX
     integral: SX
@@ -40,20 +40,20 @@ def one_error(u: SX) -> Errors:
 
 
 def weighted_errors(r: SX, u: SX, p: Signals) -> Errors:
-    """Two degrees of freedom: the reference counts ``b`` and ``c`` times for two of the actions."""
+    """Two degrees of freedom: the set-point weights ``b`` (proportional) and ``c`` (derivative action)."""
     return Errors(proportional=p["b"] * r - u, integral=r - u, derivative=p["c"] * r - u)
 
 
 def pid_states(shape: Shape) -> tuple[State, ...]:
-    """The two states that every law has."""
+    """The two states of every law."""
     return (
         State("integral", shape, "the integral action"),
-        State("filter", shape, "the filtered derivative gain times error"),
+        State("filter", shape, "filter state: filtered product of derivative gain and error"),
     )
 
 
 def pid_start(p: Signals) -> Signals:
-    """Where the two begin."""
+    """Their initial values."""
     return {"integral": p["initial_integral"], "filter": p["initial_filter"]}
 
 
@@ -64,7 +64,7 @@ def _gains(form: str, p: Signals) -> tuple[SX, SX, SX]:
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuousPid:
-    """The law in continuous time. Limits are switched at exactly located events."""
+    """The law in continuous time. Reaching and leaving a limit are events."""
 
     form: str
     limited: bool
@@ -73,17 +73,17 @@ class ContinuousPid:
 
     @property
     def clamps(self) -> bool:
-        """Whether the integral stands still while it would drive the output further out."""
+        """Whether the integral stops while it would drive the output further beyond a limit."""
         return self.limited and self.anti_windup == "clamping"
 
     def modes(self, shape: Shape) -> tuple[State, ...]:
-        """Which limit holds, and where the integral drives the output."""
-        limit = (State("limit", shape, "1 at the upper limit, -1 at the lower, else 0", follows=True),)
-        drive = (State("drive", shape, "1 where the integral rises, else -1", follows=True),)
+        """The active limit, and the direction of the integral."""
+        limit = (State("limit", shape, "1 at the upper limit, -1 at the lower limit, else 0", follows=True),)
+        drive = (State("drive", shape, "1 while the integral increases, else -1", follows=True),)
         return (*(limit if self.limited else ()), *(drive if self.clamps else ()))
 
     def guards(self, shape: Shape) -> tuple[Guard, ...]:
-        """The limits, the turn of the integral, the reset."""
+        """Guards of the limits, the sign of the integral's rate, and the reset."""
         found = list[Guard]()
         if self.limited:
             found += [
@@ -97,7 +97,7 @@ class ContinuousPid:
         return tuple(found)
 
     def output(self, x: Signals, e: Errors, p: Signals) -> SX:
-        """What the plant gets."""
+        """The controller output."""
         free = self._free(x, e, p)
         if not self.limited:
             return free
@@ -129,7 +129,7 @@ class ContinuousPid:
         return found
 
     def mode_values(self, x: Signals, e: Errors, p: Signals, tracked: SX | None) -> Signals:
-        """The modes by the values of the moment."""
+        """The modes that follow from the present values."""
         found = dict[str, SX]()
         if self.limited:
             found["limit"] = zone(self._free(x, e, p), p["lower"], p["upper"])
@@ -164,8 +164,9 @@ class SampledPid:
     """The law at the ticks of a clock; T is the period.
 
     Sums are forward Euler T / (z - 1), backward Euler T z / (z - 1), or trapezoidal T (z + 1) / 2 (z - 1).
-    With the last two the integral's newest share is part of the output. What back-calculation then takes off
-    it depends on the output itself; as that is straight in pieces, it is solved here and there is no loop.
+    With the last two, the output contains the newest increment of the integral. The increment of
+    back-calculation then depends on the output itself. This equation is piecewise linear and is solved here,
+    so that there is no algebraic loop.
     """
 
     form: str
@@ -175,22 +176,26 @@ class SampledPid:
     filter_method: str
 
     def states(self, shape: Shape) -> tuple[State, ...]:
-        """Those of every law, and which side of zero the trigger was on."""
+        """The states of every law, and the previous sign of the trigger."""
         if self.external_reset == "none":
             return pid_states(shape)
-        side = State("trigger", (), "1 where the trigger was positive at the tick before, -1 else, 0 unknown")
+        side = State(
+            "trigger",
+            (),
+            "1 if the trigger was positive at the previous tick, else -1; 0 before the first tick",
+        )
         return (*pid_states(shape), side)
 
     def start(self, p: Signals) -> Signals:
-        """Start values of the states."""
+        """Initial values of the states."""
         return pid_start(p) if self.external_reset == "none" else {**pid_start(p), "trigger": SX(0.0)}
 
     def output(self, x: Signals, e: Errors, p: Signals, trigger: SX | None) -> SX:
-        """What the plant gets."""
+        """The controller output."""
         return self._limited(self._free(self._at_tick(x, p, trigger), e, p), p)
 
     def updates(self, x: Signals, e: Errors, p: Signals, trigger: SX | None, tracked: SX | None) -> Signals:
-        """What the states become."""
+        """The next states."""
         now = self._at_tick(x, p, trigger)
         _, I, D = _gains(self.form, p)  # noqa: E741
         rate, free = I * e.integral, self._free(now, e, p)
@@ -218,12 +223,12 @@ class SampledPid:
         return free + share * p["T"] * I * e.integral if share else free
 
     def _derivative(self, now: Signals, weighted: SX, p: Signals) -> SX:
-        """The filtered derivative d: d = N (D e - f), where f sums d."""
+        """The filtered derivative d = N (D e - f), where f is the sum of d."""
         rate, share = p["N"] * (weighted - now["filter"]), _share(self.filter_method)
         return rate / (1.0 + share * p["T"] * p["N"]) if share else rate
 
     def _at_tick(self, x: Signals, p: Signals, trigger: SX | None) -> Signals:
-        """The states, set anew where the trigger fires."""
+        """The states, reset where the trigger fires."""
         if trigger is None:
             return x
         rises = logic_and(x["trigger"] < 0.0, trigger > 0.0)
@@ -236,5 +241,5 @@ class SampledPid:
 
 
 def _share(method: str) -> float:
-    """How much of a tick's own increment a sum already has at that tick."""
+    """The part of the present increment that the sum includes at its tick."""
     return {"forward_euler": 0.0, "backward_euler": 1.0, "trapezoidal": 0.5}[method]

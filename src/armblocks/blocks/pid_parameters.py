@@ -1,4 +1,4 @@
-"""The parameters, inputs and checks that all PID controllers share."""
+"""The common parameters, inputs and checks of the PID controllers."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from armblocks.errors import InputError
 
 
 def gain_parameter(default: float, doc: str, unit: str = "", **rules: Any) -> Any:
-    """A number, or one for each element."""
+    """A scalar, or one value for each element."""
     return parameter(default, kind=ParameterKind.ARRAY, doc=doc, unit=unit, **rules)
 
 
 def bandwidth_parameter() -> Any:
-    """The corner of the derivative's filter."""
-    return gain_parameter(100.0, "bandwidth of the derivative's filter", "rad/s", above=0.0)
+    """The corner frequency of the derivative filter."""
+    return gain_parameter(100.0, "bandwidth of the derivative filter", "rad/s", above=0.0)
 
 
 def lower_limit_parameter() -> Any:
-    """The least output."""
-    return gain_parameter(-math.inf, "the least output", finite=False)
+    """The lower limit of the output."""
+    return gain_parameter(-math.inf, "lower limit of the output", finite=False)
 
 
 def upper_limit_parameter() -> Any:
-    """The greatest output."""
-    return gain_parameter(math.inf, "the greatest output", finite=False)
+    """The upper limit of the output."""
+    return gain_parameter(math.inf, "upper limit of the output", finite=False)
 
 
 def limit_output_parameter() -> Any:
-    """Whether the limits are there at all."""
+    """Whether the output is limited."""
     return parameter(False, doc="whether the output is held between lower and upper")
 
 
@@ -55,24 +55,24 @@ def form_parameter() -> Any:
 
 
 def anti_windup_parameter() -> Any:
-    """What happens to the integral at a limit."""
-    return parameter("none", choices=ANTI_WINDUP, doc="what keeps the integral in bounds")
+    """The anti-windup method."""
+    return parameter("none", choices=ANTI_WINDUP, doc="anti-windup method")
 
 
 def external_reset_parameter() -> Any:
-    """When the trigger sets the states anew."""
+    """When the trigger resets the states."""
     return parameter(
-        "none", choices=tuple(RESETS), doc="when the input reset sets both states to their start values"
+        "none", choices=tuple(RESETS), doc="when the input reset sets both states to their initial values"
     )
 
 
 def tracking_parameter() -> Any:
-    """Whether the output is pulled towards a port."""
-    return parameter(False, doc="whether the input tracking pulls the output towards it")
+    """Whether the controller has a tracking input."""
+    return parameter(False, doc="whether the output tracks the input tracking")
 
 
 def method_parameter(doc: str) -> Any:
-    """The rule of a sum."""
+    """The integration method of a sum."""
     return parameter("forward_euler", choices=METHODS, doc=doc)
 
 
@@ -80,7 +80,7 @@ TWO_INPUTS = (Port("r", "the reference"), Port("u", "the measured output of the 
 
 
 def pid_example(kind: str, **parameters: Any) -> WorkedExample:
-    """The step of a loop with two lags."""
+    """A closed loop with two lags and a step of the reference."""
     plant = made("SecondOrderLag", natural_frequency=2.0, damping=0.8).named("plant")
     step = made("Step")
     feeds = (
@@ -89,7 +89,7 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
         else {"u": made("Sum", signs="+-").by(u1=step, u2=plant.by(u="y"))}
     )
     return WorkedExample(
-        shows="The plant follows a step of the reference; below it what the controller gives.",
+        shows="The plant follows a step of the reference; below, the output of the controller.",
         parameters=parameters,
         inputs=feeds,
         shown=(step, "plant/y", "y"),
@@ -97,7 +97,7 @@ def pid_example(kind: str, **parameters: Any) -> WorkedExample:
 
 
 def check_limits(block: Block, limited: bool) -> None:
-    """Raise where the limits are not in order, or are given to a controller whose output is not limited."""
+    """Raise ``InputError`` unless lower <= upper, and for limits without ``limit_output``."""
     limits_in_order(block, "lower", "upper")
     ends = [np.ravel(np.asarray(block.parameter_value(name))) for name in ("lower", "upper")]
     if not limited and np.isfinite(np.concatenate(ends)).any():
@@ -105,12 +105,12 @@ def check_limits(block: Block, limited: bool) -> None:
             "there are limits, but limit_output is false",
             where=block.type_name(),
             allowed="limits together with limit_output=True",
-            fix="set limit_output, or leave lower and upper out",
+            fix="set limit_output, or omit lower and upper",
         )
 
 
 def pid_shape(block: Block, inputs: Shapes) -> Shape:
-    """The shape that inputs and gains broadcast to."""
+    """The broadcast shape of inputs and gains."""
     wide = {name: shape for name, shape in inputs.items() if name != "reset"}
     own = {
         rule.name: shape_of(block.parameter_value(rule.name)) for rule in block.parameters() if rule.tunable

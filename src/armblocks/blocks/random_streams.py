@@ -1,11 +1,11 @@
-"""Random numbers as equations: L'Ecuyer's MRG32k3a in exact double arithmetic, and the normal quantile.
+"""Traced random numbers: L'Ecuyer's MRG32k3a in exact double arithmetic, and the normal quantile.
 
 The generator combines two recurrences of order three (P. L'Ecuyer, Good parameters and implementations for
 combined multiple recursive random number generators, Operations Research 47(1), 1999). All its products stay
-below 2^53, so that doubles hold them exactly and every machine draws the same numbers to the last bit. Its
-period is 2^191. Streams are cut out of it as in L'Ecuyer, Simard, Chen, Kelton, An object-oriented
-random-number package, Operations Research 50(6), 2002: seed s begins at s 2^127, and the elements of a vector
-lie 2^76 draws apart, so that no two of them ever meet.
+below 2^53, so that doubles represent them exactly and every machine generates the same bits. The period is
+2^191. It is divided into streams as in L'Ecuyer, Simard, Chen, Kelton, An object-oriented random-number
+package, Operations Research 50(6), 2002: seed s begins at s 2^127, and the elements of a vector lie 2^76
+draws apart, so that streams do not overlap.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from armblocks.diagram import Signals, State
 from armblocks.equations import Shape
 
 SEED_BITS = 16
-"""Seeds are whole numbers below 2 to the power of this."""
+"""Seeds are integers below 2 to the power of this number."""
 
 _M1, _M2 = 4294967087.0, 4294944443.0
 _A12, _A13N, _A21, _A23N = 1403580.0, 810728.0, 527612.0, 1370589.0
@@ -34,7 +34,7 @@ def stream_states(shape: Shape) -> tuple[State, ...]:
 
 
 def stream_start(seed: SX, shape: Shape) -> dict[str, SX]:
-    """The states from which the streams of a seed begin, one stream for each element of ``shape``."""
+    """The initial states of the streams of a seed, one stream for each element of ``shape``."""
     count = shape[0] * (shape[1] if len(shape) > 1 else 1) if shape else 1
     terms: list[list[SX]] = []
     for matrix, modulus in ((_RECURRENCE_1, int(_M1)), (_RECURRENCE_2, int(_M2))):
@@ -54,7 +54,7 @@ def stream_start(seed: SX, shape: Shape) -> dict[str, SX]:
 
 
 def draw(x: Signals) -> tuple[SX, dict[str, SX]]:
-    """A number between 0 and 1 (both excluded) for each element, and the states behind it."""
+    """A number in the open interval (0, 1) for each element, and the next states."""
     s1 = _modulo(_A12 * x["s12"] - _A13N * x["s13"], _M1)
     s2 = _modulo(_A21 * x["s21"] - _A23N * x["s23"], _M2)
     difference = s1 - s2
@@ -64,7 +64,7 @@ def draw(x: Signals) -> tuple[SX, dict[str, SX]]:
 
 
 def normal_quantile(probability: SX) -> SX:
-    """The normal variate that is exceeded with probability 1 - p, 0 < p < 1, to about 1e-16 relative.
+    """The quantile of the standard normal distribution at p, 0 < p < 1; relative error about 1e-16.
 
     M. J. Wichura, Algorithm AS 241: The percentage points of the normal distribution, Applied Statistics
     37(3), 1988 (PPND16).
@@ -83,7 +83,7 @@ def _modulo(value: SX, modulus: float) -> SX:
 
 
 def _times(matrix: _Matrix, vector: Sequence[SX], modulus: int) -> list[SX]:
-    """A matrix of 32-bit numbers times a vector, modulo; each entry is cut in two so that sums stay exact."""
+    """A matrix of 32-bit numbers times a vector, modulo; entries are split in two, so that sums are exact."""
     found = list[SX]()
     for row in matrix:
         high = sum((float(entry >> 17) * value for entry, value in zip(row, vector)), SX(0.0))

@@ -1,10 +1,11 @@
-"""Cubic splines through given points: how the slopes at the points follow from the values there.
+"""Cubic splines through given points: computes the derivatives at the points from the values.
 
 Not-a-knot at both ends, as MATLAB's ``spline``; three points give the parabola, two the line. de Boor, A
 Practical Guide to Splines, 2001, chapter IV.
 
-A long spline is read by index from a table in which every value is followed by its slope, along each axis:
-of a table ``(n, m)`` it is ``(2 n, 2 m)``. It is made of positions and values with numbers, before a run.
+A long spline is read by index from a table in which values and derivatives alternate along each axis: for a
+table ``(n, m)`` its shape is ``(2 n, 2 m)``. It is computed numerically from positions and values before a
+run.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 def spline_slopes(points: Sequence[float], values: Array) -> Array:
-    """The slopes at n >= 2 points, of values ``(n, …)`` there; the same shape."""
+    """The derivatives at n >= 2 points, from values ``(n, …)``; same shape."""
     x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
     h = np.diff(x)
     chords = np.diff(y, axis=0) / h.reshape(-1, *[1] * (y.ndim - 1))
@@ -43,7 +44,7 @@ def spline_slopes(points: Sequence[float], values: Array) -> Array:
 
 @lru_cache(maxsize=16)
 def with_slopes(axes: tuple[tuple[float, ...], ...], table: object) -> Array:
-    """The table of a long spline: each value followed by its slope, along each of the axes given."""
+    """The table of a long spline: values and derivatives alternate along each of the given axes."""
     found = np.asarray(table, dtype=np.float64)
     for k, points in enumerate(axes):
         values = np.moveaxis(found, k, 0)
@@ -53,10 +54,10 @@ def with_slopes(axes: tuple[tuple[float, ...], ...], table: object) -> Array:
 
 
 def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> list[tuple[SX, SX]]:
-    """Index and weight of what counts at position u in the table of :func:`with_slopes`: Hermite's cubic.
+    """Indices and weights of the entries of :func:`with_slopes` at position u: the cubic Hermite interpolant.
 
-    ``cell``: 0 below the first point, 2 from the last on; beyond them the curve is held, or goes on
-    ``straight``.
+    ``cell``: 0 below the first point, 2 from the last on; beyond them the curve is held, or extrapolated
+    linearly (``straight``).
     """
     n = points.numel()
     first, last = points[0], points[n - 1]
@@ -83,7 +84,7 @@ def spline_corners(u: SX, points: SX, cell: SX | None, *, straight: bool) -> lis
 
 
 def _diagonals(h: Array) -> tuple[Array, Array, Array]:
-    """Lower, main and upper diagonal of the system for the slopes."""
+    """Lower, main and upper diagonal of the linear system for the derivatives."""
     n = len(h) + 1
     lower, diagonal, upper = np.zeros(n - 1), np.zeros(n), np.zeros(n - 1)
     before, after = h[:-1], h[1:]
@@ -97,7 +98,7 @@ def _diagonals(h: Array) -> tuple[Array, Array, Array]:
 
 
 def _right_side(h: Array, chords: Array) -> Array:
-    """The right side ``(n, …)`` of that system, by the slopes of the chords ``(n - 1, …)``."""
+    """The right side ``(n, …)`` of that system, from the slopes of the chords ``(n - 1, …)``."""
     n = len(h) + 1
     found = np.empty((n, *chords.shape[1:]))
     before, after = (part.reshape(-1, *[1] * (chords.ndim - 1)) for part in (h[:-1], h[1:]))

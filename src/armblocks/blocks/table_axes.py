@@ -1,8 +1,8 @@
-"""The axes of a lookup table: where a position lies on each, and the events at which it enters another cell.
+"""The axes of a lookup table: cells, and events at which a position enters another cell.
 
-Along each axis the *borders* are the positions at which the value or its slope jumps; *cell* k lies above k
-borders. Of a located axis the cell is a mode, so that a step meets one smooth piece of the table. Tables of
-few points stand in the equations; those of many are read by index (see :mod:`.long_tables`).
+Along each axis the *borders* are the positions at which the value or its derivative jumps; *cell* k lies
+above k borders. With event location, the cell is a mode, so that a step sees one smooth piece of the table.
+The points of short tables are part of the equations; long tables are read by index (see :mod:`.long_tables`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 def rising(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
-    """Break points as floats; raises ``InputError`` unless they rise and are as many as the table is long."""
+    """Break points as floats; raises ``InputError`` unless they are ascending and fit the table."""
     values = [float(value) for value in np.ravel(cast("Any", points))]
     if len(values) < 2 or any(right <= left for left, right in pairwise(values)):
         raise InputError(
@@ -43,7 +43,7 @@ def rising(where: str, name: str, points: ArrayLike, count: int) -> list[float]:
         raise InputError(
             f"{name} has {len(values)} break points for {count} entries of the table",
             where=where,
-            allowed="as many as the table has entries along that axis",
+            allowed="one for each entry along that axis",
             fix="correct the table or the break points",
         )
     return values
@@ -55,7 +55,7 @@ def numbers_of(block: Block, name: str) -> list[float]:
 
 
 def by_element(inputs: Sequence[SX], function: Callable[..., SX]) -> SX:
-    """A function of scalars applied to all elements; scalars spread."""
+    """A function of scalars applied to all elements; scalars are broadcast."""
     largest = max(inputs, key=lambda value: value.numel())
     size = largest.numel()
     columns = [[value[k if value.numel() > 1 else 0] for k in range(size)] for value in inputs]
@@ -67,25 +67,25 @@ class Axis(Protocol):
 
     @property
     def has_borders(self) -> bool:
-        """Whether anything happens along it."""
+        """Whether the axis has events."""
         ...
 
     def cell(self, u: SX) -> SX:
-        """How many borders are at or below u."""
+        """The number of borders at or below u."""
         ...
 
     def to_next(self, u: SX, cell: SX) -> SX:
-        """How far u is beyond the border above its cell; -inf where there is none."""
+        """The distance of u beyond the upper border of its cell; -inf if there is none."""
         ...
 
     def to_last(self, u: SX, cell: SX) -> SX:
-        """How far u is beyond the border below its cell; inf where there is none."""
+        """The distance of u beyond the lower border of its cell; inf if there is none."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class ShortAxis:
-    """An axis whose points stand in the equations, as numbers or as signals."""
+    """An axis whose points are part of the equations, as numbers or as signals."""
 
     points: Sequence[float | SX]
     method: str
@@ -93,7 +93,7 @@ class ShortAxis:
 
     @property
     def borders(self) -> list[float | SX]:
-        """Where they are, rising."""
+        """The borders, ascending."""
         return list(borders(self.points, self.method, self.extrapolation))
 
     @property
@@ -132,7 +132,7 @@ class LongAxis:
 
     @property
     def _count(self) -> int:
-        """How many borders there are."""
+        """The number of borders."""
         n = self.points.numel()
         return n if self._held else n - 2 if self.method == "linear" else n - 1
 
@@ -150,7 +150,7 @@ class LongAxis:
         return if_else(cell > 0.0, u - self._border(cell - 1.0), math.inf)
 
     def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
-        """Index and weight of the points that count in a cell."""
+        """Indices and weights of the points of a cell."""
         if self.method != "linear":
             return [(cell, SX(1.0))]
         n = self.points.numel()
@@ -162,7 +162,7 @@ class LongAxis:
         return [(interval, 1.0 - share), (interval + 1.0, share)]
 
     def _border(self, number: SX) -> SX:
-        """The position of a border, counted from 0 and held between the first and the last."""
+        """The position of a border; its index starts at 0 and is limited to valid values."""
         k = fmin(fmax(number, 0.0), self._count - 1.0)
         if self.method == "nearest":
             return (read_entry(self.points, k) + read_entry(self.points, k + 1.0)) / 2.0
@@ -171,7 +171,7 @@ class LongAxis:
 
 @dataclass(frozen=True, eq=False)
 class SplineAxis:
-    """An axis of a long cubic spline, whose table has values and slopes in turn."""
+    """An axis of a long cubic spline, whose table has alternating values and derivatives."""
 
     points: SX
     extrapolation: str
@@ -190,7 +190,7 @@ class SplineAxis:
         return _beyond([-math.inf, *self._ends], u, cell)
 
     def corners(self, u: SX, cell: SX) -> list[tuple[SX, SX]]:
-        """Index and weight of the values and slopes that count in a cell."""
+        """Indices and weights of the values and derivatives of a cell."""
         return spline_corners(u, self.points, cell, straight=not self.has_borders)
 
     @property
@@ -206,7 +206,7 @@ def _beyond(ends: Sequence[float | SX], u: SX, cell: SX) -> SX:
 class Axes:
     """The axes of a table by the input port that gives the position along each.
 
-    ``located``: whether the cells are modes; then the states of the block have ``cell`` or ``cell1``, ….
+    ``located``: whether the cells are modes; then the block has the states ``cell`` or ``cell1``, ….
     """
 
     axes: Mapping[str, Axis]
@@ -214,11 +214,11 @@ class Axes:
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         """The cells."""
-        doc = "how many borders are at or below"
+        doc = "number of borders at or below"
         return tuple(State(f"cell{k}", inputs[port], f"{doc} {port}") for port, k, _ in self._moving())
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        """Both ends of each cell."""
+        """The guards at both ends of each cell."""
         return tuple(
             guard
             for port, k, _ in self._moving()
@@ -229,7 +229,7 @@ class Axes:
         )
 
     def guard_values(self, x: Signals, u: Signals) -> Signals:
-        """The distances to both ends."""
+        """The distances of the inputs to both ends."""
         found = dict[str, SX]()
         for port, k, axis in self._moving():
             place = [u[port], x[f"cell{k}"]]
@@ -238,7 +238,7 @@ class Axes:
         return found
 
     def mode_values(self, x: Signals, u: Signals) -> Signals:
-        """The cells by the values of the moment."""
+        """The cells that follow from the present values."""
         guards = self.guard_values(x, u)
         return {
             f"cell{k}": cell_of(by_element([u[port]], axis.cell), x[f"cell{k}"], guards, f"up{k}", f"down{k}")
@@ -246,17 +246,17 @@ class Axes:
         }
 
     def contradictions(self, x: Signals, u: Signals) -> Signals:
-        """Whether a position is beyond its cell."""
+        """Whether a position is outside its cell."""
         guards = self.guard_values(x, u)
         return {f"cell{k}": beyond(guards, f"up{k}", f"down{k}") for _, k, _ in self._moving()}
 
     def cell(self, port: str, x: Signals, u: Signals) -> SX:
-        """The cell along one axis: the mode, or by the values of the moment."""
+        """The cell along one axis: the mode, or computed from the present values."""
         modes = {moving: x[f"cell{k}"] for moving, k, _ in self._moving()}
         return modes[port] if port in modes else by_element([u[port]], self.axes[port].cell)
 
     def resets(self, x: Signals, u: Signals, e: Signals) -> Signals:
-        """The cells after events: the next one, or as far as u has jumped."""
+        """The cells after events: the next cell, or the cell to which u has jumped."""
         found = dict[str, SX]()
         for port, k, axis in self._moving():
             here, cell = by_element([u[port]], axis.cell), x[f"cell{k}"]
@@ -265,7 +265,7 @@ class Axes:
         return found
 
     def value(self, table: SX, shape: Shape, x: Signals, u: Signals) -> SX:
-        """What a table of this shape gives, by element."""
+        """The output of a table of this shape, element by element."""
         cells = {port: x[f"cell{k}"] for port, k, _ in self._moving()}
         for port, axis in self.axes.items():
             if not isinstance(axis, ShortAxis) and port not in cells:
@@ -286,7 +286,7 @@ class Axes:
         return by_element([*(u[port] for port in self.axes), *cells.values()], at)
 
     def _moving(self) -> list[tuple[str, str, Axis]]:
-        """Port, mark of its names and axis, of those whose cells are modes."""
+        """Port, name suffix and axis, for axes whose cells are modes."""
         many = len(self.axes) > 1
         numbered = (
             (port, str(k) if many else "", axis) for k, (port, axis) in enumerate(self.axes.items(), 1)
@@ -295,14 +295,14 @@ class Axes:
 
 
 def axis(points: SX | Sequence[float | SX], method: str, extrapolation: str) -> Axis:
-    """An axis: long where its points are one column of symbols, an input of the run."""
+    """An axis; a long one if its points are a column of symbols (a run input)."""
     if isinstance(points, SX):
         return LongAxis(points, method, extrapolation)
     return ShortAxis(points, method, extrapolation)
 
 
 def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) -> SX:
-    """The weighted sum of those entries of a flat table that lie at the corners of a cell, read by index."""
+    """The weighted sum of the entries of a flat table at the corners of a cell, read by index."""
     strides = [math.prod(shape[k + 1 :]) for k in range(len(shape))]
     found = SX(0.0)
     for corner in itertools.product(*corners):
@@ -314,7 +314,7 @@ def read(entries: SX, shape: Shape, corners: Sequence[Sequence[tuple[SX, SX]]]) 
 
 @dataclass(frozen=True, kw_only=True)
 class BlockWithAxes(Block):
-    """A block that looks its inputs up along axes: their borders are its events, their cells its modes."""
+    """A block that looks up its inputs along axes. Borders are its events, cells are its modes."""
 
     memoryless: ClassVar[bool] = True
 
@@ -344,12 +344,12 @@ class BlockWithAxes(Block):
 
     @property
     def knots(self) -> Array:
-        """Of a long cubic spline the positions, axis after axis."""
+        """The positions of a long cubic spline, axis after axis."""
         return np.concatenate([np.asarray(points) for points in self._along().values()])
 
     @property
     def spline(self) -> Array:
-        """Of a long cubic spline the values and slopes, see :func:`.splines.with_slopes`."""
+        """The values and derivatives of a long cubic spline, see :func:`.splines.with_slopes`."""
         axes = tuple(tuple(points) for points in self._along().values())
         return with_slopes(axes, self.parameter_value("table"))
 
@@ -363,7 +363,7 @@ class BlockWithAxes(Block):
         raise NotImplementedError
 
     def _read_along(self, p: Signals) -> Mapping[str, SX]:
-        """The same as inputs of the run."""
+        """The positions as run inputs."""
         raise NotImplementedError
 
     def _is_long(self) -> bool:
@@ -375,7 +375,7 @@ class BlockWithAxes(Block):
         return str(self.parameter_value("method"))
 
     def _axes(self, p: Signals | None = None) -> Axes:
-        """The axis of each input; with the parameters of the run where they hold the positions."""
+        """The axis of each input; with run inputs where these hold the positions."""
         extrapolation = str(self.parameter_value("extrapolation"))
         found = dict[str, Axis]()
         if p and is_spline(self, self._is_long()):
@@ -389,6 +389,6 @@ class BlockWithAxes(Block):
         return Axes(found, bool(self.parameter_value("zero_crossing")))
 
     def _value(self, x: Signals, u: Signals, p: Signals) -> SX:
-        """What the table gives, by element."""
+        """The output of the table, element by element."""
         table = "spline" if is_spline(self, self._is_long()) else "table"
         return self._axes(p).value(p[table], shape_of(self.parameter_value(table)), x, u)

@@ -65,24 +65,24 @@ class Integrator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Derivative(Block):
-    """The exact rate of change: y = du/dt, worked out from the equations of what feeds it.
+    """The exact time derivative of the input: y = du/dt, from the equations of the blocks that compute u.
 
-    Nothing is filtered or differenced. Where the input jumps (Step), the jump is ignored and the rate on
-    its right side is given.
+    There is no filter and no finite difference. Where the input jumps (Step), the output is the derivative
+    just after the jump.
     """
 
     title: ClassVar[str] = "Derivative"
     sign: ClassVar[FaceSign] = Fraction("du", "dt")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The slope of a sine: a cosine, exactly, from the first instant on.",
+        shows="The derivative of a sine is exactly a cosine, from t = 0 on.",
     )
     time_derivatives: ClassVar[Mapping[str, str]] = {"y": "u"}
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is differentiated"),)
+        return (Port("u", "signal to differentiate"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "its rate of change"),)
+        return (Port("y", "its time derivative"),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": rate_unit(inputs["u"])}

@@ -26,25 +26,24 @@ from armblocks.errors import InputError
 
 Matrix = NDArray[np.float64]
 ROUNDING = 1e-12
-"""Beside the largest singular value: what is smaller counts as 0."""
+"""Relative to the largest singular value: smaller singular values count as 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DescriptorStateSpace(Block):
     """A linear system with algebraic equations: E x' = A x + B u, y = C x + D u, where E may be singular.
 
-    The equations must be of index 1: what E leaves undifferentiated has to follow from the rest at each
-    moment, without differentiating. The states z are as many as E has rank: coordinates in the row space of E
-    (along its right singular vectors), or x itself where E is regular. ``initial`` is x(0), of which the part
-    that E differentiates is kept; the rest follows from u. The matrices are structure (not tunable), so that
-    what feeds through is known exactly.
+    The equations must be of index 1: the algebraic equations determine the unknowns that E does not
+    differentiate. The block has rank(E) states z: coordinates in the row space of E (along its right singular
+    vectors), or x itself where E is regular. ``initial`` is x(0); only its part in the row space of E is
+    used, and the rest follows from u. The matrices are not tunable, so that the feedthrough is known exactly.
 
     P. Kunkel, V. Mehrmann, Differential-Algebraic Equations, 2006, section 2.1.
     """
 
     title: ClassVar[str] = "Descriptor State-Space"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A capacitor of 1 F behind 1 ohm, the current as an unknown of its own: 0 = u - v - i.",
+        shows="A capacitor of 1 F behind 1 ohm; the current is an algebraic unknown: 0 = u - v - i.",
         parameters={
             "E": ((1.0, 0.0), (0.0, 0.0)),
             "A": ((0.0, 1.0), (-1.0, -1.0)),
@@ -55,7 +54,7 @@ class DescriptorStateSpace(Block):
         inputs={"u": made("SineWave")},
     )
 
-    E: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="what multiplies x' (n, n)", tunable=False)
+    E: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the matrix of x' (n, n)", tunable=False)
     A: ArrayLike = parameter(((-1.0,),), dimensions=(2,), doc="the system matrix (n, n)", tunable=False)
     B: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the input matrix (n, m)", tunable=False)
     C: ArrayLike = parameter(((1.0,),), dimensions=(2,), doc="the output matrix (k, n)", tunable=False)
@@ -71,7 +70,7 @@ class DescriptorStateSpace(Block):
                 f"E is {E}, A is {A}, B is {B}, C is {C}, D is {D}",
                 where="DescriptorStateSpace",
                 allowed="E and A (n, n), B (n, m), C (k, n), D (k, m)",
-                fix="make the five matrices fit each other",
+                fix="correct the shapes of the five matrices",
             )
         if shape_of(self.initial) not in ((), A[:1]):
             raise InputError(
@@ -90,7 +89,7 @@ class DescriptorStateSpace(Block):
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         rank = len(self._explicit.A)
-        return (State("z", (rank,), "the differentiated part of x"),) if rank else ()
+        return (State("z", (rank,), "the part of x that E differentiates"),) if rank else ()
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         system = self._explicit
@@ -116,7 +115,7 @@ class DescriptorStateSpace(Block):
 
 @dataclass(frozen=True)
 class _Explicit:
-    """z' = A z + B u, y = C z + D u, and the rows that take z out of x."""
+    """z' = A z + B u, y = C z + D u, and the rows that compute z from x."""
 
     A: Matrix
     B: Matrix
@@ -127,9 +126,9 @@ class _Explicit:
 
 @lru_cache(maxsize=64)
 def _explicit(*given: Any) -> _Explicit:
-    """The system without its algebraic equations.
+    """Eliminate the algebraic equations.
 
-    Raises ``InputError`` where they do not decide the rest.
+    Raises ``InputError`` where they do not determine their unknowns.
     """
     E, A, B, C, D = (np.asarray(value) for value in given)
     U, sizes, Vt = np.linalg.svd(E)
@@ -137,16 +136,15 @@ def _explicit(*given: Any) -> _Explicit:
     if rank == len(E):
         return _Explicit(np.linalg.solve(E, A), np.linalg.solve(E, B), C, D, np.eye(rank))
     U1, U2, V1, V2 = U[:, :rank], U[:, rank:], Vt[:rank].T, Vt[rank:].T
-    # 0 = U2' (A (V1 z + V2 w) + B u) has to give w.
+    # 0 = U2' (A (V1 z + V2 w) + B u) must determine w.
     algebraic = U2.T @ A @ V2
     scale = float(np.linalg.norm(A)) or 1.0
     if float(np.linalg.svd(algebraic, compute_uv=False)[-1]) <= ROUNDING * scale:
         raise InputError(
-            f"E has rank {rank} of {len(E)}, and its {len(E) - rank} algebraic equations do not decide the "
-            "unknowns that E leaves undifferentiated",
+            f"E has rank {rank} of {len(E)}, and its {len(E) - rank} algebraic equations do not determine "
+            "the unknowns that E does not differentiate",
             where="DescriptorStateSpace",
-            allowed="equations of index 1, where (rows of A that E leaves) times (columns that E leaves) is "
-            "regular",
+            allowed="equations of index 1: A restricted to the left and right null spaces of E is regular",
             fix="differentiate the algebraic equations by hand, or leave out one that repeats another",
         )
     of_z = -np.linalg.solve(algebraic, U2.T @ A @ V1)
@@ -163,13 +161,13 @@ def _explicit(*given: Any) -> _Explicit:
 
 
 def _cleaned(matrix: Matrix) -> Matrix:
-    """Without what only rounding has left, which would look like a dependence."""
+    """The matrix with entries of rounding size set to 0, so that they do not count as feedthrough."""
     largest = float(np.max(np.abs(matrix), initial=0.0))
     return np.where(np.abs(matrix) <= ROUNDING * largest, 0.0, matrix)
 
 
 def _sparse(matrix: Matrix) -> SX:
-    """Zeros as no dependence."""
+    """Structural zeros where the entries are 0."""
     rows, columns = matrix.shape
     found = SX(rows, columns)
     for i, j in zip(*np.nonzero(matrix)):

@@ -1,4 +1,4 @@
-"""The hold of the first order."""
+"""The first-order hold."""
 
 from __future__ import annotations
 
@@ -27,38 +27,40 @@ from armblocks.diagram.signs import FaceSign, graph
 
 @dataclass(frozen=True, kw_only=True)
 class FirstOrderHold(Block):
-    """Straight lines through samples: y(t) = u(t_k) + (u(t_k) - u(t_(k-1))) (t - t_k) / T until t_(k+1).
+    """A first-order hold: y(t) = u(t_k) + (u(t_k) - u(t_(k-1))) (t - t_k) / T until t_(k+1).
 
     ``extrapolation`` continues the straight line through the last two samples, so that it is exact for a
-    straight line; at each sample time y may jump to the new sample. ``interpolation`` goes from sample to
-    sample without a jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T.
-    Simulink's First Order Hold extrapolates. The sample before the first one is ``initial``, which is also y
-    before the offset.
+    straight line; at each sample time y may jump to the new sample. ``interpolation`` connects the samples
+    without a jump, one period late: y(t) = u(t_(k-1)) + (u(t_k) - u(t_(k-1))) (t - t_k) / T. Simulink's First
+    Order Hold extrapolates. The sample before the first one is ``initial``, which is also y before the
+    offset.
 
-    A sampled block that ticks at t_k itself sees y as it was just before.
+    A sampled block that ticks at t_k reads the left limit of y.
     """
 
     title: ClassVar[str] = "First Order Hold"
     sign: ClassVar[FaceSign] = graph((0, 0.1), (0.33, 0.5), (0.33, 0.35), (0.67, 0.95), (0.67, 0.8), (1, 1))
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine, sampled every second, as straight lines from sample to sample, one second late.",
+        shows="A sine, sampled every second; straight lines connect the samples, one second late.",
         parameters={"method": "interpolation", "period": 1.0},
         inputs={"u": made("SineWave")},
     )
 
     method: str = parameter(
-        "extrapolation", choices=("extrapolation", "interpolation"), doc="which line is drawn"
+        "extrapolation", choices=("extrapolation", "interpolation"), doc="extrapolate or interpolate"
     )
-    period: float = parameter(0.1, above=0.0, doc="T, from sample to sample", unit="s")
-    offset: float = parameter(0.0, minimum=0.0, doc="when the first sample is taken", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the sample before the first one")
+    period: float = parameter(0.1, above=0.0, doc="sampling period T", unit="s")
+    offset: float = parameter(0.0, minimum=0.0, doc="time of the first sample", unit="s")
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="value of the sample before the first one"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is sampled"),)
+        return (Port("u", "sampled signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the straight lines"),)
+        return (Port("y", "the piecewise linear signal"),)
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}

@@ -1,4 +1,4 @@
-"""The linear systems of first and second order that control engineers think in; all gains are tunable."""
+"""First-order and second-order lags and the lead-lag compensator; all gains are tunable."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _lag(time: object) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class FirstOrderLag(Block):
-    """A lag of first order (PT1): y = gain / (T s + 1) u, that is T y' = gain u - y."""
+    """A first-order lag (PT1): y = gain / (T s + 1) u, that is T y' = gain u - y."""
 
     title: ClassVar[str] = "First-Order Lag"
     spreads: ClassVar[tuple[str, ...]] = ("gain", "time_constant", "initial")
@@ -38,7 +38,7 @@ class FirstOrderLag(Block):
         inputs={"u": made("Step")},
     )
 
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
     time_constant: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, above=0.0, doc="T", unit="s")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
 
@@ -66,20 +66,20 @@ class FirstOrderLag(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrderLag(Block):
-    """A lag of second order (PT2): y = gain w^2 / (s^2 + 2 damping w s + w^2) u, at rest at the start."""
+    """A second-order lag (PT2): y = gain w^2 / (s^2 + 2 damping w s + w^2) u, initially at rest."""
 
     title: ClassVar[str] = "Second-Order Lag"
     sign: ClassVar[FaceSign] = Fraction("ω²", "s² + 2ζωs + ω²")
     spreads: ClassVar[tuple[str, ...]] = ("gain", "natural_frequency", "damping")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step response with a damping of 0.3: it overshoots and swings in.",
+        shows="The step response with a damping ratio of 0.3: it overshoots and settles.",
         parameters={"natural_frequency": 2.0, "damping": 0.3},
         inputs={"u": made("Step")},
     )
 
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
     natural_frequency: ArrayLike = parameter(
-        1.0, kind=ParameterKind.ARRAY, above=0.0, doc="w, without damping", unit="rad/s"
+        1.0, kind=ParameterKind.ARRAY, above=0.0, doc="undamped natural frequency w", unit="rad/s"
     )
     damping: ArrayLike = parameter(
         0.7, kind=ParameterKind.ARRAY, minimum=0.0, doc="damping ratio; 1 is critical"
@@ -89,11 +89,11 @@ class SecondOrderLag(Block):
         return (Port("u", "the input"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the lagging output"), Port("rate", "its rate of change"))
+        return (Port("y", "the lagging output"), Port("rate", "its time derivative"))
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        return (State("y", shape, "the output"), State("rate", shape, "its rate of change"))
+        return (State("y", shape, "the output"), State("rate", shape, "its time derivative"))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["y"], "rate": x["rate"]}
@@ -109,20 +109,20 @@ class SecondOrderLag(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LeadLag(Block):
-    """A lead or lag compensator: y = gain (T1 s + 1) / (T2 s + 1) u, at rest at the start.
+    """A lead or lag compensator: y = gain (T1 s + 1) / (T2 s + 1) u, initially at rest.
 
-    It leads (its phase is positive) where T1 is the greater of the two times, else it lags.
+    It leads (positive phase) where T1 > T2, else it lags.
     """
 
     title: ClassVar[str] = "Lead-Lag"
     spreads: ClassVar[tuple[str, ...]] = ("gain", "lead_time", "lag_time")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A lead answers a step with more than its final value, and comes back to it.",
+        shows="The step response of a lead starts above its final value and decays to it.",
         parameters={"lead_time": 2.0, "lag_time": 1.0},
         inputs={"u": made("Step")},
     )
 
-    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the final value of y / u")
+    gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="steady-state gain y / u")
     lead_time: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="T1", unit="s")
     lag_time: ArrayLike = parameter(0.1, kind=ParameterKind.ARRAY, above=0.0, doc="T2", unit="s")
 

@@ -1,4 +1,4 @@
-"""Integrators whose state jumps or stops at exactly located events."""
+"""Integrators with resets and limits, whose events are located exactly."""
 
 from __future__ import annotations
 
@@ -36,36 +36,38 @@ from armblocks.diagram import (
 from armblocks.diagram.signs import FaceSign, Fraction
 from armblocks.equations import Shape
 
-_SATURATED = Port("saturated", "1 at the upper limit, -1 at the lower, else 0")
+_SATURATED = Port("saturated", "1 at the upper limit, -1 at the lower limit, else 0")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableIntegrator(Block):
     """The integral over time with resets: y' = u, and y = initial at t = 0 and whenever a trigger fires.
 
-    It is Simulink's Integrator with its ports. With ``level`` and ``level hold`` y is the initial value, as
-    it is at each moment, while the trigger is not 0. The initial value may come from a port: at the start
-    too, or ``external at resets`` only, so that it may depend on y itself. The ``state_port`` gives the
-    integral without what the other inputs do to it at this instant: a loop through it is not algebraic. With
-    ``limit_output`` y stays between ``lower`` and ``upper``.
+    It corresponds to Simulink's Integrator with its ports. With ``level`` and ``level hold`` y equals the
+    present initial value while the trigger is not 0. The initial value may come from a port: always
+    (``external``), or only at resets (``external at resets``), so that it may depend on y itself. The
+    ``state_port`` gives the state before a reset: a loop through it is not algebraic. With ``limit_output`` y
+    stays between ``lower`` and ``upper``.
     """
 
     title: ClassVar[str] = "Integrator with Reset"
     sign: ClassVar[FaceSign] = Fraction("1", "s")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The integral of 1, set back to 0 by every rising edge.",
+        shows="The integral of 1, reset to 0 by every rising edge.",
         inputs={"u": made("Constant"), "reset": made("PulseGenerator", period=3.0, delay=1.0)},
     )
 
     external_reset: str = external_reset_parameter("rising")
     initial_condition_source: str = initial_source_parameter()
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0 and at a reset, where no port says it"
+        0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0 and at a reset, if no port gives it"
     )
     state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
     limit_output: bool = parameter(False, doc="whether the output is held between lower and upper")
-    lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
-    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+    lower: ArrayLike = parameter(
+        -1.0, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the output"
+    )
+    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the output")
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
@@ -97,8 +99,8 @@ class ResettableIntegrator(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        begun = (State("begun", (), "0 until the port has given the start value, then 1"),)
-        kept = (State("kept", shape, "the initial value just before this instant"),)
+        begun = (State("begun", (), "0 until the initial value has been read from the port, then 1"),)
+        kept = (State("kept", shape, "left limit of the initial value"),)
         return (
             *(begun if self.initial_condition_source == "external" else ()),
             *(kept if self.external_reset == "level hold" else ()),
@@ -114,7 +116,7 @@ class ResettableIntegrator(Block):
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         reset = Guard("reset", (), "the trigger", EDGES.get(self.external_reset, 0))
-        begins = Guard("begins", (), "the port is asked where to begin", 1)
+        begins = Guard("begins", (), "the initial value is read from the port", 1)
         shape = self.output_shapes(inputs)["y"]
         return (
             *(() if self.external_reset == "none" else (reset,)),
@@ -155,14 +157,14 @@ class ResettableIntegrator(Block):
         after = _limited(x, p, e) if self.limit_output else {"x": x["x"]}
         anew, start = SX(0.0), self._start(u, p)
         if self._by_level:
-            # The state takes the value that was held when the trigger lets go.
+            # When the trigger returns to 0, the state starts from the value that was held.
             anew = e["reset"] < 0.0
             start = x["kept"] if self.external_reset == "level hold" else start
             after["held"] = if_else(e["reset"] == 0.0, x["held"], e["reset"] > 0.0)
         elif self.external_reset != "none":
             anew = e["reset"] != 0.0
         if self.initial_condition_source == "external":
-            # At t = 0 what the port says may still be settling.
+            # At t = 0 the signal at the port may still change during the mode iteration.
             begins = logic_or(x["begun"] == 0.0, t <= 0.0)
             start = if_else(begins, self._start(u, p), start)
             anew = logic_or(anew, begins)
@@ -180,7 +182,7 @@ class ResettableIntegrator(Block):
         return if_else(side_of(self.external_reset, u["reset"]), 1.0, 0.0)
 
     def _start(self, u: Signals, p: Signals) -> SX:
-        """What the state becomes at a reset."""
+        """The state after a reset."""
         return self._within(u.get("initial", p["initial"]), p)
 
     def _within(self, value: SX, p: Signals) -> SX:
@@ -189,23 +191,22 @@ class ResettableIntegrator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class IntegratorLimited(Block):
-    """The integral over time, held between two limits: y' = u, but 0 at a limit while u drives beyond it."""
+    """The integral over time between two limits: y' = u, but y' = 0 at a limit while u points outwards."""
 
     title: ClassVar[str] = "Integrator Limited"
     sign: ClassVar[FaceSign] = Fraction("1", "s", limited=True)
     spreads: ClassVar[tuple[str, ...]] = ("initial", "lower", "upper")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "The integral of a sine would reach 2; it stays at the limit 1 and leaves it as soon as "
-            "the sine turns."
-        ),
+        shows=("The integral of a sine is limited to 1. It leaves the limit when the sine changes its sign."),
     )
 
     initial: ArrayLike = parameter(
         0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0, within the limits"
     )
-    lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
-    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+    lower: ArrayLike = parameter(
+        -1.0, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the output"
+    )
+    upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the output")
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
@@ -251,7 +252,7 @@ class IntegratorLimited(Block):
 
 
 def _limit_mode(shape: Shape) -> State:
-    return State("mode", shape, "1 at the upper limit, -1 at the lower, else 0")
+    return State("mode", shape, "1 at the upper limit, -1 at the lower limit, else 0")
 
 
 def _limit_guards(shape: Shape) -> tuple[Guard, ...]:
@@ -282,7 +283,7 @@ def _limit_side(x: SX, mode: SX, u: Signals, p: Signals) -> SX:
 
 
 def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
-    """State and mode after events."""
+    """State and mode after the events."""
     stands = logic_and(x["x"] >= p["upper"], e["rises"] > 0.0)
     stands_low = logic_and(x["x"] <= p["lower"], e["falls"] < 0.0)
     upper, lower = logic_or(e["upper"] > 0.0, stands), logic_or(e["lower"] < 0.0, stands_low)
@@ -292,6 +293,7 @@ def _limited(x: Signals, p: Signals, e: Signals) -> dict[str, SX]:
     inner = if_else(freed, 0.0, x["mode"])
     return {
         "mode": if_else(upper, 1.0, if_else(lower, -1.0, inner)),
-        # Also where the mode follows from the values alone, a state a little beyond a limit is put onto it.
+        # A state slightly beyond a limit is set to the limit, also where the mode follows from the values
+        # alone.
         "x": fmin(fmax(x["x"], p["lower"]), p["upper"]),
     }

@@ -46,7 +46,7 @@ from armblocks.diagram.signs import FaceSign, Lines, Words
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuousPidBlock(Block):
-    """What continuous PID controllers have in common: all but what the actions work on."""
+    """Base class of the continuous PID controllers; subclasses define the errors of the three actions."""
 
     P: ArrayLike = gain_parameter(1.0, "proportional gain")
     I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
@@ -57,8 +57,8 @@ class ContinuousPidBlock(Block):
     upper: ArrayLike = upper_limit_parameter()
     anti_windup: str = anti_windup_parameter()
     Kb: ArrayLike = gain_parameter(1.0, "back-calculation gain", "1/s")
-    initial_integral: ArrayLike = gain_parameter(0.0, "integral action at the start")
-    initial_filter: ArrayLike = gain_parameter(0.0, "filter state at the start")
+    initial_integral: ArrayLike = gain_parameter(0.0, "initial integral action")
+    initial_filter: ArrayLike = gain_parameter(0.0, "initial filter state")
     form: str = form_parameter()
     external_reset: str = external_reset_parameter()
     tracking: bool = tracking_parameter()
@@ -68,9 +68,9 @@ class ContinuousPidBlock(Block):
         check_limits(self, limited=self.limit_output)
 
     def further_ports(self) -> tuple[Port, ...]:
-        """The inputs that parameters ask for."""
+        """The inputs that the parameters enable."""
         reset = (Port("reset", "the trigger", shape=()),) if self.external_reset != "none" else ()
-        tracking = (Port("tracking", "what the output shall be close to"),) if self.tracking else ()
+        tracking = (Port("tracking", "signal that the output should track"),) if self.tracking else ()
         return (*reset, *tracking)
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -108,7 +108,7 @@ class ContinuousPidBlock(Block):
 
     @abstractmethod
     def errors(self, u: Signals, p: Signals) -> Errors:
-        """What each of the three actions works on."""
+        """The error that each of the three actions acts on."""
 
     @property
     def _law(self) -> ContinuousPid:
@@ -124,11 +124,11 @@ class ContinuousPidBlock(Block):
 class PID(ContinuousPidBlock):
     """Proportional, integral and filtered derivative action: y = (P + I/s + D N s/(s + N)) u.
 
-    That is Simulink's PID Controller; in the ideal form y = P (1 + I/s + D N s/(s + N)) u. States:
-    ``integral`` and ``filter`` (filter' = N (D u - filter)). With ``limit_output`` the output stays between
-    two limits; ``clamping`` then stops the integral while it would drive the output further out, and
-    ``back_calculation`` adds Kb (y - unlimited y) to its rate. ``tracking`` adds Kt (tracking - y) to it,
-    for a smooth change over from another controller.
+    This is the parallel form of Simulink's PID Controller; in the ideal form y = P (1 + I/s + D N s/(s + N))
+    u. States: ``integral`` and ``filter`` (filter' = N (D u - filter)). With ``limit_output`` the output
+    stays between two limits; ``clamping`` then stops the integral while it would drive the output further
+    beyond a limit, and ``back_calculation`` adds Kb (y - unlimited y) to its rate. ``tracking`` adds Kt
+    (tracking - y) to it, for a bumpless transfer from another controller.
     """
 
     title: ClassVar[str] = "PID Controller"
@@ -146,8 +146,8 @@ class PID(ContinuousPidBlock):
 class PID2DOF(ContinuousPidBlock):
     """PID with two degrees of freedom: y = P (b r - u) + I/s (r - u) + D N s/(s + N) (c r - u).
 
-    The weights b and c let a step of the reference r pass softly while disturbances are still fought hard.
-    Forms, limits, reset and tracking are those of the PID Controller.
+    With set-point weights b, c < 1 the response to a step of r is softer; the response to disturbances is
+    unchanged. Forms, limits, reset and tracking are those of the PID Controller.
     """
 
     title: ClassVar[str] = "PID Controller (2DOF)"

@@ -1,4 +1,4 @@
-"""Two integrations in one block: a position and its speed, which stop and bounce together at limits."""
+"""Second-order integrators: position and speed, optionally with limits and bounces."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SecondOrderIntegrator(Block):
     sign: ClassVar[FaceSign] = Fraction("1", "s²")
     output_rates: ClassVar[Mapping[str, str]] = {"x": "dx"}
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A mass on a spring: the acceleration is -4 x, so it swings at 2 rad/s.",
+        shows="A mass on a spring: the acceleration is -4 x, so it oscillates at 2 rad/s.",
         parameters={"initial": 1.0},
         inputs={"u": made("Gain", gain=-4.0).by(u="x")},
         shown=("x", "dx"),
@@ -81,19 +81,19 @@ class SecondOrderIntegrator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SecondOrderIntegratorLimited(Block):
-    """Position and speed between limits: x'' = u; at a limit of x the speed becomes 0, or what a port says.
+    """Position and speed between limits: x'' = u; at a limit of x the speed becomes 0 or the input ``dx0``.
 
-    As in Simulink: where x reaches a limit, dx jumps to 0 and x stays while u drives beyond, or, with
-    ``reinitialize``, dx jumps to the input ``dx0``, which may be made of dx itself: a bounce. A bounce no
-    faster than ``rest_speed`` is a stop: x then rests exactly at the limit until u drives away from it, so
-    that a ball whose bounces get shorter for ever comes to rest instead of never ending. The speed has limits
-    of its own; they allow 0 where x has a limit in the direction of motion.
+    As in Simulink: where x reaches a limit, dx jumps to 0 and x stays while u points outwards. With
+    ``reinitialize`` dx jumps to the input ``dx0`` instead, which may depend on dx (a bounce). If the speed
+    after a bounce is at most ``rest_speed``, the block stops: x stays exactly at the limit until u points
+    inwards. A bouncing ball therefore comes to rest after a finite number of bounces (no Zeno behaviour). The
+    speed may have limits too; they must include 0 where x has a limit in the direction of motion.
     """
 
     title: ClassVar[str] = "Integrator, Second-Order Limited"
     sign: ClassVar[FaceSign] = Fraction("1", "s²", limited=True)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A ball that keeps 0.7 of its speed at each bounce, and rests in the end.",
+        shows="A ball that keeps 0.7 of its speed at each bounce and finally rests.",
         parameters={"initial": 1.0, "lower": 0.0, "reinitialize": True},
         inputs={
             "u": made("Constant", value=-9.81).named("gravity"),
@@ -105,14 +105,16 @@ class SecondOrderIntegratorLimited(Block):
 
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="x at t = 0, within the limits")
     initial_speed: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="dx at t = 0")
-    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least x")
-    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest x")
-    lower_speed: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least dx")
-    upper_speed: ArrayLike = parameter(
-        math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest dx"
+    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of x")
+    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of x")
+    lower_speed: ArrayLike = parameter(
+        -math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of dx"
     )
-    reinitialize: bool = parameter(False, doc="whether the port dx0 says what dx becomes at a limit of x")
-    rest_speed: float = parameter(1e-6, minimum=0.0, doc="a bounce that is not faster is a stop")
+    upper_speed: ArrayLike = parameter(
+        math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of dx"
+    )
+    reinitialize: bool = parameter(False, doc="whether the input dx0 gives the speed after x reaches a limit")
+    rest_speed: float = parameter(1e-6, minimum=0.0, doc="at or below this speed a bounce becomes a stop")
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
@@ -127,13 +129,13 @@ class SecondOrderIntegratorLimited(Block):
             raise InputError(
                 f"x has a limit, and dx is held between {found['lower_speed']} and {found['upper_speed']}",
                 where=self.type_name(),
-                allowed="lower_speed <= 0 <= upper_speed where x has a limit, because x stands still there",
-                fix="widen the limits of dx, or take away the limit of x",
+                allowed="lower_speed <= 0 <= upper_speed where x has a limit, because the speed is 0 there",
+                fix="widen the limits of dx, or remove the limit of x",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
         ports = (Port("u", "the acceleration"),)
-        return (*ports, Port("dx0", "what dx becomes at a limit")) if self.reinitialize else ports
+        return (*ports, Port("dx0", "speed after x reaches a limit")) if self.reinitialize else ports
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("x", "the position"), Port("dx", "the speed"))
@@ -152,8 +154,8 @@ class SecondOrderIntegratorLimited(Block):
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["x"]
         return (
-            State("rests", shape, "1 at the upper limit, -1 at the lower, else 0"),
-            State("fastest", shape, "1 at the upper limit of the speed, -1 at the lower, else 0"),
+            State("rests", shape, "1 at the upper limit, -1 at the lower limit, else 0"),
+            State("fastest", shape, "1 at the upper limit of the speed, -1 at the lower limit, else 0"),
         )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
@@ -194,7 +196,7 @@ class SecondOrderIntegratorLimited(Block):
         still = u["u"] == 0.0
 
         def driven(mode: SX) -> tuple[SX, SX]:
-            """Towards the upper limit, the lower one; a mode at a limit lasts until u leads away from it."""
+            """Whether u points towards the upper and the lower limit; a limit mode ends when u turns back."""
             upwards = logic_or(u["u"] > 0.0, logic_and(mode > 0.0, still))
             return upwards, logic_or(u["u"] < 0.0, logic_and(mode < 0.0, still))
 
@@ -215,7 +217,7 @@ class SecondOrderIntegratorLimited(Block):
         return found
 
     def _impacts(self, x: Signals, p: Signals) -> tuple[SX, SX]:
-        """Whether the speed leads beyond the upper limit, the lower one, at which the state stands."""
+        """Whether the state is at the upper (lower) limit and its speed points beyond it."""
         upper = logic_and(x["x"] >= p["upper"], x["dx"] > 0.0)
         return upper, logic_and(x["x"] <= p["lower"], x["dx"] < 0.0)
 
@@ -223,13 +225,13 @@ class SecondOrderIntegratorLimited(Block):
         at_upper, at_lower = self._impacts(x, p)
         hits = logic_or(at_upper, at_lower)
         bounced = fmin(fmax(u["dx0"] if self.reinitialize else SX(0.0), p["lower_speed"]), p["upper_speed"])
-        # Away from the limit, or not worth it.
+        # The speed points away from the limit, or the bounce is below the rest speed.
         away = if_else(at_upper, -bounced, bounced)
         stops = logic_and(hits, away <= p["rest_speed"])
         presses = if_else(at_upper, u["u"] >= 0.0, u["u"] <= 0.0)
         place = if_else(at_upper, p["upper"], if_else(at_lower, p["lower"], x["x"]))
         speed = if_else(hits, if_else(stops, 0.0, bounced), x["dx"])
-        # At a limit already, without a speed that leads away, when u turns towards it.
+        # The state is at a limit without speed away from it, and u turns towards the limit.
         pushed_up = logic_and(e["rises"] > 0.0, logic_and(x["x"] >= p["upper"], x["dx"] >= 0.0))
         pushed_down = logic_and(e["falls"] < 0.0, logic_and(x["x"] <= p["lower"], x["dx"] <= 0.0))
         freed = logic_or(

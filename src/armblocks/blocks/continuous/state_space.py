@@ -1,4 +1,4 @@
-"""Linear systems by their matrices, in state space."""
+"""Linear systems in state-space form."""
 
 from __future__ import annotations
 
@@ -24,14 +24,13 @@ from armblocks.diagram.signs import FaceSign, Lines
 class StateSpace(LinearBlock):
     """A linear system: x' = A x + B u, y = C x + D u, x(0) = initial.
 
-    D belongs to the structure (it is not tunable), so that a zero in it leaves the output free of the input
-    and the block may stand in a loop.
+    D is not tunable: where D is zero the output has no feedthrough, and the block may close a loop.
     """
 
     title: ClassVar[str] = "State-Space"
     sign: ClassVar[FaceSign] = Lines(("x' = A x + B u", "y = C x + D u"))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A mass on a spring with a damper, pushed from 1 s on: it swings in.",
+        shows="A mass with spring and damper under a constant force from 1 s on: it oscillates and settles.",
         parameters={
             "A": ((0.0, 1.0), (-4.0, -0.8)),
             "B": ((0.0,), (4.0,)),

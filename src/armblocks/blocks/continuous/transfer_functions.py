@@ -1,4 +1,4 @@
-"""Rational transfer functions by their coefficients."""
+"""Rational transfer functions from their coefficients."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from armblocks.diagram.signs import FaceSign, Fraction, polynomial
 
 @dataclass(frozen=True, kw_only=True)
 class TransferFunction(RationalBlock):
-    """A rational transfer function: y = (b0 s^m + … + bm) / (a0 s^n + … + an) u, at rest at the start.
+    """A rational transfer function: y = (b0 s^m + … + bm) / (a0 s^n + … + an) u, initially at rest.
 
-    Coefficients stand from the highest power to the lowest, as in MATLAB. Its state is the controllable
-    canonical form's: x1 = u filtered by 1/denominator, differentiated n - 1 times, … xn.
+    Coefficients are listed from the highest power to the lowest, as in MATLAB. The states are those of the
+    controllable canonical form: xn is u filtered by 1/denominator, x1 its derivative of order n - 1.
     """
 
     title: ClassVar[str] = "Transfer Fcn"

@@ -1,7 +1,7 @@
-"""Dead time: what a signal was some time ago, jumps and kinks included.
+"""Transport delays: the input delayed by a constant or variable time, including jumps and kinks.
 
 Sources: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, chapters 2 and 4 (steps
-that end where discontinuities arrive, dense output as the past).
+that end at propagated discontinuities, dense output as history).
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from armblocks.diagram.signs import FaceSign, Words
 
 @dataclass(frozen=True, kw_only=True)
 class TransportDelay(Block):
-    """The input some time ago: y(t) = u(t - delay), ``initial`` before there was any.
+    """A constant transport delay: y(t) = u(t - delay), and ``initial`` for t < delay.
 
-    The past is kept as exactly as the run is; a jump comes out exactly one delay after it went in. No step is
-    longer than the delay.
+    The delay buffer has the accuracy of the solver. A jump of the input appears at the output exactly one
+    delay later. No step is longer than the delay.
     """
 
     title: ClassVar[str] = "Transport Delay"
@@ -44,18 +44,18 @@ class TransportDelay(Block):
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A step and a sine, both one second later.",
+        shows="A step and a sine, both delayed by one second.",
         inputs={"u": made("Sum").by(u1=made("Step", time=2.0), u2=made("SineWave"))},
     )
 
-    delay: float = parameter(1.0, above=0.0, doc="how long ago", unit="s")
+    delay: float = parameter(1.0, above=0.0, doc="the delay", unit="s")
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output for t < delay")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is delayed"),)
+        return (Port("u", "signal to delay"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the input some time ago"),)
+        return (Port("y", "the delayed signal"),)
 
     def assumed_output_shapes(self) -> Shapes:
         return {"y": shape_of(self.initial)}
@@ -64,7 +64,7 @@ class TransportDelay(Block):
         return {"y": inputs["u"]}
 
     def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
-        return (DelayLine("past", self.output_shapes(inputs)["y"], "the input some time ago", "u"),)
+        return (DelayLine("past", self.output_shapes(inputs)["y"], "the delayed signal", "u"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["past"]}
@@ -81,31 +81,32 @@ class TransportDelay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableTimeDelay(Block):
-    """The input a given time ago: y(t) = u(t - d(t)), with d held between ``shortest`` and ``longest``.
+    """A variable time delay: y(t) = u(t - d(t)), with d held between ``shortest`` and ``longest``.
 
-    No step is longer than ``shortest``. Jumps of the input come out as jumps, which are not located.
+    No step is longer than ``shortest``. A jump of the input is a jump of the output, whose time is not
+    located.
     """
 
     title: ClassVar[str] = "Variable Time Delay"
     sign: ClassVar[FaceSign] = Words("u(t − d)")
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine whose delay grows from 0.1 s to 2 s: it comes out slower.",
+        shows="A sine whose delay grows from 0.1 s to 2 s: the output has a lower frequency.",
         inputs={"u": made("SineWave", frequency=3.0), "d": made("Ramp", slope=0.3)},
     )
 
     shortest: float = parameter(0.1, above=0.0, doc="the shortest delay", unit="s")
     longest: float = parameter(2.0, above=0.0, doc="the longest delay", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the start")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input for t < 0")
 
     def check(self) -> None:
         limits_in_order(self, "shortest", "longest")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is delayed"), Port("d", "how long ago", "s", shape=()))
+        return (Port("u", "signal to delay"), Port("d", "the delay", "s", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the input some time ago"),)
+        return (Port("y", "the delayed signal"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
@@ -117,7 +118,7 @@ class VariableTimeDelay(Block):
         return {"y": inputs["u"]}
 
     def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
-        return (DelayLine("past", self.output_shapes(inputs)["y"], "the input some time ago", "u"),)
+        return (DelayLine("past", self.output_shapes(inputs)["y"], "the delayed signal", "u"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["past"]}
@@ -134,24 +135,25 @@ class VariableTimeDelay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class VariableTransportDelay(Block):
-    """What entered a pipe when it comes out: y(t) = u(t - d), the transit time at the inlet being ``T(t)``.
+    """A transport delay in a pipe: y(t) = u(t - d), where ``T(t)`` is the transit time at the inlet.
 
-    The pipe is filled between t - d and t, so the integral of 1/T over that time is 1, from which
-    d' = 1 - T(t - d) / T(t). (Simulink's Variable Transport Delay; Variable Time Delay takes T itself for d.)
+    The flow between t - d and t fills the pipe, so the integral of 1/T over that time is 1. Therefore d' = 1
+    - T(t - d) / T(t). (Simulink's Variable Transport Delay; Variable Time Delay takes T itself for d.)
     """
 
     title: ClassVar[str] = "Variable Transport Delay"
     sign: ClassVar[FaceSign] = Words("u(t − τ)")
     rated_inputs: ClassVar[tuple[str, ...]] = ("u", "T")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The flow in a pipe gets slower, its transit time grows from 1 s: a sine comes out late.",
+        shows="The flow in a pipe slows down and its transit time grows from 1 s: the sine is delayed more "
+        "and more.",
         inputs={"u": made("SineWave", frequency=2.0), "T": made("Ramp", slope=0.2, initial=1.0)},
     )
 
-    initial_delay: float = parameter(1.0, above=0.0, doc="the transit time up to t = 0", unit="s")
-    shortest: float = parameter(0.1, above=0.0, doc="the delay is at least that", unit="s")
-    longest: float = parameter(10.0, above=0.0, doc="and at most that", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input before the start")
+    initial_delay: float = parameter(1.0, above=0.0, doc="the transit time for t <= 0", unit="s")
+    shortest: float = parameter(0.1, above=0.0, doc="lower limit of the delay", unit="s")
+    longest: float = parameter(10.0, above=0.0, doc="upper limit of the delay", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the input for t < 0")
 
     def check(self) -> None:
         limits_in_order(self, "shortest", "longest")
@@ -160,7 +162,10 @@ class VariableTransportDelay(Block):
         return (Port("u", "what enters"), Port("T", "the transit time at the inlet, above 0", "s", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "what comes out"), Port("delay", "how long it was inside", "s", shape=()))
+        return (
+            Port("y", "signal at the outlet"),
+            Port("delay", "the delay of the signal at the outlet", "s", shape=()),
+        )
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
@@ -172,12 +177,12 @@ class VariableTransportDelay(Block):
         return {"y": inputs["u"]}
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("delay", (), "how long what comes out was inside", "s"),)
+        return (State("delay", (), "the delay of the signal at the outlet", "s"),)
 
     def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
         return (
-            DelayLine("past", self.output_shapes(inputs)["y"], "what entered then", "u"),
-            DelayLine("transit", (), "the transit time at the inlet then", "T"),
+            DelayLine("past", self.output_shapes(inputs)["y"], "the delayed inlet signal", "u"),
+            DelayLine("transit", (), "the delayed transit time", "T"),
         )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:

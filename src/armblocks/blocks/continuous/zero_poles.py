@@ -1,4 +1,4 @@
-"""Transfer functions by zeros and poles; analog filters by order and edge."""
+"""Transfer functions from zeros and poles; analog filters from order and edge frequency."""
 
 from __future__ import annotations
 
@@ -37,10 +37,11 @@ from armblocks.diagram.signs import BANDS, FaceSign, ratio_of_roots
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroPole(SectionsByRoots):
-    """A transfer function by its roots: y = gain (s - z1) … (s - zm) / ((s - p1) … (s - pn)) u, m <= n.
+    """A transfer function: y = gain (s - z1) … (s - zm) / ((s - p1) … (s - pn)) u, m <= n.
 
     Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
-    imaginary) in files. At rest at the start; the state is that of a chain of sections with one or two poles.
+    imaginary) in files. Initially at rest. The states are those of a cascade of sections with one or two
+    poles.
     """
 
     title: ClassVar[str] = "Zero-Pole"
@@ -62,28 +63,33 @@ class ZeroPole(SectionsByRoots):
 
 @dataclass(frozen=True, kw_only=True)
 class AnalogFilter(Block):
-    """A filter by order and edge: |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)) for the Butterworth low pass.
+    """An analog filter; the Butterworth low pass has |y / u| = 1 / sqrt(1 + (w / edge)^(2 order)).
 
-    ``chebyshev1`` falls faster and ripples in the pass band, ``chebyshev2`` in the stop band, which begins
-    at its edge. Bands have twice the order in poles. At rest at the start.
+    ``chebyshev1`` falls faster and has ripple in the pass band. ``chebyshev2`` has ripple in the stop band,
+    and its edge is where the stop band begins. Band filters have twice as many poles as the order. Initially
+    at rest.
     """
 
     title: ClassVar[str] = "Analog Filter Design"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A square wave of 0.25 Hz behind a Butterworth low pass of 10 rad/s.",
+        shows="A square wave of 0.25 Hz after a Butterworth low-pass filter with its edge at 10 rad/s.",
         parameters={"order": 4, "edge": 10.0},
         inputs={"u": made("SignalGenerator", waveform="square", frequency=0.25)},
     )
 
     design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the kind of filter")
     filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
-    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low pass behind it")
-    edge: float = parameter(1.0, above=0.0, tunable=False, doc="the edge, of bands the lower", unit="rad/s")
-    upper_edge: float = parameter(
-        2.0, above=0.0, tunable=False, doc="the upper edge of a band, above the lower", unit="rad/s"
+    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
+    edge: float = parameter(
+        1.0, above=0.0, tunable=False, doc="edge frequency; of a band, the lower one", unit="rad/s"
     )
-    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="in the pass band (chebyshev1), dB")
-    attenuation: float = parameter(40.0, above=0.0, tunable=False, doc="in the stop band (chebyshev2), dB")
+    upper_edge: float = parameter(
+        2.0, above=0.0, tunable=False, doc="upper edge frequency of a band", unit="rad/s"
+    )
+    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="ripple in the pass band (chebyshev1), dB")
+    attenuation: float = parameter(
+        40.0, above=0.0, tunable=False, doc="attenuation in the stop band (chebyshev2), dB"
+    )
 
     def face_sign(self) -> FaceSign:
         return BANDS[self.filter_type]

@@ -1,4 +1,4 @@
-"""Blocks whose output has kinks and jumps: each switch is an event, located exactly."""
+"""Blocks whose output has kinks and jumps. Each switching time is located as an event."""
 
 from __future__ import annotations
 
@@ -47,14 +47,16 @@ class Saturation(Block):
         inputs={"u": made("SineWave", amplitude=2.0)},
     )
 
-    lower: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, finite=False, doc="the least output")
-    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="the greatest output")
+    lower: ArrayLike = parameter(
+        -0.5, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the output"
+    )
+    upper: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the output")
 
     def check(self) -> None:
         limits_in_order(self, "lower", "upper")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is limited"),)
+        return (Port("u", "signal to limit"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
@@ -88,17 +90,17 @@ class Saturation(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadZone(Block):
-    """Nothing within the zone, what exceeds it outside: y = u - end above, u - start below, 0 between."""
+    """A dead zone: y = u - end above the zone, u - start below the zone, 0 within the zone."""
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Dead Zone"
     sign: ClassVar[FaceSign] = DEAD_ZONE
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Between -0.5 and 0.5 nothing comes through, outside what exceeds the zone.",
+        shows="Between -0.5 and 0.5 the output is 0. Outside it is the distance to the zone.",
     )
 
-    start: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, doc="where the zone begins")
-    end: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, doc="where the zone ends")
+    start: ArrayLike = parameter(-0.5, kind=ParameterKind.ARRAY, doc="lower end of the zone")
+    end: ArrayLike = parameter(0.5, kind=ParameterKind.ARRAY, doc="upper end of the zone")
 
     def check(self) -> None:
         limits_in_order(self, "start", "end")
@@ -107,7 +109,7 @@ class DeadZone(Block):
         return (Port("u", "the signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "what exceeds the zone"),)
+        return (Port("y", "signed distance of the input from the zone"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({**inputs, "start": shape_of(self.start), "end": shape_of(self.end)})}
@@ -138,7 +140,7 @@ class DeadZone(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Relay(Block):
-    """A switch with hysteresis: y = on_value once u reaches on_point, off_value once u falls to off_point.
+    """A relay: y = on_value once u rises to on_point, off_value once u falls to off_point.
 
     It starts off, unless u begins at or above on_point.
     """
@@ -146,11 +148,11 @@ class Relay(Block):
     title: ClassVar[str] = "Relay"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.7, 0), (0.7, 1), (1, 1), (0.3, 1), (0.3, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="It switches on as the sine rises through 0.5 and off as it falls through -0.5, not before.",
+        shows="The relay switches on when the sine rises through 0.5, and off when it falls through -0.5.",
     )
 
-    on_point: float = parameter(0.5, doc="where it switches on")
-    off_point: float = parameter(-0.5, doc="where it switches off, at most on_point")
+    on_point: float = parameter(0.5, doc="input value at which the relay switches on")
+    off_point: float = parameter(-0.5, doc="input value at which the relay switches off, at most on_point")
     on_value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the output while on")
     off_value: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output while off")
 
@@ -190,16 +192,17 @@ class Relay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Quantizer(Block):
-    """The input in steps: y = interval round(u / interval), halves upwards.
+    """The input rounded to multiples of an interval: y = interval round(u / interval), halves upwards.
 
-    A step down happens 1e-9 of the interval later than the step up, so that rounding makes none chatter.
+    The threshold for a step down lies 1e-9 interval below the threshold for a step up. This hysteresis
+    prevents chattering by rounding errors.
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Quantizer"
     sign: ClassVar[FaceSign] = stairs((0.0, 0.33, 0.67, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine in steps of 0.5.",
+        shows="The sine rounded to multiples of 0.5.",
         inputs={"u": made("SineWave", amplitude=2.0)},
     )
 
@@ -209,13 +212,13 @@ class Quantizer(Block):
         return (Port("u", "the signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the nearest step"),)
+        return (Port("y", "the nearest multiple of the interval"),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("step", inputs["u"], "the number of the step, 0 at u = 0"),)
+        return (State("step", inputs["u"], "number of the step, 0 at u = 0"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = inputs["u"]
@@ -236,7 +239,7 @@ class Quantizer(Block):
         return {"step": beyond(self.guard_values(t, x, u, p))}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        # A jump may pass several edges at once; at an edge, rounding must not undo the step.
+        # A jump may pass several thresholds at once; at a threshold, rounding errors must not undo the step.
         nearest = floor(u["u"] / p["interval"] + 0.5)
         down = if_else(e["down"] < 0.0, fmin(nearest, x["step"] - 1.0), x["step"])
         return {"step": if_else(e["up"] > 0.0, fmax(nearest, x["step"] + 1.0), down)}

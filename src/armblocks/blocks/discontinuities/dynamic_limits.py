@@ -1,4 +1,4 @@
-"""Limits that move, crossings that are counted, and signals that start again: each switch is an event."""
+"""Variable limits, crossing counters and wrapping to zero. Each switching time is an event."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from armblocks.diagram.signs import DEAD_ZONE, SATURATION, FaceSign, graph
 
 @dataclass(frozen=True, kw_only=True)
 class MovingLimits(Block):
-    """What blocks with two limits that are signals have in common."""
+    """Base class of blocks with two limits that are signals."""
 
     zero_crossing: bool = zero_crossing_parameter()
 
@@ -72,12 +72,12 @@ class SaturationDynamic(MovingLimits):
 
 @dataclass(frozen=True, kw_only=True)
 class DeadZoneDynamic(MovingLimits):
-    """Nothing between two signals, what exceeds them outside: y = u - upper, 0 or u - lower."""
+    """A dead zone between two signals: y = u - upper above, u - lower below, 0 between."""
 
     title: ClassVar[str] = "Dead Zone Dynamic"
     sign: ClassVar[FaceSign] = DEAD_ZONE
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="What of a sine exceeds a zone that grows upwards.",
+        shows="The part of a sine outside a zone whose upper end rises.",
         inputs={
             "upper": made("Ramp", slope=0.1).named("upper"),
             "u": made("SineWave"),
@@ -86,7 +86,7 @@ class DeadZoneDynamic(MovingLimits):
     )
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "what exceeds the zone"),)
+        return (Port("y", "signed distance of the input from the zone"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": if_else(x["above"], u["u"] - u["upper"], if_else(x["below"], u["u"] - u["lower"], 0.0))}
@@ -105,7 +105,7 @@ class WrapToZero(Block):
         inputs={"u": made("Ramp")},
     )
 
-    threshold: ArrayLike = parameter(255.0, kind=ParameterKind.ARRAY, doc="the greatest output")
+    threshold: ArrayLike = parameter(255.0, kind=ParameterKind.ARRAY, doc="upper limit of the output")
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -130,31 +130,37 @@ class WrapToZero(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class HitCrossing(Block):
-    """How often a signal has crossed an offset, and when it did last: located exactly.
+    """The number of crossings of an offset and the time of the last one; crossings are located exactly.
 
-    Simulink's block is 1 for the step that ends at the crossing; a count can be looked at afterwards, and
-    what it triggers sees it change.
+    Simulink's block outputs 1 during the step that ends at the crossing. A count remains visible after the
+    crossing, and a triggered subsystem detects its change.
     """
 
     title: ClassVar[str] = "Hit Crossing"
     spreads: ClassVar[tuple[str, ...]] = ("offset",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine crosses 0.5 upwards and downwards: the count steps at each crossing.",
+        shows="A sine crosses 0.5 upwards and downwards: the count increases at each crossing.",
         parameters={"offset": 0.5},
     )
 
-    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is crossed")
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="level whose crossings count")
     direction: str = parameter("either", choices=("rising", "falling", "either"), doc="which crossings count")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("count", "crossings so far"), Port("last", "time of the last one; 0 before any", "s"))
+        return (
+            Port("count", "number of crossings so far"),
+            Port("last", "time of the last one; 0 before any", "s"),
+        )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["count"]
-        return (State("count", shape, "crossings so far"), State("last", shape, "time of the last", "s"))
+        return (
+            State("count", shape, "number of crossings so far"),
+            State("last", shape, "time of the last", "s"),
+        )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         way = {"rising": 1, "falling": -1, "either": 0}[self.direction]

@@ -1,9 +1,9 @@
-"""Limits on how fast a signal changes.
+"""Rate limiters.
 
-In continuous time each beginning and end of a limit is an event. While the output follows, it is u; else it
-is a state y with y' at one of the two limits, until y and u meet again. The output is continuous: ``kept`` is
-its left limit at the latest tick, event or breakpoint, so that a jump of u is seen as ``u - kept`` at that
-instant.
+In continuous time the start and the end of a rate limitation are events. While no limit is active, the output
+is u. Else it is a state y with y' equal to one of the limits, until y and u meet again. The output is
+continuous: ``kept`` is its left limit at the latest tick, event or breakpoint, so that ``u - kept`` is the
+jump of u at that time.
 """
 
 from __future__ import annotations
@@ -33,19 +33,18 @@ from armblocks.diagram import (
 from armblocks.diagram.signs import RATE_LIMIT, FaceSign
 
 APART = 1e-3
-"""A limiter that is switched on, in an enabled subsystem, follows an input that is nearer to its last output
-than this, beside its size."""
+"""Relative tolerance of an enabled limiter: an input this close to the last output is followed directly."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RateLimiting(Block):
-    """What the continuous rate limiters have in common: all but where their limits come from."""
+    """Base class of the continuous rate limiters; subclasses give the limits."""
 
     rated_inputs: ClassVar[tuple[str, ...]] = ("u",)
 
     @abstractmethod
     def limits(self, u: Signals, p: Signals) -> Signals:
-        """What has the entries ``rising`` and ``falling``."""
+        """The mapping with the entries ``rising`` and ``falling``."""
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)
@@ -54,14 +53,18 @@ class RateLimiting(Block):
         return {"y": inputs["u"]}
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("y", self.output_shapes(inputs)["y"], "the output while it is at a limit"),)
+        return (State("y", self.output_shapes(inputs)["y"], "the output while a rate limit is active"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        kept = State("kept", self.output_shapes(inputs)["y"], "the output just before the latest instant")
+        kept = State(
+            "kept",
+            self.output_shapes(inputs)["y"],
+            "left limit of the output at the latest tick, event or breakpoint",
+        )
         return (kept, State("kept_at", (), "that instant", "s"))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        doc = "1 rising at the limit, -1 falling at the limit, 0 following u"
+        doc = "1 at the rising limit, -1 at the falling limit, 0 following u"
         return (State("mode", self.output_shapes(inputs)["y"], doc),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
@@ -97,7 +100,7 @@ class RateLimiting(Block):
         }
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # Where the block is switched on, y is what it gave last, and there may be no jump at this instant.
+        # When the block is enabled, y is its last output, and u need not jump at this time.
         gap = u["u"] - x["y"]
         apart = logic_and(x["mode"] == 0.0, fabs(gap) > APART * fmax(1.0, fabs(u["u"])))
         return {"mode": if_else(apart, sign(gap), self._law(t, x, u, p))}
@@ -115,15 +118,15 @@ class RateLimiting(Block):
         }
 
     def _jump(self, t: SX, x: Signals, u: Signals) -> SX:
-        """How far u has jumped at this instant."""
+        """The jump of u at this time."""
         return if_else(same_instant(t, x["kept_at"]), u["u"] - x["kept"], 0.0)
 
     def _band(self, u: Signals) -> SX:
-        """The largest jump that is passed on."""
+        """The largest jump that the output follows."""
         return SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
 
     def _law(self, t: SX, x: Signals, u: Signals, p: Signals) -> SX:
-        """The mode after this instant, from the one before it."""
+        """The mode after this event, from the mode before it."""
         limits, guards = self.limits(u, p), self.guard_values(t, x, u, p)
         band, jump = self._band(u), self._jump(t, x, u)
         too_fast, too_fast_down = guards["fast"] > 0.0, guards["fast_down"] < 0.0
@@ -139,26 +142,27 @@ class RateLimiting(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RateLimiterContinuous(RateLimiting):
-    """The input, no faster than allowed: y = u while falling <= u' <= rising, else y' is that limit.
+    """A rate limiter in continuous time: y = u while falling <= u' <= rising, else y' equals the limit.
 
-    Then y goes on at the limit until it meets u again. Where u jumps, y does not. (The Rate Limiter is the
-    sampled one; Simulink has both in one block, and takes the rate between two steps, not the exact one.)
+    Then y' stays at the limit until y meets u again. The output does not jump where u jumps. (The Rate
+    Limiter is the sampled block. Simulink has one block for both, and uses the difference between two
+    solver steps instead of the derivative.)
     """
 
     title: ClassVar[str] = "Rate Limiter (continuous)"
     sign: ClassVar[FaceSign] = RATE_LIMIT
     spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine of which the rise is limited to 0.5 a second and the fall to 0.8.",
+        shows="A sine whose rate is limited to 0.5 per second upwards and 0.8 per second downwards.",
         parameters={"rising": 0.5, "falling": -0.8},
         inputs={"u": made("SineWave")},
     )
 
     rising: ArrayLike = parameter(
-        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the fastest rise", unit="1/s"
+        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="upper limit of the rate", unit="1/s"
     )
     falling: ArrayLike = parameter(
-        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="the fastest fall, not positive", unit="1/s"
+        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="lower limit of the rate, not positive", unit="1/s"
     )
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output at t = 0")
 
@@ -171,16 +175,16 @@ class RateLimiterContinuous(RateLimiting):
 
 @dataclass(frozen=True, kw_only=True)
 class RateLimiterDynamic(RateLimiting):
-    """The input, no faster than two signals allow: y = u while falling <= u' <= rising, else at that limit.
+    """A rate limiter whose limits are signals: y = u while falling <= u' <= rising, else y' equals the limit.
 
-    As the Rate Limiter (continuous), with limits that may change at any time. Where ``falling`` exceeds
-    ``rising`` no rate fits both, and y goes towards u at the limit that it is at.
+    It works as the Rate Limiter (continuous). Where ``falling`` exceeds ``rising``, no rate satisfies both
+    limits, and y moves towards u at the limit that is active.
     """
 
     title: ClassVar[str] = "Rate Limiter Dynamic"
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine that may rise faster and faster, and fall by 0.8 a second.",
+        shows="A sine whose upper rate limit grows and whose lower rate limit is -0.8 per second.",
         inputs={
             "rising": made("Ramp", slope=0.1),
             "u": made("SineWave"),
@@ -193,9 +197,9 @@ class RateLimiterDynamic(RateLimiting):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("rising", "the fastest rise"),
+            Port("rising", "upper limit of the rate"),
             Port("u", "the signal"),
-            Port("falling", "the fastest fall, not positive"),
+            Port("falling", "lower limit of the rate, not positive"),
         )
 
     def limits(self, u: Signals, p: Signals) -> Signals:
@@ -204,29 +208,29 @@ class RateLimiterDynamic(RateLimiting):
 
 @dataclass(frozen=True, kw_only=True)
 class RateLimiter(Block):
-    """The input, no faster than allowed: y(k) is u(k) held to y(k-1) + falling T … y(k-1) + rising T."""
+    """A sampled rate limiter: y(k) is u(k) limited to y(k-1) + falling T … y(k-1) + rising T."""
 
     title: ClassVar[str] = "Rate Limiter"
     sign: ClassVar[FaceSign] = RATE_LIMIT
     spreads: ClassVar[tuple[str, ...]] = ("rising", "falling", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Pulses whose edges may not be steeper than 1 a second upwards and 2 downwards.",
+        shows="Pulses whose edges are limited to 1 per second upwards and 2 per second downwards.",
         parameters={"falling": -2.0, "sample_time": 0.05},
         inputs={"u": made("PulseGenerator", period=5.0, delay=0.5)},
     )
     sampled: ClassVar[bool] = True
 
     rising: ArrayLike = parameter(
-        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="the fastest rise", unit="1/s"
+        1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="upper limit of the rate", unit="1/s"
     )
     falling: ArrayLike = parameter(
-        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="the fastest fall, not positive", unit="1/s"
+        -1.0, kind=ParameterKind.ARRAY, maximum=0.0, doc="lower limit of the rate, not positive", unit="1/s"
     )
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the output before the first tick")
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is sampled"),)
+        return (Port("u", "sampled signal"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the limited signal"),)

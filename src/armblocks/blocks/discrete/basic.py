@@ -35,44 +35,44 @@ from armblocks.diagram import (
 )
 from armblocks.diagram.signs import FaceSign, Fraction, Words, times
 
-INPUT = Port("u", "what is sampled")
+INPUT = Port("u", "sampled signal")
 
 _METHODS = {
     "forward_euler": ("T", "z − 1"),
     "backward_euler": ("T z", "z − 1"),
     "trapezoidal": ("T (z + 1)", "2 (z − 1)"),
 }
-"""Methods of integration, each with its transfer function: what stands above and below the line."""
+"""Integration methods, each with numerator and denominator of its transfer function."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteIntegrator(Block):
-    """The integral as a sum: x(k+1) = x(k) + gain T u(k), held between two limits, x(0) = initial.
+    """A discrete-time integrator: x(k+1) = x(k) + gain T u(k), held between two limits, x(0) = initial.
 
-    The output is that of Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler:
-    y(k) = x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2.
-    An external reset makes x(k) the initial value at its tick, before anything else; the ``state_port`` gives
-    x(k) as it was before that, so that no loop through it is algebraic.
+    It corresponds to Simulink's Discrete-Time Integrator. Forward Euler: y(k) = x(k). Backward Euler: y(k) =
+    x(k) + gain T u(k). Trapezoidal: y(k) = x(k) + gain T u(k) / 2 and x(k+1) = y(k) + gain T u(k) / 2. An
+    external reset sets x(k) to the initial value at its tick before the output is computed. The
+    ``state_port`` gives x(k) before the reset, so that no loop through it is algebraic.
     """
 
     title: ClassVar[str] = "Discrete-Time Integrator"
     spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The integral of a sine by the rule of Euler: rectangles, one a tick.",
+        shows="The integral of a sine by the forward Euler method: one rectangle for each tick.",
     )
     sampled: ClassVar[bool] = True
 
-    method: str = parameter("forward_euler", choices=tuple(_METHODS), doc="the rule of integration")
+    method: str = parameter("forward_euler", choices=tuple(_METHODS), doc="integration method")
     gain: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor")
     external_reset: str = external_reset_parameter("none")
     initial_condition_source: str = initial_source_parameter()
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick and at a reset, where no port says it"
+        0.0, kind=ParameterKind.ARRAY, doc="the state at the first tick and at a reset, if no port gives it"
     )
-    lower: float = parameter(-math.inf, finite=False, doc="the least value")
-    upper: float = parameter(math.inf, finite=False, doc="the greatest value")
+    lower: float = parameter(-math.inf, finite=False, doc="lower limit of the sum")
+    upper: float = parameter(math.inf, finite=False, doc="upper limit of the sum")
     state_port: bool = parameter(False, doc="whether an output gives the state before a reset")
-    saturation_port: bool = parameter(False, doc="whether an output says at which limit the sum is")
+    saturation_port: bool = parameter(False, doc="whether an output shows which limit is active")
     sample_time: ArrayLike = sample_time_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -89,7 +89,7 @@ class DiscreteIntegrator(Block):
         return (Port("u", "the rate"), *reset_ports(self.external_reset, self.initial_condition_source))
 
     def output_ports(self) -> tuple[Port, ...]:
-        saturated = Port("saturated", "1 at the upper limit, -1 at the lower, else 0")
+        saturated = Port("saturated", "1 at the upper limit, -1 at the lower limit, else 0")
         return (
             Port("y", "the sum"),
             *((saturated,) if self.saturation_port else ()),
@@ -132,7 +132,7 @@ class DiscreteIntegrator(Block):
         return self.external_reset != "none" or self.initial_condition_source != "internal"
 
     def _begun(self, x: Signals, u: Signals, p: Signals) -> SX:
-        """The state at this tick, after a reset."""
+        """The state at this tick, after a possible reset."""
         if not self._has_resets:
             return x["x"]
         anew = SX(0.0)
@@ -148,13 +148,13 @@ class DiscreteIntegrator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Difference(Block):
-    """What the input gained since the tick before: y(k) = u(k) - u(k-1)."""
+    """The difference of the input from the previous tick: y(k) = u(k) - u(k-1)."""
 
     title: ClassVar[str] = "Difference"
     sign: ClassVar[FaceSign] = Words("1 − z⁻¹")
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="What the sine has gained since the last tick.",
+        shows="The change of the sine since the last tick.",
     )
     sampled: ClassVar[bool] = True
 
@@ -168,7 +168,7 @@ class Difference(Block):
         return (Port("y", "the difference"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"] - x["x"]}
@@ -182,12 +182,12 @@ class Difference(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteDerivative(Block):
-    """The rate of change between two ticks: y(k) = gain (u(k) - u(k-1)) / T."""
+    """The difference quotient between two ticks: y(k) = gain (u(k) - u(k-1)) / T."""
 
     title: ClassVar[str] = "Discrete Derivative"
     spreads: ClassVar[tuple[str, ...]] = ("gain", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The slope of the sine as two samples tell it: half a tick late.",
+        shows="The derivative of the sine from two samples: it lags by half a period.",
     )
     sampled: ClassVar[bool] = True
 
@@ -202,10 +202,10 @@ class DiscreteDerivative(Block):
         return (INPUT,)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the rate of change"),)
+        return (Port("y", "the rate of change of the input"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["gain"] * (u["u"] - x["x"]) / p["T"]}

@@ -1,4 +1,4 @@
-"""Blocks that hold and delay: the input as it was at this or an earlier tick.
+"""Blocks that hold or delay the input: its value at this or an earlier tick.
 
 In their equations k counts the ticks and T is the period of the clock.
 """
@@ -38,13 +38,13 @@ from armblocks.diagram.signs import FaceSign, Words, raised, stairs
 from armblocks.equations import Shape
 from armblocks.errors import InputError
 
-INPUT = Port("u", "what is sampled")
-OUTPUT = Port("y", "what is held")
+INPUT = Port("u", "sampled signal")
+OUTPUT = Port("y", "the held signal")
 
 
 @dataclass(frozen=True, kw_only=True)
 class OneTickDelay(Block):
-    """What a Unit Delay and a Memory with a sample time are."""
+    """Base class of Unit Delay and Memory."""
 
     spreads: ClassVar[tuple[str, ...]] = ("initial",)
     sampled: ClassVar[bool] = True
@@ -65,7 +65,7 @@ class OneTickDelay(Block):
         return {"y": shape_of(self.initial)}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["x"]}
@@ -82,27 +82,27 @@ class OneTickDelay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class UnitDelay(OneTickDelay):
-    """The input one tick before: y(k) = u(k-1), y(0) = initial."""
+    """A delay of one tick: y(k) = u(k-1), y(0) = initial."""
 
     title: ClassVar[str] = "Unit Delay"
     sign: ClassVar[FaceSign] = Words("z⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine as it was one tick ago, held until the next.",
+        shows="The sine, delayed by one tick and held until the next tick.",
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Memory(OneTickDelay):
-    """The input at the tick before, as Simulink's Memory with a sample time: y(k) = u(k-1), y(0) = initial.
+    """A delay of one tick, like Simulink's Memory with a sample time: y(k) = u(k-1), y(0) = initial.
 
-    Simulink's Memory in a continuous part gives the input one solver step before. What that is depends on
-    the solver, so it has no place here: with the sample time -1 behind continuous signals it is refused.
-    There a Transport Delay says how long ago; a Unit Delay or this block, with a period, says when to look.
+    In a continuous part, Simulink's Memory gives the input at the previous solver step. Its output depends on
+    the solver, so this block does not support it: the sample time -1 with a continuous input is an error. Use
+    a Transport Delay there, or give this block or a Unit Delay a period.
     """
 
     title: ClassVar[str] = "Memory"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sampled sine one tick late: the sample time is that of what feeds it.",
+        shows="The sampled sine, delayed by one tick; the sample time is inherited from the input.",
         parameters={"sample_time": -1.0},
         inputs={"u": made("ZeroOrderHold", sample_time=0.5).by(u=made("SineWave"))},
     )
@@ -110,16 +110,16 @@ class Memory(OneTickDelay):
 
 @dataclass(frozen=True, kw_only=True)
 class Delay(Block):
-    """The input some ticks before: y(k) = u(k - length), y = initial for k < length."""
+    """A delay of a fixed number of ticks: y(k) = u(k - length), y = initial for k < length."""
 
     title: ClassVar[str] = "Delay"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine as it was two ticks ago.",
+        shows="The sine, delayed by two ticks.",
     )
     sampled: ClassVar[bool] = True
 
-    length: int = parameter(2, minimum=1, doc="by how many ticks")
-    initial: float = parameter(0.0, doc="every element of the first outputs")
+    length: int = parameter(2, minimum=1, doc="delay in ticks")
+    initial: float = parameter(0.0, doc="initial output, for each element")
     sample_time: ArrayLike = sample_time_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -141,7 +141,7 @@ class Delay(Block):
         return {"y": ()}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.length, math.prod(inputs["u"])), "the last inputs, the oldest first"),)
+        return (State("x", (self.length, math.prod(inputs["u"])), "the last inputs, oldest first"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["x"][0, :].T}
@@ -158,16 +158,16 @@ class Delay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableDelay(Block):
-    """A delay that starts anew at a trigger: y(k) = u(k - length), or initial where k - length is before it.
+    """A delay with reset: y(k) = u(k - length), or initial where k - length is before it.
 
-    It is Simulink's Delay with its ports. At the tick of a reset y is the initial value, and all that is on
-    its way becomes that value. With ``enable_port`` the block stands still, y held, at ticks at which the
-    input enable is 0.
+    It corresponds to Simulink's Delay with its ports. At the tick of a reset y and all values in the delay
+    buffer become the initial value. With ``enable_port`` the block holds its state and output at ticks at
+    which the input enable is 0.
     """
 
     title: ClassVar[str] = "Resettable Delay"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A sine three ticks late, begun anew from -1 at each rising edge of the pulses.",
+        shows="A sine delayed by three ticks and reset to -1 at each rising edge of the pulses.",
         parameters={"length": 3, "external_reset": "rising", "sample_time": 0.1},
         inputs={
             "u": made("SineWave"),
@@ -177,17 +177,17 @@ class ResettableDelay(Block):
     )
     sampled: ClassVar[bool] = True
 
-    length: int = parameter(2, minimum=1, doc="by how many ticks")
+    length: int = parameter(2, minimum=1, doc="delay in ticks")
     external_reset: str = external_reset_parameter("level")
     initial_condition_source: str = initial_source_parameter("external")
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="the first outputs, and those after a reset, where no port says it"
+        0.0, kind=ParameterKind.ARRAY, doc="the initial output, also after a reset, if no port gives it"
     )
-    enable_port: bool = parameter(False, doc="whether the block works at ticks only at which enable is not 0")
+    enable_port: bool = parameter(False, doc="whether an input enable can stop the block")
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        enable = Port("enable", "not 0 where the block works", shape=())
+        enable = Port("enable", "not 0 while the block is enabled", shape=())
         further = reset_ports(self.external_reset, self.initial_condition_source)
         return (INPUT, *((enable,) if self.enable_port else ()), *further)
 
@@ -206,8 +206,8 @@ class ResettableDelay(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self.output_shapes(inputs)["y"]
-        past = State("x", (self.length, math.prod(shape)), "the last inputs, the oldest first")
-        held = (State("held", shape, "the output at the tick before"),)
+        past = State("x", (self.length, math.prod(shape)), "the last inputs, oldest first")
+        held = (State("held", shape, "the output at the previous tick"),)
         return (past, SEEN, *(held if self.enable_port else ()))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -242,7 +242,7 @@ class ResettableDelay(Block):
         return u.get("initial", p["initial"])
 
     def _anew(self, x: Signals, u: Signals) -> SX:
-        """1 at the first tick where a port says the start value, and where the trigger fires."""
+        """1 at the first tick if a port gives the initial value, and where the trigger fires."""
         first = x["seen"] < 0.0 if self.initial_condition_source == "external" else SX(0.0)
         if self.external_reset == "none":
             return first
@@ -250,7 +250,7 @@ class ResettableDelay(Block):
 
 
 def _a_vector(shape: Shape) -> Shape:
-    """The shape; raises ``InputError`` for a matrix, which a row of the past does not hold."""
+    """The shape; raises ``InputError`` for a matrix, because the delay buffer holds vectors."""
     if len(shape) > 1:
         raise InputError(
             f"'u' has shape {shape}",
@@ -262,26 +262,26 @@ def _a_vector(shape: Shape) -> Shape:
 
 @dataclass(frozen=True, kw_only=True)
 class TappedDelay(Block):
-    """The last inputs in one vector: y(k) = [u(k - length), …, u(k - 1)]."""
+    """A tapped delay, the last inputs in one vector: y(k) = [u(k - length), …, u(k - 1)]."""
 
     title: ClassVar[str] = "Tapped Delay"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The last four samples of the sine, side by side.",
+        shows="The last four samples of the sine in one vector.",
     )
     sampled: ClassVar[bool] = True
 
-    length: int = parameter(4, minimum=1, doc="how many inputs are kept")
-    initial: float = parameter(0.0, doc="every element at the first tick")
+    length: int = parameter(4, minimum=1, doc="number of inputs in the buffer")
+    initial: float = parameter(0.0, doc="initial value of every element")
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is sampled", shape=()),)
+        return (Port("u", "sampled signal", shape=()),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the last inputs, the oldest first", shape=(self.length,)),)
+        return (Port("y", "the last inputs, oldest first", shape=(self.length,)),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.length,), "the last inputs, the oldest first"),)
+        return (State("x", (self.length,), "the last inputs, oldest first"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["x"]}
@@ -298,12 +298,12 @@ class TappedDelay(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroOrderHold(Block):
-    """The input as it was at the last tick: y(t) = u(k T) until the next one."""
+    """A zero-order hold: y(t) = u(k T) from tick k until the next tick."""
 
     title: ClassVar[str] = "Zero-Order Hold"
     sign: ClassVar[FaceSign] = stairs((0.2, 0.7, 1.0, 0.6))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine as it was at the last tick.",
+        shows="The sine at the last tick.",
     )
     sampled: ClassVar[bool] = True
 
@@ -324,14 +324,14 @@ class ZeroOrderHold(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RateTransition(Block):
-    """Hands a signal from one sample time to another: y(t) = u(k T) at the ticks of the receiving clock.
+    """Transfers a signal from one sample time to another: y(t) = u(k T) at the ticks of the receiving clock.
 
-    Where both clocks tick at the same instant, the value of that instant is handed over.
+    Where both clocks tick at the same time, the output is the value of that tick.
     """
 
     title: ClassVar[str] = "Rate Transition"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A signal of ticks every 0.2 s, handed to a part that ticks every second.",
+        shows="A signal with a sample time of 0.2 s, transferred to a part with a sample time of 1 s.",
         inputs={"u": made("ZeroOrderHold", sample_time=0.2).by(u=made("SineWave"))},
     )
     sampled: ClassVar[bool] = True

@@ -1,4 +1,4 @@
-"""Sampled transfer functions of the first order."""
+"""Sampled first-order transfer functions."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from armblocks.diagram.signs import FaceSign, Fraction, minus, value_text
 
 @dataclass(frozen=True, kw_only=True)
 class TransferFunctionFirstOrder(Block):
-    """A sampled lag with a final value of 1: y(k) = pole y(k-1) + (1 - pole) u(k)."""
+    """A sampled first-order lag with unit steady-state gain: y(k) = pole y(k-1) + (1 - pole) u(k)."""
 
     title: ClassVar[str] = "Transfer Fcn First Order"
     spreads: ClassVar[tuple[str, ...]] = ("pole", "initial")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step response: every tick goes a fifth of the way that is left.",
+        shows="The step response: each tick covers a fifth of the remaining distance.",
         parameters={"pole": 0.8},
         inputs={"u": made("Step")},
     )
@@ -53,7 +53,7 @@ class TransferFunctionFirstOrder(Block):
         return (Port("y", "the lagging output"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the output at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the output at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": p["pole"] * x["x"] + (1.0 - p["pole"]) * u["u"]}
@@ -72,7 +72,7 @@ class TransferFunctionFirstOrder(Block):
 class TransferFunctionLeadOrLag(Block):
     """A sampled compensator: y(k) = pole y(k-1) + u(k) - zero u(k-1), which is (z - zero) / (z - pole).
 
-    It leads where zero > pole. At once it passes the input itself, in the end (1 - zero) / (1 - pole) of it.
+    It leads where zero > pole. Its gain is 1 at high frequency and (1 - zero) / (1 - pole) in steady state.
     """
 
     title: ClassVar[str] = "Transfer Fcn Lead or Lag"
@@ -100,7 +100,7 @@ class TransferFunctionLeadOrLag(Block):
         return (Port("y", "the compensated signal"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "pole y - zero u of the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "pole y - zero u of the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": x["x"] + u["u"]}
@@ -138,10 +138,10 @@ class TransferFunctionRealZero(Block):
         return (Port("u", "the input"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the input, its past taken off"),)
+        return (Port("y", "the input minus its share of the previous tick"),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", self.output_shapes(inputs)["y"], "the input at the tick before"),)
+        return (State("x", self.output_shapes(inputs)["y"], "the input at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": u["u"] - p["zero"] * x["x"]}

@@ -44,7 +44,7 @@ from armblocks.diagram.signs import FaceSign, Lines, Words
 
 @dataclass(frozen=True, kw_only=True)
 class SampledPidBlock(Block):
-    """What sampled PID controllers have in common: all but what the actions work on."""
+    """Base class of the sampled PID controllers; subclasses define the errors of the three actions."""
 
     P: ArrayLike = gain_parameter(1.0, "proportional gain")
     I: ArrayLike = gain_parameter(1.0, "integral gain", "1/s")  # noqa: E741
@@ -54,23 +54,23 @@ class SampledPidBlock(Block):
     upper: ArrayLike = upper_limit_parameter()
     anti_windup: str = anti_windup_parameter()
     Kb: ArrayLike = gain_parameter(1.0, "back-calculation gain", "1/s")
-    initial_integral: ArrayLike = gain_parameter(0.0, "integral action at the start")
-    initial_filter: ArrayLike = gain_parameter(0.0, "filter state at the start")
+    initial_integral: ArrayLike = gain_parameter(0.0, "initial integral action")
+    initial_filter: ArrayLike = gain_parameter(0.0, "initial filter state")
     form: str = form_parameter()
     external_reset: str = external_reset_parameter()
     tracking: bool = tracking_parameter()
     Kt: ArrayLike = gain_parameter(1.0, "tracking gain", "1/s")
-    integrator_method: str = method_parameter("rule of the integral")
-    filter_method: str = method_parameter("rule of the filter")
+    integrator_method: str = method_parameter("integration rule of the integral")
+    filter_method: str = method_parameter("integration rule of the filter")
     sample_time: ArrayLike = sample_time_parameter()
 
     def check(self) -> None:
         check_limits(self, limited=True)
 
     def further_ports(self) -> tuple[Port, ...]:
-        """The inputs that parameters ask for."""
+        """The inputs that the parameters enable."""
         reset = (Port("reset", "the trigger", shape=()),) if self.external_reset != "none" else ()
-        tracking = (Port("tracking", "what the output shall be close to"),) if self.tracking else ()
+        tracking = (Port("tracking", "signal that the output should track"),) if self.tracking else ()
         return (*reset, *tracking)
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -93,7 +93,7 @@ class SampledPidBlock(Block):
 
     @abstractmethod
     def errors(self, u: Signals, p: Signals) -> Errors:
-        """What each of the three actions works on."""
+        """The error that each of the three actions acts on."""
 
     @property
     def _law(self) -> SampledPid:
@@ -110,11 +110,11 @@ class SampledPidBlock(Block):
 class DiscretePID(SampledPidBlock):
     """Sampled PID: y = limit(P u + i + N (D u - f)), i(k+1) = i + T I u, f(k+1) = f + T N (D u - f).
 
-    That is Simulink's Discrete PID Controller with forward Euler rules; ``backward_euler`` and
-    ``trapezoidal`` are its other two, for the integral and the filter each. Where the output is limited,
-    ``clamping`` stops the integral while it would drive the output further out, and ``back_calculation``
-    adds T Kb (y - unlimited y) to it. ``tracking`` adds T Kt (tracking - y). A reset happens at the tick
-    that finds the trigger on the other side of zero.
+    This is Simulink's Discrete PID Controller with forward Euler rules. The integral and the filter may each
+    use ``backward_euler`` or ``trapezoidal`` instead. Where the output is limited, ``clamping`` stops the
+    integral while it would drive the output further beyond the limit, and ``back_calculation`` adds T Kb (y -
+    unlimited y) to it. ``tracking`` adds T Kt (tracking - y). A reset happens at the first tick after the
+    trigger has crossed zero.
     """
 
     title: ClassVar[str] = "Discrete PID Controller"
@@ -133,8 +133,8 @@ class DiscretePID(SampledPidBlock):
 class DiscretePID2DOF(SampledPidBlock):
     """Sampled PID with two degrees of freedom: P acts on b r - u, I on r - u, D on c r - u.
 
-    The weights b and c let a step of the reference r pass softly while disturbances are still fought hard.
-    Rules, forms, limits, reset and tracking are those of the Discrete PID Controller.
+    With set-point weights b, c < 1 the response to a step of r is softer; the response to disturbances is
+    unchanged. Rules, forms, limits, reset and tracking are those of the Discrete PID Controller.
     """
 
     title: ClassVar[str] = "Discrete PID Controller (2DOF)"

@@ -24,14 +24,13 @@ from armblocks.diagram.signs import FaceSign, Lines
 class DiscreteStateSpace(LinearBlock):
     """A linear sampled system: x(k+1) = A x(k) + B u(k), y(k) = C x(k) + D u(k), x(0) = initial.
 
-    D belongs to the structure (it is not tunable), so that a zero in it leaves the output free of the input
-    and the block may stand in a loop.
+    D is not tunable: where D is zero the output has no feedthrough, and the block may close a loop.
     """
 
     title: ClassVar[str] = "Discrete State-Space"
     sign: ClassVar[FaceSign] = Lines(("x⁺ = A x + B u", "y = C x + D u"))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step response of x(k+1) = 0.5 x + u: it goes to 2, half of the way with every tick.",
+        shows="The step response of x(k+1) = 0.5 x + u: each tick halves the distance to 2.",
         inputs={"u": made("Step")},
     )
     sampled: ClassVar[bool] = True

@@ -1,4 +1,4 @@
-"""Sampled transfer functions and filters by their coefficients.
+"""Sampled transfer functions and filters from their coefficients.
 
 In their equations k counts the ticks and T is the period of the clock.
 """
@@ -31,14 +31,14 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteTransferFunction(RationalBlock):
-    """A rational transfer function in z: y = (b0 z^m + … + bm) / (a0 z^n + … + an) u, at rest at the start.
+    """A rational transfer function in z: y = (b0 z^m + … + bm) / (a0 z^n + … + an) u, initially at rest.
 
-    Coefficients stand from the highest power of z to the lowest, as in MATLAB.
+    Coefficients are listed from the highest power of z to the lowest, as in MATLAB.
     """
 
     title: ClassVar[str] = "Discrete Transfer Fcn"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step response of z / (z - 0.5): each tick halves the way to 2.",
+        shows="The step response of z / (z - 0.5): each tick halves the distance to 2.",
         parameters={"numerator": (1.0, 0.0), "denominator": (1.0, -0.5)},
         inputs={"u": made("Step")},
     )
@@ -51,7 +51,7 @@ class DiscreteTransferFunction(RationalBlock):
         return Fraction(polynomial("b", self.numerator, "z"), polynomial("a", self.denominator, "z"))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.degree,), "u / denominator at the last ticks"),)
+        return (State("x", (self.degree,), "u filtered by 1/denominator, at the last ticks"),)
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return self._shifted(x, u, p)
@@ -59,18 +59,18 @@ class DiscreteTransferFunction(RationalBlock):
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteFilter(RationalBlock):
-    """A digital filter: y = (b0 + b1 z^-1 + … + bm z^-m) / (a0 + … + an z^-n) u, at rest at the start."""
+    """A digital filter: y = (b0 + b1 z^-1 + … + bm z^-m) / (a0 + … + an z^-n) u, initially at rest."""
 
     title: ClassVar[str] = "Discrete Filter"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A low-pass: pulses come out smoothed.",
+        shows="A low-pass filter smooths pulses.",
         parameters={"numerator": (0.2,), "denominator": (1.0, -0.8), "sample_time": 0.1},
         inputs={"u": made("PulseGenerator", period=4.0)},
     )
     sampled: ClassVar[bool] = True
 
-    numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, rising powers of 1/z")
-    denominator: ArrayLike = parameter((1.0, 0.5), dimensions=(1,), doc="a0 … an, rising powers of 1/z")
+    numerator: ArrayLike = parameter((1.0,), dimensions=(1,), doc="b0 … bm, ascending powers of 1/z")
+    denominator: ArrayLike = parameter((1.0, 0.5), dimensions=(1,), doc="a0 … an, ascending powers of 1/z")
     sample_time: ArrayLike = sample_time_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -85,22 +85,22 @@ class DiscreteFilter(RationalBlock):
             raise InputError(
                 f"the denominator is {a.tolist()}",
                 where=self.type_name(),
-                allowed="a0 not zero, and two coefficients in one of both",
-                fix="use a Gain where nothing is remembered",
+                allowed="a0 not zero, and at least two coefficients in the numerator or the denominator",
+                fix="use a Gain for a filter without memory",
             )
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the filtered input", shape=()),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (self.degree,), "u / denominator at the last ticks"),)
+        return (State("x", (self.degree,), "u filtered by 1/denominator, at the last ticks"),)
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return self._shifted(x, u, p)
 
     @property
     def degree(self) -> int:
-        """How many states there are."""
+        """Number of states."""
         return max(shape_of(self.numerator)[0], shape_of(self.denominator)[0]) - 1
 
     def _coefficients(self, p: Signals) -> tuple[SX, SX]:
@@ -113,11 +113,11 @@ class DiscreteFilter(RationalBlock):
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteFir(Block):
-    """A filter with finite memory: y(k) = b0 u(k) + b1 u(k-1) + … + bm u(k-m)."""
+    """A filter with finite impulse response: y(k) = b0 u(k) + b1 u(k-1) + … + bm u(k-m)."""
 
     title: ClassVar[str] = "Discrete FIR Filter"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The mean of the last four samples of pulses: edges become slopes.",
+        shows="The mean of the last four samples of pulses: edges become ramps.",
         parameters={"coefficients": (0.25, 0.25, 0.25, 0.25), "sample_time": 0.2},
         inputs={"u": made("PulseGenerator", period=4.0)},
     )
@@ -135,7 +135,7 @@ class DiscreteFir(Block):
                 "there is one coefficient",
                 where="DiscreteFir.coefficients",
                 allowed="two or more",
-                fix="use a Gain where nothing is remembered",
+                fix="use a Gain for a filter without memory",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -145,7 +145,7 @@ class DiscreteFir(Block):
         return (Port("y", "the filtered input", shape=()),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("x", (shape_of(self.coefficients)[0] - 1,), "the last inputs, the newest first"),)
+        return (State("x", (shape_of(self.coefficients)[0] - 1,), "the last inputs, newest first"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": dot(p["coefficients"], vertcat(u["u"], x["x"]))}

@@ -1,4 +1,4 @@
-"""A delay of a number of ticks that is a signal."""
+"""A delay in ticks that is given by a signal."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class VariableIntegerDelay(Block):
-    """The input a given count of ticks before: y(k) = u(k - d(k)), ``initial`` where nothing is that old.
+    """A delay by a variable number of ticks: y(k) = u(k - d(k)), and ``initial`` where k < d(k).
 
-    The delay d is cut down to an integer and held between 0 and ``longest``.
+    The delay d is truncated to an integer and limited to the range 0 to ``longest``.
     """
 
     title: ClassVar[str] = "Variable Integer Delay"
@@ -40,11 +40,11 @@ class VariableIntegerDelay(Block):
     )
 
     longest: int = parameter(10, minimum=1, doc="the longest delay, in ticks")
-    initial: float = parameter(0.0, doc="every element of the inputs before the first tick")
+    initial: float = parameter(0.0, doc="the input before the first tick, for each element")
     sample_time: ArrayLike = sample_time_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is delayed"), Port("d", "by how many ticks", shape=()))
+        return (Port("u", "signal to delay"), Port("d", "delay in ticks", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the delayed signal"),)
@@ -60,7 +60,7 @@ class VariableIntegerDelay(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         width = inputs["u"][0] if inputs["u"] else 1
-        return (State("past", (self.longest, width), "the last inputs, the latest first"),)
+        return (State("past", (self.longest, width), "the last inputs, newest first"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ticks = fmin(fmax(floor(u["d"]), 0.0), float(self.longest))

@@ -1,4 +1,4 @@
-"""Sampled systems by zeros, poles and gain; digital filters."""
+"""Sampled systems from zeros, poles and gain; digital filters."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ from armblocks.diagram.signs import BANDS, FaceSign, ratio_of_roots
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteZeroPole(SectionsByRoots):
-    """A sampled system by its roots: y = gain (z - z1) … (z - zm) / ((z - p1) … (z - pn)) u, m <= n.
+    """A sampled transfer function: y = gain (z - z1) … (z - zm) / ((z - p1) … (z - pn)) u, m <= n.
 
     Complex zeros and poles come in conjugate pairs, as complex numbers in Python and as rows (real,
-    imaginary) in files. At rest at the start.
+    imaginary) in files. Initially at rest.
     """
 
     title: ClassVar[str] = "Discrete Zero-Pole"
@@ -75,15 +75,16 @@ class DiscreteZeroPole(SectionsByRoots):
 
 @dataclass(frozen=True, kw_only=True)
 class DigitalFilter(Block):
-    """A sampled filter by order and edge: the analog one under the transformation z = (1 + s) / (1 - s).
+    """A digital filter: the analog filter under the bilinear transformation z = (1 + s) / (1 - s).
 
-    Edges are shares of half the sampling frequency, as in MATLAB and SciPy (``butter(order, edge)``).
+    Edge frequencies are fractions of half the sampling frequency, as in MATLAB and SciPy (``butter(order,
+    edge)``).
     """
 
     title: ClassVar[str] = "Digital Filter Design"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A noisy sine, sampled every 0.02 s, behind a low pass of 2 Hz.",
+        shows="A noisy sine, sampled every 0.02 s, after a low-pass filter with its edge at 2 Hz.",
         parameters={"order": 3, "edge": 0.08, "sample_time": 0.02},
         inputs={
             "u": made("Sum").by(
@@ -94,15 +95,21 @@ class DigitalFilter(Block):
 
     design: str = parameter("butterworth", choices=FILTER_DESIGNS, doc="the kind of filter")
     filter_type: str = parameter("low_pass", choices=FILTER_TYPES, doc="what passes")
-    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low pass behind it")
+    order: int = parameter(2, minimum=1, maximum=20, doc="order of the low-pass prototype")
     edge: float = parameter(
-        0.2, above=0.0, maximum=0.9999, tunable=False, doc="the edge, of bands the lower; 1 is 1 / (2 T)"
+        0.2,
+        above=0.0,
+        maximum=0.9999,
+        tunable=False,
+        doc="edge frequency (of a band, the lower one); 1 is 1 / (2 T)",
     )
     upper_edge: float = parameter(
-        0.4, above=0.0, maximum=0.9999, tunable=False, doc="the upper edge of a band, above the lower"
+        0.4, above=0.0, maximum=0.9999, tunable=False, doc="upper edge frequency of a band"
     )
-    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="in the pass band (chebyshev1), dB")
-    attenuation: float = parameter(40.0, above=0.0, tunable=False, doc="in the stop band (chebyshev2), dB")
+    ripple: float = parameter(1.0, above=0.0, tunable=False, doc="ripple in the pass band (chebyshev1), dB")
+    attenuation: float = parameter(
+        40.0, above=0.0, tunable=False, doc="attenuation in the stop band (chebyshev2), dB"
+    )
     sample_time: ArrayLike = sample_time_parameter()
 
     def face_sign(self) -> FaceSign:

@@ -1,1 +1,1 @@
-"""Blocks whose equation the user writes: expressions and Python functions."""
+"""Blocks with user-written equations: expressions and Python functions."""

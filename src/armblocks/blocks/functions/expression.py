@@ -1,4 +1,4 @@
-"""A block that calculates what its user writes."""
+"""A block that evaluates a user-written formula."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from armblocks.errors import InputError, UnknownNameError
 
 @dataclass(frozen=True, kw_only=True)
 class Expression(Block):
-    """What a formula says, such as sin(u[1]) * k: y = formula(u, t, constants), compiled like any block.
+    """The value of a formula such as sin(u[1]) * k: y = formula(u, t, constants), compiled like any block.
 
-    In the formula stand the inputs ``u`` (or ``u1``, ``u2``, … where there are several), their elements
-    ``u[1]``, ``u[2]``, … counted from 1, the time ``t``, ``pi``, ``e``, and the constants that ``names``
-    lists and ``values`` gives, which stay tunable. Operators are + - * / ^, comparisons and && || !.
-    Functions are the usual ones, such as atan2, min, hypot, and ``if(condition, yes, no)``. Whole vectors are
-    worked on element by element.
+    A formula may contain the input ``u`` (or ``u1``, ``u2``, … for several inputs), elements ``u[1]``,
+    ``u[2]``, … with indices from 1, the time ``t``, ``pi``, ``e``, and tunable constants, whose names are in
+    ``names`` and whose values are in ``values``. Operators are + - * / ^, comparisons and && || !. Functions
+    are the common ones, such as atan2, min, hypot, and ``if(condition, yes, no)``. Vectors are evaluated
+    element by element.
     """
 
     title: ClassVar[str] = "Fcn"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A formula of the input: a decaying swing, over a straight rise.",
+        shows="A decaying oscillation as a formula of the input, plotted over a ramp.",
         parameters={"formula": "sin(3 * u) * exp(-k * u)", "names": "k", "values": (0.3,)},
         inputs={"u": made("Ramp")},
         shown=("y",),
     )
 
-    formula: str = parameter("u", doc="what comes out")
-    inputs: int = parameter(1, minimum=0, maximum=100, doc="how many inputs")
+    formula: str = parameter("u", doc="the formula")
+    inputs: int = parameter(1, minimum=0, maximum=100, doc="number of inputs")
     names: str = parameter("", doc="names of constants, such as k, offset")
     values: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="their values, in order"
+        0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="values of the constants, in the same order"
     )
 
     def face_sign(self) -> FaceSign:
@@ -64,7 +64,7 @@ class Expression(Block):
             raise InputError(
                 f"'{wrong[0]}' cannot be the name of a constant",
                 where="Expression.names",
-                allowed="names made of letters, digits and _, each once, that mean nothing else in formulas",
+                allowed="unique names of letters, digits and _ that have no other meaning in formulas",
                 fix="choose another name",
             )
         if names and math.prod(shape_of(self.values)) != len(names):
@@ -72,7 +72,7 @@ class Expression(Block):
                 f"there are {len(names)} names and {math.prod(shape_of(self.values))} values",
                 where="Expression",
                 allowed="one value for each name",
-                fix="correct names or values",
+                fix="correct the names or the values",
             )
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -1,4 +1,4 @@
-"""Blocks that are Python functions: traced with symbols and compiled like any other, or called at ticks."""
+"""Blocks that evaluate Python functions: traced and compiled like any block, or called at ticks."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from armblocks.errors import ArmblocksError, InputError
 
 
 def unchanged(u: object) -> object:
-    """What comes in, comes out: the function of a block that was given none."""
+    """The identity: the default function of a new block."""
     return u
 
 
 @dataclass(frozen=True, kw_only=True)
 class PythonFunction(Block):
-    """What a Python function gives: y = function(its inputs, t).
+    """The value of a Python function: y = function(its inputs, t).
 
-    Every argument without a default is an input of its name, but ``t``, which is the time (s). A scalar
-    arrives as a symbol, a vector or matrix as a NumPy array of symbols, on which arithmetic, indices, ``@``
-    and NumPy's functions work; the function runs once, when the diagram is traced, and its equations are
-    compiled and differentiated like those of any block. It may not decide by values (``if u > 0``), as they
-    are not known then: ``casadi.if_else``, ``fmin``, ``fmax`` and ``fabs`` do that in the equations. It must
-    depend on its arguments alone. With several ``results`` it returns as many.
+    Every argument without a default is an input of that name, except ``t``, the time (s). A scalar input
+    is a symbol; a vector or matrix is a NumPy array of symbols, which supports arithmetic, indices, ``@`` and
+    NumPy's functions. The function runs once, when the diagram is traced, and its equations are compiled and
+    differentiated like those of any block. The values of the inputs are not known at that time, so the
+    function cannot branch on them (``if u > 0``): use ``casadi.if_else``, ``fmin``, ``fmax`` and ``fabs``.
+    The function must depend on its arguments alone. It returns one value for each name in ``results``.
 
-    A diagram's file keeps ``file.py:name`` and runs no code unless it is trusted.
+    The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted.
     """
 
     title: ClassVar[str] = "Python Function"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The function that every new block has: what comes in, comes out."
+        shows="The default function of a new block: the identity."
     )
 
     function: Any = parameter(
@@ -84,7 +84,7 @@ class PythonFunction(Block):
         return {name: _symbols(value) for name, value in self._called(t, u, shapes).items()}
 
     def _called(self, t: SX, u: Signals, shapes: Shapes) -> Mapping[str, Any]:
-        """What the function gives for symbols."""
+        """The results of the function for symbolic arguments."""
         user = cast("UserFunction", self.function)
         given = {name: _array(value, shapes[name]) for name, value in u.items()}
         if "t" in user.arguments:
@@ -93,7 +93,7 @@ class PythonFunction(Block):
         where = f"the function {user.name}"
         try:
             with warnings.catch_warnings():
-                # CasADi announces other types for numbers; symbols stay symbols
+                # CasADi's annotations include numbers; symbols stay symbols
                 warnings.simplefilter("ignore", FutureWarning)
                 returned: Any = user.function(**given)
             values = [returned] if len(names) == 1 else list(returned)
@@ -105,9 +105,9 @@ class PythonFunction(Block):
         except Exception as error:
             raise InputError(
                 f"{where} cannot be traced: {type(error).__name__}: {error}"[:400],
-                allowed="arithmetic, NumPy's functions, and casadi.if_else, fmin, fmax where values decide",
+                allowed="arithmetic, NumPy's functions, and casadi.if_else, fmin, fmax in place of branches",
                 fix="replace 'if' by casadi.if_else, max by casadi.fmax, and functions of other libraries; "
-                "or take a CalledPythonFunction, which runs at its ticks",
+                "or use a CalledPythonFunction, which runs at its ticks",
             ) from error
         if len(found) != len(names):
             raise InputError(
@@ -120,23 +120,23 @@ class PythonFunction(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CalledPythonFunction(Block):
-    """What a Python function gives at each tick: y(k) = function(its inputs at the tick, t), held in between.
+    """The value of a Python function at each tick: y(k) = function(inputs at the tick, t), held in between.
 
-    For what no equations can say: a controller of another library, a decision, a table that is searched. The
-    run halts at each tick and calls the function with numbers and NumPy arrays; its report says how often,
-    and which part of the run that took. What ticks at the same instant sees the new values. The function may
-    keep things of its own, which are then no states of the diagram: a saved state and a second run do not
-    know of them. Where it can be traced, a Python Function is faster by far, works in continuous time and can
-    be linearised.
+    It is for functions that cannot be traced: a controller of another library, branches, a search in a table.
+    The run stops at each tick and calls the function with numbers and NumPy arrays. The report of the run
+    gives the number of calls and their share of the computing time. Blocks that tick at the same time use the
+    new values. The function may store data between calls, but these data are not states of the diagram: they
+    are neither saved with a state nor reset before another run. A function that can be traced should be a
+    Python Function: it is much faster, works in continuous time and can be linearised.
 
-    A diagram's file keeps ``file.py:name`` and runs no code unless it is trusted.
+    The file of a diagram stores ``file.py:name`` and runs no code unless it is trusted.
     """
 
     title: ClassVar[str] = "Python Function (called)"
     sampled: ClassVar[bool] = True
     called: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The function that every new block has, called every half second: what comes in, comes out.",
+        shows="The default function of a new block, the identity, called every 0.5 s.",
         parameters={"sample_time": 0.5},
     )
 
@@ -147,7 +147,7 @@ class CalledPythonFunction(Block):
         doc="the function, such as def law(u, t)",
     )
     results: str = parameter("y", doc="names of the outputs, such as tau, power")
-    shapes: str = parameter("", doc="shapes of the outputs, such as 3, 2x2, 1; numbers where nothing is said")
+    shapes: str = parameter("", doc="shapes of the outputs, such as 3, 2x2, 1; empty: all are scalars")
     sample_time: ArrayLike = sample_time_parameter(0.1)
 
     def check(self) -> None:
@@ -158,7 +158,7 @@ class CalledPythonFunction(Block):
             raise InputError(
                 f"the shapes are '{self.shapes}' for the results {', '.join(names)}",
                 where="CalledPythonFunction.shapes",
-                allowed="one for each result: 1 for a number, 3 for a vector of three, 2x2 for a matrix",
+                allowed="one for each result: 1 for a scalar, 3 for a vector of length 3, 2x2 for a matrix",
                 fix="give as many shapes as results",
             )
 
@@ -176,13 +176,13 @@ class CalledPythonFunction(Block):
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         taken = (State(f"{name}?", shape, f"{name} at the tick") for name, shape in inputs.items())
         given = (
-            State(f"{port.name}?", port.shape or (), f"what the function gave for {port.name}")
+            State(f"{port.name}?", port.shape or (), f"result of the function for {port.name}")
             for port in self.output_ports()
         )
         return (*taken, *given)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # The values follow from the inputs, though not by an equation: the order of a tick has to know.
+        # The outputs depend on the inputs without an equation; the order of the tick must include this.
         all_inputs = sum((sum1(sum2(value)) for value in u.values()), SX(0.0))
         given = {port.name: x[f"{port.name}?"] for port in self.output_ports()}
         return {name: if_else(all_inputs > 0.0, value, value) for name, value in given.items()}
@@ -205,7 +205,7 @@ class CalledPythonFunction(Block):
         except Exception as error:
             raise InputError(
                 f"the function {user.name} failed: {type(error).__name__}: {error}"[:400],
-                allowed="a function that takes numbers and arrays and returns such",
+                allowed="a function that takes and returns numbers and arrays",
                 fix="correct the function",
             ) from error
         if len(values) != len(names):
@@ -236,13 +236,13 @@ def _check_results(block: Block, names: list[str]) -> None:
         raise InputError(
             f"the results are '{block.parameter_value('results')}'",
             where=f"{block.type_name()}.results",
-            allowed="names made of letters, digits and _, each once, that no argument has",
+            allowed="unique names of letters, digits and _ that are not argument names",
             fix="choose other names",
         )
 
 
 def _array(value: SX, shape: Shape) -> Any:
-    """A symbol as the user's function gets it."""
+    """A symbol as the user's function receives it."""
     if not shape:
         return value
     found = np.empty(shape, dtype=object)
@@ -262,7 +262,7 @@ def _shape(value: Any) -> Shape:
 
 
 def _symbols(value: Any) -> SX:
-    """What the user's function gave, in its natural shape."""
+    """The result of the user's function, in its natural shape."""
     if isinstance(value, SX):
         return value
     entries = SX.zeros(value.size)

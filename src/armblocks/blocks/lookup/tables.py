@@ -1,4 +1,4 @@
-"""Lookup tables. Break points are fixed, entries are tunable; signals are looked up element by element."""
+"""Lookup tables. Break points are constant, entries are tunable; inputs are looked up element by element."""
 
 from __future__ import annotations
 
@@ -34,24 +34,25 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class LookupTable1D(BlockWithAxes):
-    """A curve through given points: y = table(u), between them by the method chosen.
+    """A curve through given points: y = table(u), interpolated by the chosen method.
 
-    ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``); ``flat`` takes the entry at or below
-    u, ``nearest`` the nearest. Beyond the ends ``clip`` holds the last value, ``linear`` goes straight on.
+    ``cubic`` is the spline with not-a-knot ends (MATLAB's ``spline``); ``flat`` uses the entry at or below u,
+    ``nearest`` the nearest entry. Beyond the ends ``clip`` holds the last value and ``linear`` extrapolates
+    along the tangent.
     """
 
     title: ClassVar[str] = "1-D Lookup Table"
     sign: ClassVar[FaceSign] = TABLE
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A curve through five points: straight between them, held beyond the ends.",
+        shows="A curve through five points: linear interpolation, held beyond the ends.",
         parameters={"positions": (1.0, 3.0, 5.0, 6.0, 8.0), "table": (0.0, 2.0, 1.0, 1.5, 0.0)},
         inputs={"u": made("Ramp")},
     )
 
     positions: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions (n,)")
-    table: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), doc="values there (n,)")
-    method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
-    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    table: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), doc="values at the positions (n,)")
+    method: str = parameter("linear", choices=METHODS, doc="interpolation method")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="extrapolation method")
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
@@ -83,7 +84,7 @@ class LookupTable2D(BlockWithAxes):
     title: ClassVar[str] = "2-D Lookup Table"
     sign: ClassVar[FaceSign] = Words("T(u₁, u₂)")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The table is crossed along its first axis while the second swings.",
+        shows="The first input crosses the table while the second input oscillates.",
         parameters={
             "positions1": (0.0, 5.0, 10.0),
             "positions2": (-1.0, 1.0),
@@ -92,11 +93,15 @@ class LookupTable2D(BlockWithAxes):
         inputs={"u1": made("Ramp"), "u2": made("SineWave", frequency=2.0)},
     )
 
-    positions1: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="positions of rows")
-    positions2: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="and of columns")
+    positions1: ArrayLike = parameter(
+        (0.0, 1.0), dimensions=(1,), tunable=False, doc="break points of the rows"
+    )
+    positions2: ArrayLike = parameter(
+        (0.0, 1.0), dimensions=(1,), tunable=False, doc="break points of the columns"
+    )
     table: ArrayLike = parameter(((0.0, 1.0), (1.0, 2.0)), dimensions=(2,), doc="values (rows, columns)")
-    method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
-    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    method: str = parameter("linear", choices=METHODS, doc="interpolation method")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="extrapolation method")
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
@@ -143,11 +148,14 @@ class LookupTableND(BlockWithAxes):
     )
 
     positions: ArrayLike = parameter(
-        (0.0, 1.0, 0.0, 1.0), dimensions=(1,), tunable=False, doc="positions, axis after axis, rising in each"
+        (0.0, 1.0, 0.0, 1.0),
+        dimensions=(1,),
+        tunable=False,
+        doc="positions, axis after axis, ascending in each",
     )
     table: ArrayLike = parameter(((0.0, 1.0), (1.0, 2.0)), dimensions=(1, 2, 3, 4), doc="values")
-    method: str = parameter("linear", choices=METHODS, doc="what to do between the points")
-    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="what to do beyond the ends")
+    method: str = parameter("linear", choices=METHODS, doc="interpolation method")
+    extrapolation: str = parameter("clip", choices=EXTRAPOLATIONS, doc="extrapolation method")
     zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
@@ -157,7 +165,7 @@ class LookupTableND(BlockWithAxes):
                 f"there are {count} break points for a table of shape {shape}",
                 where="LookupTableND",
                 allowed=f"{sum(shape)}: {' + '.join(map(str, shape))}",
-                fix="give the positions of every axis, one axis after the other",
+                fix="list the positions of all axes, axis after axis",
             )
         for k, along in enumerate(self._along().values(), 1):
             rising("LookupTableND", f"axis {k} of positions", along, shape[k - 1])
@@ -182,7 +190,7 @@ class LookupTableND(BlockWithAxes):
         return {port: p["positions"][part] for port, part in self._parts().items()}
 
     def _parts(self) -> dict[str, slice]:
-        """Where the positions along each input stand."""
+        """The slice of the positions for each input."""
         ends = np.cumsum(shape_of(self.table)).tolist()
         ports = (port.name for port in self.input_ports())
         return {port: slice(start, end) for port, start, end in zip(ports, [0, *ends], ends)}
@@ -190,16 +198,17 @@ class LookupTableND(BlockWithAxes):
 
 @dataclass(frozen=True, kw_only=True)
 class LookupTableDynamic(Block):
-    """A curve whose points are signals: y = table(u), straight between them, held beyond the ends.
+    """A curve whose points are signals: y = table(u), linear between the points, held beyond the ends.
 
-    The positions must rise at every instant; where two of them are equal the value is not finite.
+    The positions must be strictly ascending at all times; where two of them are equal the output is not
+    finite.
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Lookup Table Dynamic"
     sign: ClassVar[FaceSign] = TABLE
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A curve whose values grow while it is read.",
+        shows="A curve whose values grow during the run.",
         inputs={
             "u": made("SineWave", bias=1.0),
             "positions": made("Constant", value=(0.0, 1.0, 2.0)),
@@ -212,9 +221,9 @@ class LookupTableDynamic(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("u", "where to look"),
-            Port("positions", "positions (n,), rising"),
-            Port("values", "values there (n,)"),
+            Port("u", "position"),
+            Port("positions", "positions (n,), ascending"),
+            Port("values", "values at the positions (n,)"),
         )
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -252,7 +261,7 @@ class LookupTableDynamic(Block):
         return self._axes(u["positions"]).resets(x, u, e)
 
     def _axes(self, positions: SX | int) -> Axes:
-        """The axis of positions that are signals; where only its borders are counted, any that rise."""
+        """The axis of positions that are signals; for counting borders only, any ascending positions."""
         whole = isinstance(positions, int)
         points = range(positions) if whole else (positions[k] for k in range(positions.numel()))
         return Axes({"u": axis([*points], "linear", "clip")}, self.zero_crossing)

@@ -1,1 +1,1 @@
-"""Blocks that calculate outputs from inputs of the same time."""
+"""Blocks without memory: outputs are functions of the present inputs."""

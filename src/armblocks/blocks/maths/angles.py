@@ -36,7 +36,7 @@ from armblocks.diagram.signs import FaceSign, Words
 
 @dataclass(frozen=True, kw_only=True)
 class DegreesToRadians(Block):
-    """An angle in degrees told in radians: y = u pi / 180."""
+    """Converts an angle from degrees to radians: y = u pi / 180."""
 
     title: ClassVar[str] = "Degrees to Radians"
     sign: ClassVar[FaceSign] = Words("° → rad")
@@ -58,7 +58,7 @@ class DegreesToRadians(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RadiansToDegrees(Block):
-    """An angle in radians told in degrees: y = u 180 / pi."""
+    """Converts an angle from radians to degrees: y = u 180 / pi."""
 
     title: ClassVar[str] = "Radians to Degrees"
     sign: ClassVar[FaceSign] = Words("rad → °")
@@ -86,8 +86,8 @@ class CartesianToPolar(Block):
     sign: ClassVar[FaceSign] = Words("xy→rθ")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which "
-            "wraps at pi."
+            "A point on an ellipse with the half axes 2 and 1: its distance, and its angle, which wraps at "
+            "pi."
         ),
         inputs={"x": made("SineWave", amplitude=2.0, phase=pi / 2), "y": made("SineWave")},
     )
@@ -115,7 +115,7 @@ class PolarToCartesian(Block):
     title: ClassVar[str] = "Polar to Cartesian"
     sign: ClassVar[FaceSign] = Words("rθ→xy")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Distance and angle grow evenly: the point runs along a spiral of Archimedes.",
+        shows="Distance and angle grow linearly: the point moves along an Archimedean spiral.",
         inputs={
             "r": made("Ramp", slope=0.1).named("distance"),
             "angle": made("Ramp", slope=2.0).named("angle"),
@@ -142,19 +142,19 @@ class PolarToCartesian(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class AngleDifference(Block):
-    """The difference of two angles the short way round: y = mod(a - b + pi, 2 pi) - pi, from -pi up to pi."""
+    """The wrapped difference of two angles: y = mod(a - b + pi, 2 pi) - pi, with -pi <= y < pi."""
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "angdiff"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="How far an angle that grows evenly is from 1 rad, the shorter way around.",
+        shows="The wrapped difference between a linearly growing angle and 1 rad.",
         inputs={"a": made("Ramp"), "b": made("Constant")},
     )
 
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("a", "one angle", "rad"), Port("b", "the angle that is taken away", "rad"))
+        return (Port("a", "one angle", "rad"), Port("b", "the angle to subtract", "rad"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "a - b, at least -pi and below pi", "rad"),)

@@ -1,4 +1,4 @@
-"""Elementwise arithmetic: every element of the output follows from the elements of the inputs beside it."""
+"""Elementwise arithmetic: each output element depends on the input elements with the same index."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Abs(Block):
     title: ClassVar[str] = "Abs"
     sign: ClassVar[FaceSign] = Words("|u|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The lower half of the sine, turned up.",
+        shows="The absolute value of a sine.",
     )
 
     zero_crossing: bool = zero_crossing_parameter()
@@ -80,7 +80,7 @@ class Bias(Block):
         parameters={"bias": 1.0},
     )
 
-    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="constant to add")
 
     def face_sign(self) -> FaceSign:
         return Words(f"u {plus(self.bias)}")
@@ -105,7 +105,7 @@ class UnaryMinus(Block):
     title: ClassVar[str] = "Unary Minus"
     sign: ClassVar[FaceSign] = Words("−u")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine, upside down.",
+        shows="The negated sine.",
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -154,12 +154,12 @@ class Sign(Block):
 class Sqrt(Block):
     """A square root of every element: y = sqrt(u), sign(u) sqrt(abs(u)) or 1 / sqrt(u).
 
-    Of a negative number ``sqrt`` and ``rSqrt`` are not a number.
+    ``sqrt`` and ``rSqrt`` of a negative number are NaN.
     """
 
     title: ClassVar[str] = "Sqrt"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The root of a straight rise.", inputs={"u": made("Ramp")}
+        shows="The square root of a ramp.", inputs={"u": made("Ramp")}
     )
 
     function: str = parameter("sqrt", choices=tuple(_ROOTS), doc="root, signed root or reciprocal root")
@@ -179,7 +179,7 @@ class Sqrt(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Hypot(Block):
-    """The hypotenuse, element by element: y = sqrt(u^2 + v^2), without overflow on the way."""
+    """The hypotenuse, element by element: y = sqrt(u^2 + v^2), without intermediate overflow."""
 
     title: ClassVar[str] = "Hypot"
     sign: ClassVar[FaceSign] = Words("√(u²+v²)")
@@ -205,7 +205,7 @@ class Hypot(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Divide(Block):
-    """One input by the other, element by element: y = dividend / divisor."""
+    """The quotient of two inputs, element by element: y = dividend / divisor."""
 
     title: ClassVar[str] = "Divide"
     sign: ClassVar[FaceSign] = Words("÷")
@@ -215,7 +215,7 @@ class Divide(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("dividend", "what is divided"), Port("divisor", "by what"))
+        return (Port("dividend", "dividend"), Port("divisor", "by what"))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the quotient"),)
@@ -226,9 +226,9 @@ class Divide(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Polynomial(Block):
-    """A polynomial of every element, the highest power first: y = c1 u^n + … + cn u + c(n+1).
+    """A polynomial of every element, highest power first: y = c1 u^n + … + cn u + c(n+1).
 
-    Worked out by Horner's rule.
+    Evaluated by Horner's scheme.
     """
 
     title: ClassVar[str] = "Polynomial"

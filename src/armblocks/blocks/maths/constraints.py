@@ -1,4 +1,4 @@
-"""Signals that are sought: what they have to be follows from an equation."""
+"""Algebraic constraints: signals that are solved for."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from armblocks.diagram.signs import FaceSign, Words
 
 @dataclass(frozen=True, kw_only=True)
 class AlgebraicConstraint(Block):
-    """A signal that makes another one zero: z such that f(z) = 0, where f leads from z back to the input u.
+    """An algebraic constraint: the output z solves f(z) = 0, where the input is f(z).
 
-    An equation that is linear in z is solved while the diagram is compiled; else Newton's method with the
-    exact Jacobian searches from ``initial`` at the start, later from where it was. Of several solutions the
-    start decides. As many equations as unknowns: a vector is solved as a whole. An input that z has no
-    influence on is refused.
+    An equation that is linear in z is solved symbolically when the diagram is compiled. Other equations are
+    solved by Newton's method with the exact Jacobian, which starts from ``initial`` at t = 0 and later from
+    the previous solution. The start value selects one of several solutions. There are as many equations as
+    unknowns: the elements of a vector are solved together. An input that does not depend on z is an error.
     """
 
     title: ClassVar[str] = "Algebraic Constraint"
@@ -46,13 +46,13 @@ class AlgebraicConstraint(Block):
         shown=("sine/y", "z"),
     )
 
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="where the search begins")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="start value of the iteration")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "f(z), which is to be 0"),)
+        return (Port("u", "f(z), the residual"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("z", "the signal that is sought"),)
+        return (Port("z", "the solution"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"z": broadcast({**inputs, "initial": shape_of(self.initial)})}

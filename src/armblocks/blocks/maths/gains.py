@@ -1,4 +1,4 @@
-"""Gains and waves with a meaning: a slider, the sample time, an angle that comes from outside."""
+"""A gain with a slider, arithmetic with the sample time, and a sine of an input."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _OPERATIONS: Mapping[str, Callable[[SX, SX], SX]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class SliderGain(Block):
-    """A gain to be moved between two ends while a model runs: y = gain u, low <= gain <= high."""
+    """A gain with a slider that can be moved during a run: y = gain u, low <= gain <= high."""
 
     title: ClassVar[str] = "Slider Gain"
     outline: ClassVar[Outline] = Outline.TRIANGLE
@@ -52,11 +52,11 @@ class SliderGain(Block):
                 f"gain is {self.gain}",
                 where="SliderGain",
                 allowed=f"low <= gain <= high: {self.low} to {self.high}",
-                fix="move the gain or the ends",
+                fix="change the gain or the ends",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is multiplied"),)
+        return (Port("u", "signal to multiply"),)
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the product"),)
@@ -73,7 +73,7 @@ class WeightedSampleTime(Block):
     spreads: ClassVar[tuple[str, ...]] = ("weight",)
     sampled: ClassVar[bool] = True
 
-    operation: str = parameter("+", choices=tuple(_OPERATIONS), doc="what is done")
+    operation: str = parameter("+", choices=tuple(_OPERATIONS), doc="operation")
     weight: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the factor of the sample time")
     sample_time: ArrayLike = sample_time_parameter()
 
@@ -92,18 +92,18 @@ class WeightedSampleTime(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SineWaveFunction(Block):
-    """A sine of a time that comes from outside: y = amplitude sin(frequency u + phase) + bias."""
+    """A sine of an input: y = amplitude sin(frequency u + phase) + bias."""
 
     title: ClassVar[str] = "Sine Wave Function"
     sign: ClassVar[FaceSign] = swing(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A time that passes twice as fast.", inputs={"u": made("Ramp", slope=2.0)}
+        shows="The input is a time that runs twice as fast.", inputs={"u": made("Ramp", slope=2.0)}
     )
 
-    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the way from peak to peak")
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the peak-to-peak value")
     frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="angular frequency", unit="rad/s")
     phase: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="angle at u = 0", unit="rad")
-    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="constant to add")
 
     def check(self) -> None:
         parameters_shape(self, "amplitude", "frequency", "phase", "bias")

@@ -1,4 +1,4 @@
-"""Blocks that make one number, or a running one, out of the elements of a signal."""
+"""Blocks that reduce or accumulate the elements of a signal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armblocks.errors import InputError
 
 
 def _elements(value: SX) -> list[SX]:
-    """Column by column, as MATLAB counts them."""
+    """The elements in column-major order, as in MATLAB."""
     return [value[k] for k in range(value.numel())]
 
 
@@ -70,14 +70,14 @@ class ProductOfElements(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Extremum(Block):
-    """The least or the greatest element and where it stands: y = u(index), index from 1.
+    """The least or the greatest element and its index: y = u(index), index from 1.
 
-    Of several equal ones the first is told. A matrix is counted column by column.
+    Of several equal elements the first counts. Indices of a matrix are in column-major order.
     """
 
     title: ClassVar[str] = "MinMax of Elements"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The greatest of three phases, and which one it is.",
+        shows="The greatest of three phases, and its index.",
         parameters={"function": "max"},
         inputs={"u": THREE_PHASES},
     )
@@ -94,7 +94,7 @@ class Extremum(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (
             Port("y", "the least or the greatest element", shape=()),
-            Port("index", "its place, counted from 1", shape=()),
+            Port("index", "its index, from 1", shape=()),
         )
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
@@ -102,7 +102,7 @@ class Extremum(Block):
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         count = math.prod(inputs["u"])
-        doc = "1 where element {} is beyond all before it"
+        doc = "1 where element {} exceeds all previous elements"
         return located(
             self, *(Condition(f"beyond{k}", (), doc.format(k), closed=False) for k in range(2, count + 1))
         )
@@ -119,7 +119,7 @@ class Extremum(Block):
         return {"y": best, "index": index}
 
     def _best(self, x: Signals, values: list[SX]) -> tuple[SX, SX]:
-        """The best of some elements and its place, as the conditions tell."""
+        """The least or greatest element and its index, selected by the conditions."""
         best, index = values[0], SX(1.0)
         for k in range(2, len(values) + 1):
             beyond = x[f"beyond{k}"]
@@ -129,7 +129,7 @@ class Extremum(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CumulativeSum(Block):
-    """Running sums along a vector: y(k) = u1 + … + uk; down every column of a matrix."""
+    """Cumulative sums of a vector: y(k) = u1 + … + uk; of a matrix, along every column."""
 
     title: ClassVar[str] = "Cumulative Sum"
     sign: ClassVar[FaceSign] = Words("Σ↓")
@@ -143,7 +143,7 @@ class CumulativeSum(Block):
         return (Port("u", "vector or matrix"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the running sums"),)
+        return (Port("y", "the cumulative sums"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": inputs["u"]}
@@ -165,7 +165,7 @@ class DotProduct(Block):
     title: ClassVar[str] = "Dot Product"
     sign: ClassVar[FaceSign] = Words("u · v")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="How far a turning vector points along a fixed one.",
+        shows="The component of a rotating vector along a fixed one.",
         inputs={"u": CIRCLING, "v": made("Constant", value=(1.0, 1.0))},
     )
 
@@ -190,16 +190,16 @@ class DotProduct(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Norm(Block):
-    """The size of a vector or matrix: 2: sqrt(sum u^2), 1: sum abs(u), inf: max abs(u), fro: sqrt(sum u^2).
+    """The norm of a vector or matrix: 2: sqrt(sum u^2), 1: sum abs(u), inf: max abs(u), fro: sqrt(sum u^2).
 
-    Of a matrix 1 is the greatest sum down a column and inf the greatest sum along a row; 2 would be its
-    greatest singular value, which is not offered. At zero the rate of 2 and fro is not a number.
+    For a matrix, 1 is the greatest column sum and inf the greatest row sum. The 2-norm of a matrix (its
+    greatest singular value) is not supported. The derivative of the norms 2 and fro at zero is NaN.
     """
 
     title: ClassVar[str] = "Norm"
     sign: ClassVar[FaceSign] = Words("‖u‖")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The length of a vector that runs around an ellipse.",
+        shows="The length of a vector that moves along an ellipse.",
         inputs={"u": made("SineWave", amplitude=(2.0, 1.0), phase=(pi / 2, 0.0))},
     )
 
@@ -214,7 +214,7 @@ class Norm(Block):
     def output_shapes(self, inputs: Shapes) -> Shapes:
         if self.norm == "2" and len(inputs["u"]) > 1:
             raise InputError(
-                f"the 2-norm of a matrix of shape {inputs['u']} is asked for",
+                f"the 2-norm of a matrix of shape {inputs['u']} is not supported",
                 allowed="1, inf and fro of a matrix",
                 fix="choose another norm",
             )

@@ -1,4 +1,4 @@
-"""The extreme of all values so far."""
+"""The running minimum or maximum."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from armblocks.diagram.signs import FaceSign, Words
 
 @dataclass(frozen=True, kw_only=True)
 class MinMaxRunningResettable(Block):
-    """The least or greatest input so far: y(k) = min(u(k), y(k-1)) or max, ``initial`` where it is reset."""
+    """The running minimum or maximum of the input: y(k) = min(u(k), y(k-1)) or max."""
 
     title: ClassVar[str] = "MinMax Running Resettable"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The greatest value so far of a sine that swells.",
+        shows="The running maximum of a sine with growing amplitude.",
         parameters={"function": "max", "sample_time": 0.1},
         inputs={
             "u": made("Product").by(u1=made("SineWave", frequency=2.0), u2=made("Ramp", slope=0.1)),
@@ -41,14 +41,14 @@ class MinMaxRunningResettable(Block):
     )
 
     function: str = parameter("min", choices=("min", "max"), doc="which one")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="where it begins, and after a reset")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value at the start and after a reset")
     sample_time: ArrayLike = sample_time_parameter()
 
     def face_sign(self) -> FaceSign:
         return Words(f"{self.function}(u, y)", italic=True)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "the signal"), Port("reset", "starts anew while not 0", shape=()))
+        return (Port("u", "the signal"), Port("reset", "resets the output while not 0", shape=()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the extreme so far"),)
@@ -57,7 +57,7 @@ class MinMaxRunningResettable(Block):
         return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("extreme", self.output_shapes(inputs)["y"], "the output at the tick before"),)
+        return (State("extreme", self.output_shapes(inputs)["y"], "the output at the previous tick"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         further = (fmin if self.function == "min" else fmax)(u["u"], x["extreme"])

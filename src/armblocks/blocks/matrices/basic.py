@@ -1,4 +1,4 @@
-"""Matrix algebra on one wire: products, equations, and the shape of a matrix."""
+"""Matrix algebra: products, linear equations, shapes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from armblocks.errors import InputError
 
 
 def _square(shape: Shape) -> Shape:
-    """A square matrix's shape as it is, that of one number as (1, 1)."""
+    """The shape of a square matrix; a scalar counts as (1, 1)."""
     if math.prod(shape) == 1:
         return (1, 1)
     if len(shape) != 2 or shape[0] != shape[1]:
@@ -34,7 +34,7 @@ class CrossProduct(Block):
     title: ClassVar[str] = "Cross Product"
     sign: ClassVar[FaceSign] = Words("u × v")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A vector that turns in the plane, crossed with z: it runs a quarter turn behind.",
+        shows="A vector that rotates in the plane, times z: the product lags by a quarter turn.",
         inputs={
             "u": made("SineWave", amplitude=(1.0, 1.0, 0.0), phase=(pi / 2, 0.0, 0.0)).named("turning"),
             "v": made("Constant", value=(0.0, 0.0, 1.0)),
@@ -54,12 +54,12 @@ class CrossProduct(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Transpose(Block):
-    """Rows to columns: y = u'; a vector counts as a column and becomes a matrix of one row."""
+    """The transpose: y = u'; a vector counts as a column and becomes a matrix of one row."""
 
     title: ClassVar[str] = "Transpose"
     sign: ClassVar[FaceSign] = Words("Aᵀ")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The two entries off the diagonal change places.",
+        shows="The two off-diagonal entries change places.",
         inputs={"u": made("SineWave", amplitude=((1.0, 2.0), (3.0, 4.0)))},
     )
 
@@ -82,12 +82,12 @@ class Transpose(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixInverse(Block):
-    """The inverse of a square matrix: u y = I, by elimination with pivots; not finite where u is singular."""
+    """The inverse of a square matrix: u y = I, by Gaussian elimination; not finite where u is singular."""
 
     title: ClassVar[str] = "Matrix Inverse"
     sign: ClassVar[FaceSign] = Words("A⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The entries of the inverse of [1 a; 0 2] while a rises: only the one off the diagonal moves.",
+        shows="The entries of the inverse of [1 a; 0 2] while a rises: only the off-diagonal entry changes.",
         inputs={"u": made("Ramp", slope=((0.0, 0.2), (0.0, 0.0)), initial=((1.0, 0.0), (0.0, 2.0)))},
     )
 
@@ -107,7 +107,7 @@ class MatrixInverse(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LinearSolve(Block):
-    """The solution of linear equations: A y = B, by elimination; not finite where A is singular."""
+    """The solution of linear equations: A y = B, by Gaussian elimination; not finite where A is singular."""
 
     title: ClassVar[str] = "Matrix Solve"
     sign: ClassVar[FaceSign] = Words("A⁻¹ B")
@@ -142,12 +142,12 @@ class LinearSolve(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Determinant(Block):
-    """The determinant of a square matrix: y = det(u), by elimination with pivots."""
+    """The determinant of a square matrix: y = det(u), by Gaussian elimination with pivoting."""
 
     title: ClassVar[str] = "Determinant"
     sign: ClassVar[FaceSign] = Words("det")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The determinant of [1 a; a 1] while a swings: 1 - a^2.",
+        shows="The determinant of [1 a; a 1] while a oscillates: 1 - a^2.",
         inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (1.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
     )
 
@@ -167,12 +167,12 @@ class Determinant(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Trace(Block):
-    """The sum of the diagonal of a square matrix: y = u11 + u22 + …"""
+    """The trace of a square matrix: y = u11 + u22 + …"""
 
     title: ClassVar[str] = "Trace"
     sign: ClassVar[FaceSign] = Words("tr")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sum of the diagonal: one entry swings about 1, the other about 2.",
+        shows="The trace: one diagonal entry oscillates about 1, the other about 2.",
         inputs={
             "u": made(
                 "SineWave",
@@ -202,7 +202,7 @@ class Trace(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixPower(Block):
-    """A square matrix times itself: y = u^exponent; 0 gives the identity, negative ones take the inverse."""
+    """An integer power of a square matrix: y = u^exponent; negative powers use the inverse."""
 
     title: ClassVar[str] = "Matrix Power"
     sign: ClassVar[FaceSign] = Words("Aⁿ")
@@ -211,7 +211,7 @@ class MatrixPower(Block):
         inputs={"u": made("SineWave", amplitude=((0.0, 1.0), (0.0, 0.0)), bias=((1.0, 0.0), (0.0, 1.0)))},
     )
 
-    exponent: int = parameter(2, minimum=-100, maximum=100, doc="how many factors")
+    exponent: int = parameter(2, minimum=-100, maximum=100, doc="the exponent")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the matrix (n, n)"),)
@@ -235,7 +235,7 @@ class MatrixPower(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Reshape(Block):
-    """The same elements in another shape, taken and laid column by column as in MATLAB.
+    """The same elements in another shape, in column-major order as in MATLAB.
 
     ``vector`` (n,), ``column`` (n, 1), ``row`` (1, n), or ``matrix`` (rows, n / rows).
     """
@@ -247,7 +247,7 @@ class Reshape(Block):
     )
 
     output: str = parameter("vector", choices=("vector", "column", "row", "matrix"), doc="the new shape")
-    rows: int = parameter(1, minimum=1, doc="how many rows a matrix gets")
+    rows: int = parameter(1, minimum=1, doc="number of rows of the matrix")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "any signal"),)
@@ -259,8 +259,8 @@ class Reshape(Block):
         n = math.prod(inputs["u"])
         if self.output == "matrix" and n % self.rows:
             raise InputError(
-                f"{n} elements make no matrix of {self.rows} rows",
-                allowed=f"a count of rows that divides {n}",
+                f"{n} elements cannot form a matrix with {self.rows} rows",
+                allowed=f"a number of rows that divides {n}",
                 fix="change rows",
             )
         shapes = {"vector": (n,), "column": (n, 1), "row": (1, n), "matrix": (self.rows, n // self.rows)}
@@ -277,9 +277,9 @@ class Reshape(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MatrixConcatenate(Block):
-    """Matrices one beside the other or one under the other: y = [u1 u2 …] or [u1; u2; …].
+    """Horizontal or vertical concatenation of matrices: y = [u1 u2 …] or [u1; u2; …].
 
-    Vectors count as columns. Scalars and vectors one under the other give a vector.
+    Vectors count as columns. Vertical concatenation of scalars and vectors gives a vector.
     """
 
     title: ClassVar[str] = "Matrix Concatenate"
@@ -289,8 +289,10 @@ class MatrixConcatenate(Block):
         inputs={"u1": made("SineWave", amplitude=(1.0, 2.0)), "u2": made("Constant", value=(-1.0, 1.0))},
     )
 
-    inputs: int = parameter(2, minimum=1, doc="how many inputs")
-    direction: str = parameter("horizontal", choices=("horizontal", "vertical"), doc="beside or under")
+    inputs: int = parameter(2, minimum=1, doc="number of inputs")
+    direction: str = parameter(
+        "horizontal", choices=("horizontal", "vertical"), doc="horizontal (beside) or vertical (under)"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", self.inputs, "part")
@@ -304,8 +306,8 @@ class MatrixConcatenate(Block):
         if len({shape[1 - along] for shape in full}) > 1:
             raise InputError(
                 f"the parts have shapes {', '.join(map(str, inputs.values()))}",
-                allowed="equal rows beside each other, equal columns under each other",
-                fix="change the direction or one of the parts",
+                allowed="equal numbers of rows side by side, equal numbers of columns one under another",
+                fix="change the direction or one of the inputs",
             )
         length = sum(shape[along] for shape in full)
         if along == 0 and all(len(shape) < 2 for shape in inputs.values()):

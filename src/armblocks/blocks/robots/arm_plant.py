@@ -1,4 +1,4 @@
-"""The arm as a machine: joints that stick and slip, end stops, a payload that may change, a force at the tip.
+"""The arm with stick-slip friction, end stops, a variable payload and a force at the tip.
 
 The equations are those of :mod:`armblocks.dynamics.held_joints`, which names the sources.
 """
@@ -41,28 +41,28 @@ from armblocks.robot import Robot
 
 @dataclass(frozen=True, kw_only=True)
 class ArmPlant(Block):
-    """The robot with friction that sticks: M(q) q'' + C q' + g + friction = tau + stops - J' wrench.
+    """The robot with stick-slip friction: M(q) q'' + C q' + g + friction = tau + stops - J' wrench.
 
-    Friction is that of the robot's motors by its friction model. A joint without speed is held, with exactly
-    no acceleration, while the torque that this takes, which the other joints' motion has a part in, lies
-    within ``breakaway`` times its Coulomb friction; beyond, it slides. The plain block Robot
-    (ForwardDynamics) lets joints creep there.
+    Friction is that of the motors, by the robot's friction model. A joint at rest sticks, with zero
+    acceleration, while the torque that holds it is within ``breakaway`` times its Coulomb friction; beyond
+    that it slides. The holding torque includes the coupling with the other joints. The block Robot
+    (ForwardDynamics) has no sticking, and its joints creep instead.
 
-    End stops stand at the robot's own joint limits. ``elastic``: torque stiffness (limit - q) - damping qd
-    beyond a limit, and never a pull. ``hard``: the joint stops at once (impact without rebound, whose
-    impulse the other joints feel) and rests exactly at the limit until something moves it away; joints that
-    rest at their stops already stay there through the impact.
+    End stops are at the robot's joint limits. ``elastic``: torque stiffness (limit - q) - damping qd beyond a
+    limit, which never pulls. ``hard``: the joint stops at once in a plastic impact, whose impulse acts on the
+    other joints too, and stays exactly at the limit until a torque moves it away. Joints that rest at their
+    stops before the impact stay there.
 
     ``payload``: mass, centre x y z and inertia xx yy zz xy yz xz about it, in the tool frame. Where it jumps,
-    the speeds stay: what is picked up has the tool's speed already, and what is dropped takes its own along.
-    ``wrench``: force, then moment, that the tip exerts on its surroundings, in the last link's axes.
+    the joint speeds do not change: a payload is picked up and released at the speed of the tool. ``wrench``:
+    force, then moment, of the tip on the environment, in the axes of the last link.
     """
 
     title: ClassVar[str] = "Arm Plant"
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The Puma falls onto the end stop of its shoulder and, by the friction of its motors, to rest.",
+        shows="The Puma falls onto the end stop of its shoulder and comes to rest by motor friction.",
         parameters={"robot": "puma560", "q0": (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), "stops": "hard"},
         inputs={"tau": made("Constant", value=(0.0,) * 6)},
         shown=("q", "qd", "friction"),
@@ -87,7 +87,7 @@ class ArmPlant(Block):
         1.0,
         kind=ParameterKind.ARRAY,
         dimensions=(0, 1),
-        doc="static over sliding friction (n,), or one number for all",
+        doc="ratio of static to sliding friction (n,), or one number for all",
         minimum=1.0,
     )
     stops: str = parameter("none", choices=("none", "elastic", "hard"), doc="end stops at the joint limits")
@@ -95,7 +95,7 @@ class ArmPlant(Block):
         1e5,
         kind=ParameterKind.ARRAY,
         dimensions=(0, 1),
-        doc="of elastic stops (n,), or one number for all",
+        doc="stiffness of elastic stops (n,), or one number for all",
         unit="N m/rad",
         minimum=0.0,
     )
@@ -103,12 +103,12 @@ class ArmPlant(Block):
         1e3,
         kind=ParameterKind.ARRAY,
         dimensions=(0, 1),
-        doc="of elastic stops (n,), or one number for all",
+        doc="damping of elastic stops (n,), or one number for all",
         unit="N m s/rad",
         minimum=0.0,
     )
-    payload_input: bool = parameter(False, doc="whether there is an input for the payload")
-    wrench_input: bool = parameter(False, doc="whether there is an input for a force at the tip")
+    payload_input: bool = parameter(False, doc="whether the block has an input for the payload")
+    wrench_input: bool = parameter(False, doc="whether the block has an input for a force at the tip")
 
     def check(self) -> None:
         for name in ("q0", "qd0", "breakaway", "stiffness", "damping"):
@@ -119,14 +119,14 @@ class ArmPlant(Block):
                 raise InputError(
                     f"the Coulomb friction of joint '{name}' drives it",
                     where="ArmPlant",
-                    allowed="friction against the motion, forwards >= 0 >= backwards",
+                    allowed="friction opposite to the motion: forwards >= 0 >= backwards",
                     fix="correct the robot's Coulomb friction, or choose the friction model squared-gear",
                 )
             low, high = self.robot.qlim[k]
             q0 = np.broadcast_to(np.asarray(self.q0), (self.robot.n,))[k]
             if self.stops == "hard" and not low <= q0 <= high:
                 raise InputError(
-                    f"joint '{name}' starts at {q0:g}, behind its stop",
+                    f"joint '{name}' starts at {q0:g}, beyond its stop",
                     where="ArmPlant.q0",
                     allowed=f"{low:g} … {high:g}",
                     fix="start within the limits, or choose elastic stops",
@@ -137,7 +137,7 @@ class ArmPlant(Block):
     def input_ports(self) -> tuple[Port, ...]:
         ports = [tau_port(self.robot, "torque or force at the joints")]
         if self.wrench_input:
-            ports.append(Port("wrench", "force (N) and moment (N m) on the surroundings", shape=(6,)))
+            ports.append(Port("wrench", "force (N) and moment (N m) on the environment", shape=(6,)))
         if self.payload_input:
             ports.append(Port("payload", "mass, centre, inertia", shape=(10,)))
         return tuple(ports)
@@ -148,8 +148,8 @@ class ArmPlant(Block):
             q_port(self.robot),
             qd_port(self.robot),
             qdd_port(self.robot),
-            Port("friction", "torque or force of friction against the motion", unit, (self.robot.n,)),
-            Port("stop", "torque or force of the end stops on the joints", unit, (self.robot.n,)),
+            Port("friction", "friction torque or force opposite to the motion", unit, (self.robot.n,)),
+            Port("stop", "torque or force of the end stops", unit, (self.robot.n,)),
         )
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
@@ -161,19 +161,19 @@ class ArmPlant(Block):
         shape = (self.robot.n,)
         found: list[State] = []
         if self._holdable():
-            found.append(State("mode", shape, "1 sliding forwards or free, -1 sliding backwards, 0 held"))
+            found.append(State("mode", shape, "1 sliding forwards or free, -1 sliding backwards, 0 sticking"))
         if self._lower() or self._upper():
-            found.append(State("contact", shape, "1 at the upper stop, -1 at the lower, 0 at none"))
+            found.append(State("contact", shape, "1 at the upper stop, -1 at the lower stop, else 0"))
         return tuple(found)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         elastic = self.stops == "elastic"
         found = (
             ("rest", self._dry(), "a sliding joint comes to rest", -1),
-            ("forwards", self._holdable(), "a held joint breaks away forwards", 1),
-            ("backwards", self._holdable(), "a held joint breaks away backwards", -1),
-            ("upper", self._upper(), "a joint meets its upper stop", 0 if elastic else 1),
-            ("lower", self._lower(), "a joint meets its lower stop", 0 if elastic else -1),
+            ("forwards", self._holdable(), "a sticking joint breaks away forwards", 1),
+            ("backwards", self._holdable(), "a sticking joint breaks away backwards", -1),
+            ("upper", self._upper(), "a joint reaches its upper stop", 0 if elastic else 1),
+            ("lower", self._lower(), "a joint reaches its lower stop", 0 if elastic else -1),
         )
         return tuple(
             Guard(name, (len(joints),), doc, direction) for name, joints, doc, direction in found if joints
@@ -244,7 +244,7 @@ class ArmPlant(Block):
         return {state.name: values[state.name] for state in self.modes({})}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # By the guards: the consistent modes themselves are the solution of a complementarity problem.
+        # Modes change by the guards; the consistent modes are the solution of a complementarity problem.
         found = dict[str, SX]()
         guards = self.guard_values(t, x, u, p)
         if self._holdable():
@@ -286,7 +286,7 @@ class ArmPlant(Block):
             values["contact"] = found.contact if self.stops == "hard" else contact
         happened = dot(vertcat(*e.values()), vertcat(*e.values())) > 0.0
         after = {name: if_else(happened, value, x[name]) for name, value in values.items()}
-        # At rest the speed is 0 whatever the parameters are: the derivatives of the speed are 0 too.
+        # At rest the speed is 0 for all parameter values, so its derivatives by parameters are 0 too.
         rests = logic_and(found.mode == 0.0, x["qd"] == 0.0)
         return {**after, "qd": if_else(logic_and(rests, logic_not(happened)), 0.0, after["qd"])}
 
@@ -305,7 +305,7 @@ class ArmPlant(Block):
         return self.stops != "none"
 
     def _holdable(self) -> tuple[int, ...]:
-        """The joints that can be held: by friction or by a rigid stop."""
+        """The joints that can be locked by friction or by a rigid stop."""
         stops = (*self._upper(), *self._lower()) if self.stops == "hard" else ()
         return tuple(sorted({*self._dry(), *stops}))
 
@@ -320,14 +320,14 @@ class ArmPlant(Block):
         return SX(marks)
 
     def _spread(self, guard: str, e: Signals) -> SX:
-        """The events of a guard as (n,), 0 for joints without it."""
+        """The fired directions of a guard as (n,); 0 for joints without the guard."""
         marks = SX.zeros(self.robot.n)
         if guard in e:
             marks[list(self._joints_of(guard))] = e[guard]
         return marks
 
     def _limits(self, side: int) -> SX:
-        """Lower (0) or upper (1) limits (n,), 0 where there is none."""
+        """Lower (0) or upper (1) limits (n,); 0 for joints without a limit."""
         limits = self.robot.qlim[:, side]
         return SX(np.where(np.isfinite(limits), limits, 0.0))
 
@@ -338,7 +338,7 @@ class ArmPlant(Block):
         return x["contact"] if self._lower() or self._upper() else SX.zeros(self.robot.n)
 
     def _rigid(self, contact: SX) -> SX:
-        """Contact with stops that hold joints: none where the stops give way."""
+        """Contact with hard stops; 0 for elastic stops."""
         return contact if self.stops == "hard" else SX.zeros(self.robot.n)
 
     def _elastic_stops(self, x: Signals, p: Signals) -> SX:
@@ -356,7 +356,7 @@ class ArmPlant(Block):
         return above - below
 
     def _driving(self, x: Signals, u: Signals, p: Signals) -> SX:
-        """All torque at the joints but dry friction and rigid stops."""
+        """The joint torque without dry friction and rigid stops."""
         return u["tau"] - SX(viscous_friction(self.robot)) * x["qd"] + self._elastic_stops(x, p)
 
     def _motion(self, x: Signals, u: Signals, p: Signals) -> tuple[JointEquations, SX, SX]:

@@ -31,19 +31,17 @@ from armblocks.robot import Robot
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianInverse(Block):
-    """What undoes a Jacobian (m, n): Ji (n, m) = J^-1, J', the pseudo-inverse, or J'(J J' + damping^2 I)^-1.
+    """An inverse of a Jacobian: J^-1, J', the pseudo-inverse, or J'(J J' + damping^2 I)^-1.
 
-    ``inverse`` wants a square one and is not finite where the arm is singular. ``pseudo`` gives the least
-    joint speeds (n >= m) or the least error (n < m), of an arm that is not singular. ``damped`` (damped
-    least squares) stays finite everywhere, at the price of an error where the arm is nearly singular.
+    ``inverse`` needs a square Jacobian and is not finite at a singularity. ``pseudo`` gives the least-norm
+    joint speeds (n >= m) or the least-squares error (n < m) and needs full rank. ``damped`` (damped least
+    squares) is finite everywhere, with an error near singularities.
     """
 
     title: ClassVar[str] = "ijacob"
     sign: ClassVar[FaceSign] = Words("J⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "The pseudo-inverse of the Jacobian while an arm unfolds: the speeds that a motion asks for grow."
-        ),
+        shows=("The pseudo-inverse of the Jacobian while an arm stretches: the required joint speeds grow."),
         parameters={"method": "pseudo"},
         inputs={
             "J": made("SubMatrix", last_row=3)
@@ -54,7 +52,7 @@ class JacobianInverse(Block):
     )
 
     method: str = parameter("inverse", choices=("inverse", "transpose", "pseudo", "damped"), doc="which one")
-    damping: float = parameter(0.1, above=0.0, doc="damping, for 'damped' only")
+    damping: float = parameter(0.1, above=0.0, doc="damping factor of 'damped'")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("J", "the Jacobian (m, n)"),)
@@ -67,7 +65,7 @@ class JacobianInverse(Block):
         if len(shape) != 2 or (self.method == "inverse" and shape[0] != shape[1]):
             raise InputError(
                 f"the Jacobian has shape {shape}",
-                allowed="a matrix, which is square for 'inverse'",
+                allowed="a matrix; square for 'inverse'",
                 fix="choose 'pseudo' or 'damped'",
             )
         return {"Ji": shape[::-1]}
@@ -89,12 +87,12 @@ class JacobianInverse(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Manipulability(Block):
-    """How far an arm is from a singularity: w = sqrt(det(J J')), Yoshikawa's measure."""
+    """Yoshikawa's manipulability measure, which is 0 at a singularity: w = sqrt(det(J J'))."""
 
     title: ClassVar[str] = "manipulability"
     sign: ClassVar[FaceSign] = Words("√|J Jᵀ|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An arm with two links unfolds: the nearer it is to being stretched, the smaller the measure.",
+        shows="An arm with two links stretches: the measure falls towards 0 near the stretched singularity.",
         inputs={"q": made("JTraj", q0=(0.0, 1.5), qf=(0.5, 0.0), tmax=8.0).named("motion")},
     )
 
@@ -117,9 +115,7 @@ class RobotEnergy(Block):
     title: ClassVar[str] = "Energy"
     sign: ClassVar[FaceSign] = Words("E(q, qd)")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "A double pendulum without friction: kinetic and potential energy change places, their sum stays."
-        ),
+        shows=("A double pendulum without friction: the sum of kinetic and potential energy is constant."),
         inputs={
             "q": made("ForwardDynamics")
             .named("arm")
@@ -154,15 +150,15 @@ class RobotEnergy(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LoadedRne(Block):
-    """Inverse dynamics with a force at the tip and a payload: tau = rne(q, qd, qdd) + their part.
+    """Inverse dynamics with a force at the tip and a payload: tau = rne(q, qd, qdd) + load torque.
 
-    ``wrench`` (force, moment) is what the tip exerts on its surroundings, in the last link's axes; the
+    ``wrench`` (force, moment) is the load of the tip on the environment, in the axes of the last link. The
     payload is mass, centre of mass (3) and inertia xx yy zz xy yz xz about it, in the tool frame.
     """
 
     title: ClassVar[str] = "rne with load"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The torques that hold the arm on its way with 2 kg at the tool.",
+        shows="The torques of a motion with 2 kg at the tool.",
         inputs={
             "wrench": made("Constant", value=(0.0,) * 6).named("no force"),
             "payload": made("Constant", value=(2.0,) + (0.0,) * 9).named("2 kg"),
@@ -174,7 +170,7 @@ class LoadedRne(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         motion = (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
-        wrench = Port("wrench", "force (N) and moment (N m) on the surroundings", shape=(6,))
+        wrench = Port("wrench", "force (N) and moment (N m) on the environment", shape=(6,))
         return *motion, wrench, Port("payload", "mass, centre, inertia", shape=(10,))
 
     def output_ports(self) -> tuple[Port, ...]:

@@ -1,6 +1,6 @@
-"""The robot blocks of the toolbox's roblocks: trajectory, kinematics, dynamics, and the moving picture.
+"""The blocks of the toolbox's roblocks library: trajectory, kinematics, dynamics and animation.
 
-Their equations are those of :mod:`armblocks.dynamics`, with the robot's numbers in place.
+Their equations are those of :mod:`armblocks.dynamics` with the robot's parameters.
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ from armblocks.trajectories import Quintic
 
 @dataclass(frozen=True, kw_only=True)
 class JTraj(Block):
-    """The quintic from q0 to qf in tmax, at rest at both ends: q = q0 + (qf - q0)(10 s^3 - 15 s^4 + 6 s^5).
+    """A quintic from q0 to qf in tmax, at rest at both ends: q = q0 + (qf - q0)(10 s^3 - 15 s^4 + 6 s^5).
 
-    s = t / tmax; qd and qdd are its exact derivatives. After tmax the joints stand still at qf, as in the
-    toolbox since release 10; up to release 9.10 its block gave NaN there. The toolbox interpolates a table
-    of 101 points linearly; this block evaluates the polynomial (they differ by up to 7.2e-5 (qf - q0)).
+    s = t / tmax; qd and qdd are its exact derivatives. After tmax the joints stay at qf, as in the toolbox
+    since release 10; up to release 9.10 its block gave NaN. The toolbox interpolates a table of 101 points
+    linearly; this block evaluates the polynomial (they differ by up to 7.2e-5 (qf - q0)).
     """
 
     title: ClassVar[str] = "jtraj"
@@ -58,7 +58,7 @@ class JTraj(Block):
         *((k / 20, 10 * (k / 20) ** 3 - 15 * (k / 20) ** 4 + 6 * (k / 20) ** 5) for k in range(21))
     )
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Two joints leave and arrive at rest; position, speed and acceleration are smooth.",
+        shows="Two joints start and end at rest; position, speed and acceleration are continuous.",
         parameters={"tmax": 8.0, "q0": (0.0, 0.0), "qf": (1.0, -1.5)},
     )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd", "qd": "qdd"}
@@ -70,7 +70,7 @@ class JTraj(Block):
         doc="joint coordinates at t = tmax",
         unit="rad",
     )
-    tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
+    tmax: float = parameter(10.0, above=0.0, doc="duration of the motion", unit="s")
 
     def check(self) -> None:
         n, m = shape_of(self.q0)[0], shape_of(self.qf)[0]
@@ -78,7 +78,7 @@ class JTraj(Block):
             raise InputError(
                 f"q0 has {n} joints and qf has {m}",
                 where="JTraj",
-                allowed="the same count",
+                allowed="equal numbers of joints",
                 fix="correct one",
             )
 
@@ -128,7 +128,7 @@ class Jacob0(Block):
     title: ClassVar[str] = "jacob0"
     sign: ClassVar[FaceSign] = Words("J(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The linear rows of the Jacobian: how far the tool moves along x, y, z for each joint.",
+        shows="The linear rows of the Jacobian: velocity of the tool along x, y, z per unit joint speed.",
         shown=(made("SubMatrix", last_row=3).named("linear rows").by(u="J"),),
     )
 
@@ -169,18 +169,15 @@ class Jacobe(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Rne(Block):
-    """Inverse dynamics: tau = rne(q, qd, qdd), with friction and motor inertia; gravity is the robot's.
+    """Inverse dynamics: tau = rne(q, qd, qdd), with friction and motor inertia, and the robot's gravity.
 
-    (The mask of the toolbox's block has a gravity that no release has ever used.)
+    (The mask of the toolbox's block has a gravity parameter, which no release uses.)
     """
 
     title: ClassVar[str] = "rne"
     sign: ClassVar[FaceSign] = Words("rne")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "The torques that a motion of two joints asks for; at the end they only hold the arm "
-            "against gravity."
-        ),
+        shows=("The torques of a motion of two joints; at the end they only hold the arm against gravity."),
         shown=("q", "tau"),
     )
 
@@ -190,7 +187,7 @@ class Rne(Block):
         return (q_port(self.robot), qd_port(self.robot), qdd_port(self.robot))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (tau_port(self.robot, "torque or force that the motion needs"),)
+        return (tau_port(self.robot, "torque or force of the motion"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"tau": apply_traced(dynamics.trace_rne(self.robot), u["q"], u["qd"], u["qdd"])}
@@ -203,7 +200,7 @@ class Gravload(Block):
     title: ClassVar[str] = "gravload"
     sign: ClassVar[FaceSign] = Words("g(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The torques that hold the arm against gravity, on its way up.",
+        shows="The gravity torques while the arm moves upwards.",
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
@@ -226,8 +223,7 @@ class Inertia(Block):
     sign: ClassVar[FaceSign] = Words("M(q)")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "The entries of the inertia matrix: the first joint feels less inertia the more the arm "
-            "is folded."
+            "The entries of the inertia matrix: the inertia at the first joint falls as the arm is folded."
         ),
         inputs={"q": made("JTraj", q0=(0.0, 0.0), qf=(0.0, 2.5), tmax=8.0).named("motion")},
     )
@@ -251,7 +247,7 @@ class Coriolis(Block):
     title: ClassVar[str] = "coriolis"
     sign: ClassVar[FaceSign] = Words("C(q, qd)")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The entries of the Coriolis matrix: they vanish with the speeds.",
+        shows="The entries of the Coriolis matrix; they are 0 at zero speed.",
         shown=("qd", "C"),
     )
 
@@ -269,19 +265,20 @@ class Coriolis(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ForwardDynamics(Block):
-    """The robot moved by torques: q'' = accel(q, q', tau), from q(0) = q0 at speed qd0.
+    """Forward dynamics of the robot: q'' = accel(q, q', tau), from q(0) = q0 at speed qd0.
 
-    Where joints come to rest against Coulomb friction, its equations jump at every turn and steps become
-    tiny: take ArmPlant there, whose joints stick, or a robot without that friction.
+    With Coulomb friction the equations are discontinuous at zero speed, and the steps become very small where
+    a joint comes to rest. Use ArmPlant for such robots, whose joints can stick, or a robot without Coulomb
+    friction.
 
-    This is the toolbox's block Robot. There, q0 is the start since the tags 9.7 (2013); before, the
-    parameter was not connected and the robot started at zero. qd0 is zero there.
+    This is the toolbox's block Robot. In the toolbox, q0 is the initial position since tag 9.7 (2013);
+    before, the parameter was not connected and the robot started at zero. The initial speed is zero there.
     """
 
     title: ClassVar[str] = "Robot"
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Let go from the horizontal without torque: a double pendulum.",
+        shows="A double pendulum, released from the horizontal without torque.",
         inputs={"tau": made("Constant", value=(0.0, 0.0)).named("no torque")},
         shown=("q",),
         stop_time=5.0,
@@ -331,12 +328,12 @@ class ForwardDynamics(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotPlot(Block):
-    """The moving robot: records the poses of all its links, so that a view needs no kinematics."""
+    """Animation of the robot: records the poses of all links, so that a view needs no kinematics."""
 
     title: ClassVar[str] = "plot"
     card_size: ClassVar[tuple[float, float]] = (84.0, 64.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The arm at six moments of its motion, with the path of the tool.",
+        shows="The arm at six times of its motion, with the path of the tool.",
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")

@@ -1,4 +1,4 @@
-"""Electric drives: the DC motor, and the windings of motors whose rotors belong to an arm.
+"""Electric drives: the DC motor, and motor windings for arms whose model includes the rotors.
 
 Source: Siciliano et al., Robotics, 2009, 5.2.1 (electric drives). One constant k serves as torque constant
 (N m/A) and as back-EMF constant (V s/rad): in SI units they are the same number.
@@ -32,12 +32,12 @@ from armblocks.equations import Shape
 class DcMotor(Block):
     """A DC motor: L i' = v - R i - k w, J w' = k i - b w - load, angle' = w.
 
-    It has one shaft and no dry friction. Every signal is at the motor's side.
+    The model has one shaft and no dry friction. All signals are on the motor side.
     """
 
     title: ClassVar[str] = "DC Motor"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The motor runs up under 12 V, and a load from 3 s on slows it and draws current.",
+        shows="The motor accelerates under 12 V. A load from 3 s on slows it down and increases the current.",
         parameters={"R": 2.0, "L": 0.1, "k": 0.3, "J": 0.02, "b": 0.01},
         inputs={"v": made("Constant", value=12.0), "load": made("Step", time=3.0, final=0.5)},
         shown=("w", "i"),
@@ -53,14 +53,14 @@ class DcMotor(Block):
     initial_angle: float = parameter(0.0, doc="the angle at t = 0", unit="rad")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("v", "voltage", "V", ()), Port("load", "torque against the motion", "N m", ()))
+        return (Port("v", "voltage", "V", ()), Port("load", "load torque, opposite to the motion", "N m", ()))
 
     def output_ports(self) -> tuple[Port, ...]:
         return (
             Port("w", "speed", "rad/s", ()),
             Port("angle", "angle of the shaft", "rad", ()),
             Port("i", "current", "A", ()),
-            Port("torque", "torque k i of the magnets", "N m", ()),
+            Port("torque", "motor torque k i", "N m", ()),
         )
 
     def states(self, inputs: Shapes) -> tuple[State, ...]:
@@ -87,15 +87,15 @@ class DcMotor(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MotorWinding(Block):
-    """The windings of motors behind gears: L i' = v - R i - k G w, tau = G k i, each motor by itself.
+    """The windings of geared motors: L i' = v - R i - k G w, tau = G k i, independently for each motor.
 
-    ``w`` and ``tau`` are the joint's, as an arm gives and takes them; G motor turns make one turn of the
-    joint. Inertia and friction of the rotors belong to the arm.
+    ``w`` and ``tau`` are joint speed and joint torque, as at the ports of an arm; G is the gear ratio, motor
+    turns per joint turn. Inertia and friction of the rotors are part of the arm.
     """
 
     title: ClassVar[str] = "Motor Winding"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The current of a motor at rest follows 24 V within its time constant L / R of 0.5 s.",
+        shows="The current of a motor at rest after a step of 24 V, with the time constant L / R = 0.5 s.",
         parameters={"R": 2.0, "L": 1.0, "gear_ratio": 50.0},
         inputs={"v": made("Step", time=1.0, final=24.0), "w": made("Constant", value=0.0)},
         shown=("v", "i", "tau"),

@@ -38,18 +38,18 @@ def _check_gains(block: Block, robot: Robot) -> None:
             raise InputError(
                 f"{name} has {shape[0]} gains",
                 where=block.type_name(),
-                allowed=f"{robot.n}, as '{robot.name}' has joints, or one number for all",
+                allowed=f"{robot.n}, one for each joint of '{robot.name}', or one number for all",
                 fix=f"correct {name}",
             )
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointPD(Block):
-    """A PD controller of joints: tau = Kp (qr - q) + Kd (qdr - qd), each joint by itself."""
+    """A PD controller of joints: tau = Kp (qr - q) + Kd (qdr - qd), independently for each joint."""
 
     title: ClassVar[str] = "PD Joint Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A PD controller alone: the arm follows, and sags under gravity by a constant error.",
+        shows="A PD controller alone: the arm follows with a constant error due to gravity.",
         parameters={"Kp": 200.0, "Kd": 40.0},
         inputs={
             "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
@@ -61,8 +61,8 @@ class JointPD(Block):
         stop_time=5.0,
     )
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
 
     def check(self) -> None:
         broadcast({"Kp": shape_of(self.Kp), "Kd": shape_of(self.Kd)})
@@ -87,11 +87,11 @@ class JointPD(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class GravityCompensation(Block):
-    """PD with gravity compensation: tau = g(q) + Kp (qr - q) - Kd qd, which rests at qr and nowhere else."""
+    """PD with gravity compensation: tau = g(q) + Kp (qr - q) - Kd qd, whose only equilibrium is qr."""
 
     title: ClassVar[str] = "PD with Gravity Compensation"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="From rest to a wanted posture: gravity is compensated, so that no error remains.",
+        shows="From rest to a desired posture: gravity is compensated, so that no error remains.",
         inputs={
             "qr": made("Constant", value=(1.0, -0.5)).named("wanted"),
             "q": made("ForwardDynamics").named("arm").by(tau="tau").at("q"),
@@ -102,8 +102,8 @@ class GravityCompensation(Block):
     )
 
     robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot")
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
 
     def check(self) -> None:
         _check_gains(self, self.robot)
@@ -123,16 +123,13 @@ class GravityCompensation(Block):
 class ComputedTorque(Block):
     """Inverse dynamics control: tau = M(q) (qddr + Kd e' + Kp e) + C qd + g + friction, e = qr - q.
 
-    With the true robot the errors obey e'' + Kd e' + Kp e = 0, each joint by itself: critically damped for
-    Kd = 2 sqrt(Kp).
+    If the model equals the robot, the errors of all joints obey e'' + Kd e' + Kp e = 0 independently:
+    critically damped for Kd = 2 sqrt(Kp).
     """
 
     title: ClassVar[str] = "Computed Torque Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "The arm starts 0.2 rad beside the wanted motion; the errors vanish as those of a "
-            "critically damped oscillator."
-        ),
+        shows=("The arm starts with an error of 0.2 rad; they vanish like a critically damped oscillation."),
         inputs={
             "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
             "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
@@ -144,12 +141,14 @@ class ComputedTorque(Block):
         stop_time=5.0,
     )
 
-    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
+    robot: RobotField = parameter(
+        kind=ParameterKind.ROBOT, of_type=Robot, doc="model of the robot in the controller"
+    )
     Kp: ArrayLike = parameter(
-        100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position", unit="1/s2"
+        100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains", unit="1/s2"
     )
     Kd: ArrayLike = parameter(
-        20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed", unit="1/s"
+        20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains", unit="1/s"
     )
 
     def check(self) -> None:
@@ -170,14 +169,11 @@ class ComputedTorque(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class FeedForward(Block):
-    """The torque of the wanted motion plus PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd)."""
+    """Feedforward and PD: tau = rne(qr, qdr, qddr) + Kp (qr - q) + Kd (qdr - qd)."""
 
     title: ClassVar[str] = "Feed-Forward Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "The torques of the wanted motion are given beforehand; PD corrects what is left of the "
-            "start beside it."
-        ),
+        shows=("The torques of the desired motion are fed forward; PD corrects the initial error."),
         inputs={
             "qr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("q"),
             "qdr": made("JTraj", q0=(0.0, 0.0), qf=(1.0, -1.5), tmax=3.0).named("motion").at("qd"),
@@ -189,9 +185,11 @@ class FeedForward(Block):
         stop_time=5.0,
     )
 
-    robot: RobotField = parameter(kind=ParameterKind.ROBOT, of_type=Robot, doc="the robot as it is known")
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+    robot: RobotField = parameter(
+        kind=ParameterKind.ROBOT, of_type=Robot, doc="model of the robot in the controller"
+    )
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
 
     def check(self) -> None:
         _check_gains(self, self.robot)

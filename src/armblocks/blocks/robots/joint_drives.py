@@ -1,4 +1,4 @@
-"""What stands between a controller and a joint: the limits of a drive, and end stops.
+"""Blocks between a controller and a joint: torque limits of a drive, and end stops.
 
 Source: Siciliano et al., Robotics, 2009, 5.2 (drives).
 """
@@ -29,17 +29,17 @@ from armblocks.diagram import (
 
 @dataclass(frozen=True, kw_only=True)
 class MotorDrive(Block):
-    """A drive's limits: y = u held within its current limit, peak, and voltage limit, stall (1 -+ w / w0).
+    """Torque limits of a drive: y = u, limited by the current (peak) and the voltage (stall (1 -+ w / w0)).
 
-    The voltage limit is the torque-speed line of a DC motor: ``stall`` at rest and 0 at ``no_load_speed`` w0,
-    for torques that drive; beyond w0 the drive can only brake.
+    The voltage limit is the torque-speed line of a DC motor: ``stall`` at rest, 0 at ``no_load_speed`` w0,
+    for driving torques. Beyond w0 the drive can only brake.
     """
 
     title: ClassVar[str] = "Motor Drive"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "A wanted torque of 15 N m: the current limit holds it at 10, and with rising speed the "
-            "voltage limit takes it to 0."
+            "A torque command of 15 N m: the current limit is 10 N m, and with rising speed the "
+            "voltage limit reduces the torque to 0."
         ),
         inputs={
             "u": made("Constant", value=15.0).named("wanted"),
@@ -48,10 +48,10 @@ class MotorDrive(Block):
         shown=("u", "y"),
     )
 
-    peak: ArrayLike = parameter(10.0, kind=ParameterKind.ARRAY, above=0.0, doc="torque at most", unit="N m")
-    stall: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, above=0.0, doc="torque at rest", unit="N m")
+    peak: ArrayLike = parameter(10.0, kind=ParameterKind.ARRAY, above=0.0, doc="peak torque", unit="N m")
+    stall: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, above=0.0, doc="stall torque", unit="N m")
     no_load_speed: ArrayLike = parameter(
-        100.0, kind=ParameterKind.ARRAY, above=0.0, doc="speed w0 at which no torque is left", unit="rad/s"
+        100.0, kind=ParameterKind.ARRAY, above=0.0, doc="no-load speed w0", unit="rad/s"
     )
     zero_crossing: bool = zero_crossing_parameter()
 
@@ -68,10 +68,10 @@ class MotorDrive(Block):
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
         shape = self.output_shapes(inputs)["y"]
         docs = {
-            "fast": "1 where the speed lowers the upper limit",
-            "overrun": "1 where it makes it brake",
-            "fast_back": "1 where the speed backwards raises the lower limit",
-            "overrun_back": "1 where it makes it brake",
+            "fast": "1 where the speed reduces the upper limit",
+            "overrun": "1 where the speed forces braking",
+            "fast_back": "1 where the backward speed raises the lower limit",
+            "overrun_back": "1 where the speed forces braking",
             "above": "1 above the upper limit",
             "below": "1 below the lower limit",
         }
@@ -107,14 +107,14 @@ class MotorDrive(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class JointStops(Block):
-    """End stops that push back: tau = stiffness (lower - q) - damping qd below lower, likewise above upper.
+    """Elastic end stops: tau = stiffness (lower - q) - damping qd below lower, likewise above upper.
 
-    A stop never pulls: while a joint leaves it quickly the torque is 0.
+    A stop never pulls: where the damping term would pull, the torque is 0.
     """
 
     title: ClassVar[str] = "Joint Stops"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A joint runs 0.05 rad into its stops at -1 and 1 rad, which push back.",
+        shows="A joint moves 0.05 rad into its stops at -1 and 1 rad, which push back.",
         inputs={
             "q": made("SineWave", amplitude=1.05).named("q"),
             "qd": made("Derivative").by(u=made("SineWave", amplitude=1.05).named("q")),
@@ -125,10 +125,10 @@ class JointStops(Block):
     lower: ArrayLike = parameter(-1.0, kind=ParameterKind.ARRAY, finite=False, doc="lower stop", unit="rad")
     upper: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, finite=False, doc="upper stop", unit="rad")
     stiffness: ArrayLike = parameter(
-        1e4, kind=ParameterKind.ARRAY, minimum=0.0, doc="of the stops", unit="N m/rad"
+        1e4, kind=ParameterKind.ARRAY, minimum=0.0, doc="stiffness of the stops", unit="N m/rad"
     )
     damping: ArrayLike = parameter(
-        100.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="of the stops", unit="N m s/rad"
+        100.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="damping of the stops", unit="N m s/rad"
     )
     zero_crossing: bool = zero_crossing_parameter()
 
@@ -147,9 +147,9 @@ class JointStops(Block):
         shape = self.output_shapes(inputs)["tau"]
         docs = {
             "low": "1 below the lower stop",
-            "pushed_up": "1 where spring and damper of the lower stop push",
+            "pushed_up": "1 where the lower stop pushes",
             "high": "1 above the upper stop",
-            "pushed_down": "1 where spring and damper of the upper stop push",
+            "pushed_down": "1 where the upper stop pushes",
         }
         return located(self, *(Condition(name, shape, doc, closed=False) for name, doc in docs.items()))
 
@@ -169,6 +169,6 @@ class JointStops(Block):
 
     @staticmethod
     def _pushes(u: Signals, p: Signals) -> tuple[SX, SX]:
-        """What spring and damper of the lower and of the upper stop would give in contact."""
+        """The spring and damper torques of the lower and the upper stop in contact."""
         drag = p["damping"] * u["qd"]
         return p["stiffness"] * (p["lower"] - u["q"]) - drag, p["stiffness"] * (p["upper"] - u["q"]) - drag

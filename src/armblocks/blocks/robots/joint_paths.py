@@ -1,4 +1,4 @@
-"""Paths over time: trapezoidal and multi-segment joint motions, and straight and round motions of the tool.
+"""Trajectories: trapezoidal and multi-segment joint motions, straight and circular tool motions.
 
 Sources: Siciliano et al., Robotics, 2009, 4.2 (trapezoidal profile, blends at via points) and 4.3 (straight
 path with the axis-angle rotation between two orientations); Corke, Robotics Toolbox (lspb, mstraj, ctraj).
@@ -36,24 +36,24 @@ from armblocks.trajectories import Quintic
 
 @dataclass(frozen=True, kw_only=True)
 class Trapezoidal(Block):
-    """From q0 to qf in tmax with even ramps: qd rises, is cruise (qf - q0) / tmax, and falls.
+    """A trapezoidal profile from q0 to qf in tmax: qd rises, is cruise (qf - q0) / tmax, and falls.
 
     This is the toolbox's ``lspb``. ``cruise`` is the speed of the middle part in units of the mean speed:
-    1.5, the toolbox's default, makes three equal parts, 2 a triangle. The ramps take tmax (1 - 1 / cruise)
-    each. Before 0 and after tmax the joints stand still.
+    1.5 (the toolbox's default) gives three equal parts and 2 a triangle. The ramps take tmax (1 - 1 / cruise)
+    each. Before 0 and after tmax the joints are at rest.
     """
 
     title: ClassVar[str] = "lspb"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.25, 0.12), (0.75, 0.88), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Even ramps of the speed with a stretch of even speed between them.",
+        shows="Linear ramps of the speed with constant speed between them.",
         parameters={"q0": (0.0, 0.0), "qf": (1.0, -0.5), "tmax": 8.0},
     )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
 
     q0: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="start (n,)", unit="rad")
     qf: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="end (n,)", unit="rad")
-    tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
+    tmax: float = parameter(10.0, above=0.0, doc="duration of the motion", unit="s")
     cruise: float = parameter(1.5, above=1.0, maximum=2.0, doc="greatest speed over mean speed")
 
     def check(self) -> None:
@@ -93,18 +93,18 @@ class Trapezoidal(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MultiSegment(Block):
-    """Straight through points with rounded corners: segment k takes durations(k), each corner blend.
+    """Linear segments through points with blended corners: segment k takes durations(k), each corner blend.
 
-    This is the toolbox's ``mstraj`` for given times. The speed of a segment is constant and changes evenly
-    within blend / 2 of the instant of each point, so that the path passes close to inner points and exactly
-    through the first and the last. It begins at t = 0 and ends after the sum of durations plus one blend:
-    q = p1 + sum of (p(k+1) - p(k)) g_k(t), with each g_k going from 0 to 1.
+    This is the toolbox's ``mstraj`` for given times. The speed of a segment is constant, and changes linearly
+    within blend / 2 of the time of each point. The path passes exactly through the first and last point and
+    close to the inner points. It begins at t = 0 and ends after the sum of durations plus one blend: q = p1 +
+    sum of (p(k+1) - p(k)) g_k(t), with each g_k going from 0 to 1.
     """
 
     title: ClassVar[str] = "mstraj"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.35, 0.9), (0.45, 0.95), (0.55, 0.9), (1, 0.3))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Through three corners: the joint goes straight and rounds each corner within 0.6 s.",
+        shows="Three corners: linear segments with blends of 0.6 s.",
         parameters={"points": ((0.0,), (1.0,), (0.5,), (1.5,)), "durations": (3.0, 3.0, 3.0), "blend": 0.6},
     )
     output_rates: ClassVar[Mapping[str, str]] = {"q": "qd"}
@@ -116,9 +116,9 @@ class MultiSegment(Block):
         unit="rad",
     )
     durations: ArrayLike = parameter(
-        (1.0, 1.0), dimensions=(1,), above=0.0, doc="of segments (k - 1,)", unit="s"
+        (1.0, 1.0), dimensions=(1,), above=0.0, doc="durations of the segments (k - 1,)", unit="s"
     )
-    blend: float = parameter(0.2, above=0.0, doc="how long the speed takes to change", unit="s")
+    blend: float = parameter(0.2, above=0.0, doc="duration of a blend", unit="s")
 
     def check(self) -> None:
         segments, given = shape_of(self.points)[0] - 1, shape_of(self.durations)[0]
@@ -132,7 +132,7 @@ class MultiSegment(Block):
         shortest = min(self.durations)  # pyright: ignore[reportUnknownVariableType, reportArgumentType, reportCallIssue]
         if self.blend > shortest:
             raise InputError(
-                f"corners of {self.blend:g} s do not fit into a segment of {shortest:g} s",
+                f"blends of {self.blend:g} s do not fit into a segment of {shortest:g} s",
                 where="MultiSegment",
                 allowed="a blend no longer than any duration",
                 fix="shorten the blend or lengthen the segment",
@@ -168,15 +168,15 @@ class MultiSegment(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class CTraj(Block):
-    """The tool's straight way from pose T0 to T1 in tmax: p = p0 + s (p1 - p0), R = R0 turn(axis, s angle).
+    """A straight motion from pose T0 to T1 in tmax: p = p0 + s (p1 - p0), R = R0 rot(axis, s angle).
 
-    Axis and angle are those of R0' R1, so that the turn is the shortest and even. s goes from 0 to 1 by the
+    Axis and angle are those of R0' R1, so that the rotation is the shortest. s goes from 0 to 1 by the
     quintic of ``jtraj`` or the trapezoidal profile of ``lspb``.
     """
 
     title: ClassVar[str] = "ctraj"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="From one pose straight to another that is turned by 90 degrees, by a trapezoidal profile.",
+        shows="A straight motion with a rotation by 90 degrees and a trapezoidal profile.",
         parameters={"tmax": 8.0},
         inputs={
             "T0": pose_along_x(ZERO).named("start"),
@@ -192,14 +192,14 @@ class CTraj(Block):
         shown=position_of("T"),
     )
 
-    tmax: float = parameter(10.0, above=0.0, doc="how long the motion takes", unit="s")
-    profile: str = parameter("lspb", choices=("lspb", "quintic"), doc="how s goes from 0 to 1")
+    tmax: float = parameter(10.0, above=0.0, doc="duration of the motion", unit="s")
+    profile: str = parameter("lspb", choices=("lspb", "quintic"), doc="profile of s")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("T0", "pose at t = 0", shape=(4, 4)), Port("T1", "pose at t = tmax", shape=(4, 4)))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("T", "pose of the tool", shape=(4, 4)), Port("s", "part of the way, 0 to 1", shape=()))
+        return (Port("T", "pose of the tool", shape=(4, 4)), Port("s", "path parameter, 0 to 1", shape=()))
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         if self.profile == "lspb":
@@ -216,17 +216,17 @@ class CTraj(Block):
 
     @staticmethod
     def _way(p: Signals) -> Signals:
-        """The parameters of s as a trapezoidal profile."""
+        """The parameters of the trapezoidal profile of s."""
         return {"q0": SX(0.0), "qf": SX(1.0), "tmax": p["tmax"], "cruise": SX(1.5)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class CirclePath(Block):
-    """A point that goes round: y = centre + radius (cos(a), sin(a), 0), a = 2 pi frequency t + phase."""
+    """A point on a circle: y = centre + radius (cos(a), sin(a), 0), a = 2 pi frequency t + phase."""
 
     title: ClassVar[str] = "Circle Path"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A point that goes around once in ten seconds.",
+        shows="A point with a period of ten seconds.",
         parameters={"frequency": 0.1},
     )
 
@@ -241,7 +241,7 @@ class CirclePath(Block):
                 f"the centre has {shape_of(self.centre)[0]} numbers",
                 where="CirclePath.centre",
                 allowed="3: x, y, z",
-                fix="give the middle of the circle in m",
+                fix="give the centre of the circle in m",
             )
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -253,7 +253,7 @@ class CirclePath(Block):
 
 
 def _rounded_ramp(t: SX, begin: SX, end: SX, blend: SX) -> tuple[SX, SX, SX]:
-    """A ramp whose slope rises from 0 to 1 between two instants, ``blend`` apart; its two derivatives."""
+    """A ramp whose slope rises from 0 to 1 within ``blend`` seconds, and its two derivatives."""
     rising = fmin(fmax(t - begin, 0.0), blend)
     within = logic_and(t >= begin, t < end)
     value = rising * rising / (2.0 * blend) + fmax(t - end, 0.0)

@@ -1,4 +1,4 @@
-"""PID controllers of joints with limited torque, running all the time or at the ticks of a clock.
+"""PID controllers of joints with limited torque, in continuous time and sampled.
 
 Source: Siciliano et al., Robotics, 2009, 8.3; Åström, Hägglund, Advanced PID Control, 2006, 3.5 (windup).
 """
@@ -48,27 +48,31 @@ _LOOP = {
 class JointPID(Block):
     """PID of joints: tau = limit(Kp (qr - q) + Kd (qdr - qd) + i), i' = Ki (qr - q) + Kb (tau - unlimited).
 
-    Each joint by itself. The last term, back-calculation, lets the integral go with the limits of the
-    torque instead of winding up; with Kb = 0 it winds up. The speeds are measured: nothing is differentiated.
+    Each joint has its own controller. The last term, back-calculation, prevents windup of the integral at the
+    torque limits; Kb = 0 disables it. Speeds are measured, not differentiated.
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "PID Joint Controller"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An inertia of 1 goes to 1 rad under a torque of at most 0.5.",
+        shows="An inertia of 1 moves to 1 rad with a torque of at most 0.5.",
         parameters={"Kp": 10.0, "Ki": 5.0, "Kd": 5.0, "lower": -0.5, "upper": 0.5},
         inputs=_LOOP,
         shown=("q", "tau"),
     )
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
-    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of its integral")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
+    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="integral gains")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
     Kb: ArrayLike = parameter(
         1.0, kind=ParameterKind.ARRAY, minimum=0.0, doc="back-calculation gain", unit="1/s"
     )
-    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least torque")
-    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest torque")
+    lower: ArrayLike = parameter(
+        -math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the torque"
+    )
+    upper: ArrayLike = parameter(
+        math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the torque"
+    )
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the integral action at t = 0")
 
     def check(self) -> None:
@@ -88,7 +92,7 @@ class JointPID(Block):
         return (State("integral", self._shape(inputs), "the integral action"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("mode", self._shape(inputs), "-1 at the lower limit, 1 at the upper, 0"),)
+        return (State("mode", self._shape(inputs), "-1 at the lower limit, 1 at the upper limit, 0"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         shape = self._shape(inputs)
@@ -129,14 +133,14 @@ class JointPID(Block):
 class SampledJointPID(Block):
     """PID of joints at ticks: tau(k) = limit(Kp e + Kd (qdr - qd) + i(k)), i(k+1) = i(k) + T Ki e.
 
-    e = qr - q. Each joint by itself. Clamping: the integral stands still while the torque is at a limit and
-    e would drive it further out.
+    e = qr - q. Each joint has its own controller. Clamping: the integral stops while the torque is at a limit
+    and e would drive it further beyond the limit.
     """
 
     title: ClassVar[str] = "Sampled PID Joint Controller"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An inertia of 1 goes to 1 rad under a torque of at most 0.5 that changes each 0.1 s.",
+        shows="An inertia of 1 moves to 1 rad with a torque of at most 0.5 that changes every 0.1 s.",
         parameters={
             "Kp": 10.0,
             "Ki": 5.0,
@@ -149,12 +153,16 @@ class SampledJointPID(Block):
         shown=("q", "tau"),
     )
 
-    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the position")
-    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of its integral")
-    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="gains of the speed")
-    lower: ArrayLike = parameter(-math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the least torque")
-    upper: ArrayLike = parameter(math.inf, kind=ParameterKind.ARRAY, finite=False, doc="the greatest torque")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the integral action at first")
+    Kp: ArrayLike = parameter(100.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="position gains")
+    Ki: ArrayLike = parameter(50.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="integral gains")
+    Kd: ArrayLike = parameter(20.0, kind=ParameterKind.ARRAY, dimensions=(0, 1), doc="speed gains")
+    lower: ArrayLike = parameter(
+        -math.inf, kind=ParameterKind.ARRAY, finite=False, doc="lower limit of the torque"
+    )
+    upper: ArrayLike = parameter(
+        math.inf, kind=ParameterKind.ARRAY, finite=False, doc="upper limit of the torque"
+    )
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="initial integral action")
     sample_time: ArrayLike = sample_time_parameter(1e-3)
 
     def check(self) -> None:

@@ -1,4 +1,4 @@
-"""Sensors of joints: noise, the steps of an encoder, the lag of a tachometer.
+"""Joint sensors: noise, quantization by an encoder, the lag of a tachometer.
 
 Source: Siciliano et al., Robotics, 2009, 5.3 (proprioceptive sensors).
 """
@@ -38,16 +38,16 @@ _TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, kw_only=True)
 class JointSensor(Block):
-    """Measured joint coordinates and speeds: each tick gives q + noise and qd + noise.
+    """Measured joint coordinates and speeds: q + noise and qd + noise at each tick.
 
-    The noise is Gaussian, without mean, of the given standard deviations, and independent from joint to
-    joint, between q and qd, and from tick to tick. The seed repeats it exactly.
+    The noise is Gaussian with zero mean and the given standard deviations. It is independent between joints,
+    between q and qd, and between ticks. The same seed gives exactly the same noise.
     """
 
     title: ClassVar[str] = "Joint Sensor"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A motion of the Puma's joints as a sensor with a noise of 0.05 rad sees it each 0.1 s.",
+        shows="A motion of the Puma's joints, measured every 0.1 s with a noise of 0.05 rad.",
         parameters={"robot": "puma560", "q_deviation": 0.05, "sample_time": 0.1},
         inputs={"q": made("JTraj"), "qd": made("JTraj").at("qd")},
         shown=("q",),
@@ -71,7 +71,7 @@ class JointSensor(Block):
         unit="rad/s",
     )
     seed: float = parameter(
-        0.0, minimum=0.0, maximum=float(2**SEED_BITS - 1), doc="which stream of random numbers"
+        0.0, minimum=0.0, maximum=float(2**SEED_BITS - 1), doc="seed of the random numbers"
     )
     sample_time: ArrayLike = sample_time_parameter(1e-3)
 
@@ -105,24 +105,25 @@ class JointSensor(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder(Block):
-    """An incremental encoder behind a gear: count = floor(G counts u / 2 pi), y = 2 pi count / (G counts).
+    """An incremental encoder with a gear: count = floor(G counts u / 2 pi), y = 2 pi count / (G counts).
 
-    ``speed`` is what a drive makes of it at a fixed rate: (count(k) - count(k-1)) / T as an angle of the
-    joint, and 0 at the first tick; it comes in steps of 2 pi / (G counts T). ``counts`` are those after
-    quadrature, four a line.
+    ``speed`` is the difference quotient at the sampling rate of a drive: (count(k) - count(k-1)) / T as a
+    joint angle per second, and 0 at the first tick. Its resolution is 2 pi / (G counts T). ``counts`` is the
+    number of counts per turn after quadrature, four per line.
     """
 
     title: ClassVar[str] = "Encoder"
     sampled: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Twenty counts a turn of a slow swing, and the speed in steps that one count each 0.2 s makes.",
+        shows="A slow oscillation at twenty counts per turn; one count in 0.2 s is the resolution of the "
+        "speed.",
         parameters={"counts": 20.0, "sample_time": 0.2},
         inputs={"u": made("SineWave")},
         shown=("u", "y", "speed"),
     )
 
     counts: ArrayLike = parameter(
-        4096.0, kind=ParameterKind.ARRAY, above=0.0, doc="counts per turn of the encoder's shaft"
+        4096.0, kind=ParameterKind.ARRAY, above=0.0, doc="counts per turn of the encoder shaft"
     )
     gear_ratio: ArrayLike = parameter(
         1.0, kind=ParameterKind.ARRAY, doc="G, turns of the encoder per turn of the joint"
@@ -134,9 +135,9 @@ class Encoder(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (
-            Port("y", "the counted angle", "rad"),
+            Port("y", "the measured angle", "rad"),
             Port("count", "the counter"),
-            Port("speed", "counts a second, as an angle of the joint", "rad/s"),
+            Port("speed", "counts per second, as a joint angle", "rad/s"),
         )
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
@@ -144,7 +145,9 @@ class Encoder(Block):
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         shape = self._shape(inputs)
-        return State("before", shape, "the counter at the tick before"), State("ticked", (), "1 after a tick")
+        return State("before", shape, "the counter at the previous tick"), State(
+            "ticked", (), "1 after a tick"
+        )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count = self._count(u, p)
@@ -167,11 +170,11 @@ class Encoder(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Tachometer(Block):
-    """The voltage of a tachogenerator behind its filter: time_constant y' = gain w - y."""
+    """The voltage of a tachogenerator with a filter: time_constant y' = gain w - y."""
 
     title: ClassVar[str] = "Tachometer"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="What a tachometer with a slow filter gives while the speed jumps.",
+        shows="The output of a tachometer with a slow filter after a jump of the speed.",
         parameters={"gain": 0.5, "time_constant": 0.5},
         inputs={"w": made("Step", time=1.0)},
         shown=("w", "y"),
@@ -179,7 +182,7 @@ class Tachometer(Block):
 
     gain: ArrayLike = parameter(0.02, kind=ParameterKind.ARRAY, doc="volts per speed", unit="V s/rad")
     time_constant: ArrayLike = parameter(
-        1e-3, kind=ParameterKind.ARRAY, above=0.0, doc="of the filter", unit="s"
+        1e-3, kind=ParameterKind.ARRAY, above=0.0, doc="time constant of the filter", unit="s"
     )
     initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the voltage at t = 0", unit="V")
 

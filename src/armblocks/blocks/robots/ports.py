@@ -1,4 +1,4 @@
-"""What the robot blocks of several files share: ports with the units of the joints, and traced equations."""
+"""Functions shared by robot blocks: ports with joint units, and traced equations."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armblocks.robot import Robot
 
 
 def apply_traced(traced: TracedFunction, *values: SX) -> SX:
-    """The equations of a robot over other symbols, natural shapes in and out."""
+    """Evaluates a traced robot function for other symbols, with arrays of natural shape."""
     flat = [flatten(value, slot.shape) for value, slot in zip(values, traced.inputs)]
     (result,) = traced.casadi_function().call(flat, True, False)
     return unflatten(result, traced.outputs.slots[0].shape)
@@ -57,6 +57,6 @@ def check_joint_values(block: Block, robot: Robot, name: str) -> None:
         raise InputError(
             f"{name} has {shape[0]} joints",
             where=f"{block.type_name()}.{name}",
-            allowed=f"{robot.n}, as '{robot.name}' has, or one number for all",
+            allowed=f"{robot.n}, one for each joint of '{robot.name}', or one number for all",
             fix="give one number for each joint of the robot",
         )

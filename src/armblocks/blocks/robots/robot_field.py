@@ -8,16 +8,16 @@ from armblocks.robot import Robot
 
 
 class HasRobot(Protocol):
-    """Something that has a robot, such as an Arm."""
+    """An object with a robot, such as an Arm."""
 
     @property
     def robot(self) -> Robot: ...
 
 
 class RobotField(Protocol):
-    """For type checkers, to whom a field of a descriptor's type is what the descriptor takes and gives.
+    """For type checkers, which read a field's type from the ``__set__`` and ``__get__`` of a descriptor.
 
-    A block is made with a Robot or an Arm, and its attribute is the Robot. Nothing is an instance of this.
+    A block takes a Robot or an Arm, and its attribute is the Robot. This class has no instances.
     """
 
     @overload

@@ -1,4 +1,4 @@
-"""Blocks that put signals together and take them apart."""
+"""Blocks that combine and split signals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Mux(Block):
-    """Scalars and vectors one after the other in one vector: y = [u1; u2; …]."""
+    """Concatenation of scalars and vectors: y = [u1; u2; …]."""
 
     title: ClassVar[str] = "Mux"
     outline: ClassVar[Outline] = Outline.BAR
@@ -27,13 +27,13 @@ class Mux(Block):
         shown=("y",),
     )
 
-    inputs: int = parameter(2, minimum=1, doc="how many inputs")
+    inputs: int = parameter(2, minimum=1, doc="number of inputs")
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", self.inputs, "part")
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "all parts in one vector"),)
+        return (Port("y", "all inputs in one vector"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         for name, shape in inputs.items():
@@ -41,7 +41,7 @@ class Mux(Block):
                 raise InputError(
                     f"'{name}' has shape {shape}",
                     allowed="scalars and vectors",
-                    fix="put a Reshape before it, or take a MatrixConcatenate",
+                    fix="put a Reshape before it, or use a MatrixConcatenate",
                 )
         return {"y": (sum(math.prod(shape) for shape in inputs.values()),)}
 
@@ -54,17 +54,17 @@ class Mux(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Demux(Block):
-    """A vector cut into equal parts: [y1; y2; …] = u; parts of one element are scalars."""
+    """A vector split into equal parts: [y1; y2; …] = u; parts of one element are scalars."""
 
     title: ClassVar[str] = "Demux"
     outline: ClassVar[Outline] = Outline.BAR
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The elements of a vector, one by one.",
+        shows="The elements of a vector as scalars.",
         inputs={"u": CIRCLING},
         shown=("y1", "y2"),
     )
 
-    parts: int = parameter(2, minimum=1, doc="how many outputs")
+    parts: int = parameter(2, minimum=1, doc="number of outputs")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the vector"),)
@@ -78,7 +78,7 @@ class Demux(Block):
             raise InputError(
                 f"'u' has shape {inputs['u']}",
                 allowed=f"a vector whose length {self.parts} divides",
-                fix="change the count of outputs",
+                fix="change the number of outputs",
             )
         part = size // self.parts
         return {port.name: (part,) if part > 1 else () for port in self.output_ports()}

@@ -29,7 +29,7 @@ COUNTING = ("one-based", "zero-based")
 
 
 def _places(indices: ArrayLike, counting: str) -> list[int]:
-    """Indices as places from 0."""
+    """Indices, converted to zero-based ones."""
     first = 1 if counting == "one-based" else 0
     return [int(index) - first for index in np.atleast_1d(cast("Any", indices))]
 
@@ -41,8 +41,8 @@ def _check_indices(where: str, indices: ArrayLike, counting: str) -> None:
         raise InputError(
             f"the indices are {numbers.tolist()}",
             where=where,
-            allowed=f"integers from {least} on",
-            fix="correct the indices or the way of counting",
+            allowed=f"integers, at least {least}",
+            fix="correct the indices or the index base",
         )
 
 
@@ -50,7 +50,7 @@ def _check_inside(places: list[int], size: int, counting: str) -> None:
     if max(places) >= size:
         first = 1 if counting == "one-based" else 0
         raise InputError(
-            f"the index {max(places) + first} is beyond the end",
+            f"the index {max(places) + first} exceeds the size of the signal",
             allowed=f"{first} to {size - 1 + first}, as the signal has {size} elements",
             fix="correct the indices or the width of the signal",
         )
@@ -67,7 +67,9 @@ def _check_vector(name: str, inputs: Shapes) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Selector(Block):
-    """Chosen elements of a vector, in the order of the indices: y(k) = u(indices(k)); one index: a scalar."""
+    """Selected elements of a vector, in the order of the indices: y(k) = u(indices(k)).
+
+    One index gives a scalar."""
 
     title: ClassVar[str] = "Selector"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -88,7 +90,7 @@ class Selector(Block):
         return (Port("u", "the vector"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the chosen elements"),)
+        return (Port("y", "the selected elements"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         _check_vector("u", inputs)
@@ -105,9 +107,9 @@ class Selector(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SubMatrix(Block):
-    """Chosen rows and columns of a matrix: y = u(first_row:last_row, first_column:last_column), from 1.
+    """A submatrix: y = u(first_row:last_row, first_column:last_column), from 1.
 
-    A last row or column of 0 stands for the end of the matrix. A vector counts as a column.
+    A last row or column of 0 means the end of the matrix. A vector counts as a column.
     """
 
     title: ClassVar[str] = "Submatrix"
@@ -126,15 +128,15 @@ class SubMatrix(Block):
         return (Port("u", "the matrix"),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the chosen part, a matrix"),)
+        return (Port("y", "the submatrix"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         rows, columns = (*inputs["u"], 1, 1)[:2]
         last_row, last_column = self.last_row or rows, self.last_column or columns
         if not (self.first_row <= last_row <= rows and self.first_column <= last_column <= columns):
             raise InputError(
-                f"rows {self.first_row} to {last_row} and columns {self.first_column} to {last_column} "
-                "are no part of the matrix",
+                f"rows {self.first_row} to {last_row} and columns {self.first_column} to {last_column} are "
+                f"outside the matrix",
                 allowed=f"rows 1 to {rows} and columns 1 to {columns}, the first not after the last",
                 fix="correct the rows and columns",
             )
@@ -151,7 +153,7 @@ class SubMatrix(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Assignment(Block):
-    """A vector with some elements replaced: y = y0, but y(indices(k)) = u(k); a scalar u goes to all."""
+    """A vector with some elements replaced: y = y0, but y(indices(k)) = u(k); a scalar u is broadcast."""
 
     title: ClassVar[str] = "Assignment"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -161,7 +163,11 @@ class Assignment(Block):
     )
 
     indices: ArrayLike = parameter(
-        (1.0,), kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc="which elements are replaced"
+        (1.0,),
+        kind=ParameterKind.ARRAY,
+        dimensions=(0, 1),
+        tunable=False,
+        doc="indices of the replaced elements",
     )
     counting: str = parameter("one-based", choices=COUNTING, doc="whether the first index is 1 or 0")
 
@@ -181,8 +187,8 @@ class Assignment(Block):
         _check_inside(places, math.prod(inputs["y0"]), self.counting)
         if math.prod(inputs["u"]) not in (1, len(places)):
             raise InputError(
-                f"{math.prod(inputs['u'])} new elements come for {len(places)} places",
-                allowed="one for each place, or one for all",
+                f"{math.prod(inputs['u'])} new elements for {len(places)} indices",
+                allowed="one for each index, or one for all",
                 fix="correct the indices or the width of 'u'",
             )
         return {"y": inputs["y0"]}
@@ -199,14 +205,14 @@ class Assignment(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class IndexVector(Block):
-    """The element of a vector that a signal points at: y = u(index).
+    """The element of a vector at a variable index: y = u(index).
 
-    The index is cut down to an integer and held between the first and the last element.
+    The index is truncated to an integer and limited to the range of the elements.
     """
 
     title: ClassVar[str] = "Index Vector"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A counter picks one of three numbers after the other.",
+        shows="A counter selects three numbers in turn.",
         inputs={"index": made("CounterLimited", upper=2), "u": made("Constant", value=(0.5, 2.0, 1.0))},
         shown=("index", "y"),
     )
@@ -232,7 +238,7 @@ class IndexVector(Block):
 
 
 def choose(index: SX, candidates: list[SX], counting: str = "zero-based") -> SX:
-    """The candidate at a symbolic index, which is cut down to an integer and held inside the list."""
+    """The candidate at a symbolic index, which is truncated to an integer and limited to the list."""
     first = 1.0 if counting == "one-based" else 0.0
     place = fmin(fmax(floor(index) - first, 0.0), float(len(candidates) - 1))
     chosen = candidates[-1]

@@ -1,4 +1,4 @@
-"""Blocks that pass one of their inputs on."""
+"""Blocks that select one of their inputs."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from armblocks.diagram import (
 
 @dataclass(frozen=True, kw_only=True)
 class Switch(Block):
-    """One of two signals: y = u1 where the control meets the criterion, u3 elsewhere."""
+    """One of two signals: y = u1 where the control input meets the criterion, else u3."""
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Switch"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A fast sine while the control is at least 0.5, a constant else.",
+        shows="A fast sine while the control input is at least 0.5, else a constant.",
         parameters={"threshold": 0.5},
         inputs={
             "u1": made("SineWave", frequency=5.0),
@@ -47,12 +47,14 @@ class Switch(Block):
         },
     )
 
-    criterion: str = parameter(">=", choices=(">=", ">"), doc="how the control compares with the threshold")
-    threshold: float = parameter(0.0, doc="what the control is compared with")
+    criterion: str = parameter(
+        ">=", choices=(">=", ">"), doc="comparison of the control input with the threshold"
+    )
+    threshold: float = parameter(0.0, doc="threshold of the control input")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("u1", "given where the criterion is met"),
+            Port("u1", "output where the criterion is met"),
             Port("u2", "the control"),
             Port("u3", "given elsewhere"),
         )
@@ -61,7 +63,7 @@ class Switch(Block):
         return ("u1", "u3")
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "one of the two"),)
+        return (Port("y", "the selected input"),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u1"] if inputs["u1"] == inputs["u3"] else ""}
@@ -87,15 +89,15 @@ class Switch(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MultiportSwitch(Block):
-    """The input that a signal points at: y = u1 for index 1, u2 for index 2, …
+    """The input at a variable index: y = u1 for index 1, u2 for index 2, …
 
-    The index is cut down to an integer and held between the first and the last input. All inputs have one
-    shape, scalars spread.
+    The index is truncated to an integer and limited to the range of the inputs. All inputs have one shape;
+    scalars are broadcast.
     """
 
     title: ClassVar[str] = "Multiport Switch"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A counter picks one input after the other.",
+        shows="A counter selects the inputs in turn.",
         parameters={"counting": "zero-based"},
         inputs={
             "index": made("CounterLimited", upper=2),
@@ -105,7 +107,7 @@ class MultiportSwitch(Block):
         },
     )
 
-    inputs: int = parameter(3, minimum=1, doc="how many inputs there are to choose from")
+    inputs: int = parameter(3, minimum=1, doc="number of inputs to select from")
     counting: str = parameter("one-based", choices=COUNTING, doc="whether the first index is 1 or 0")
     zero_crossing: bool = zero_crossing_parameter()
 
@@ -116,7 +118,7 @@ class MultiportSwitch(Block):
         return tuple(f"u{k}" for k in range(1, self.inputs + 1))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the chosen input"),)
+        return (Port("y", "the selected input"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({name: shape for name, shape in inputs.items() if name != "index"})}
@@ -125,7 +127,7 @@ class MultiportSwitch(Block):
         return {"y": common_unit({name: unit for name, unit in inputs.items() if name != "index"})}
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
-        doc = "1 where the index points at input {} or beyond"
+        doc = "1 where the index is at least that of input {}"
         return located(self, *(Condition(f"from{k}", (), doc.format(k)) for k in range(2, self.inputs + 1)))
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -144,9 +146,9 @@ class MultiportSwitch(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ManualSwitch(Block):
-    """One of two inputs, thrown by hand: y = u1 for position 1 and u2 for position 2.
+    """A manual switch: y = u1 for position 1 and u2 for position 2.
 
-    The position is tunable, so that it can be thrown without compiling again; from 1.5 on it is 2.
+    The position is tunable, so that it can change without compiling again; values from 1.5 on count as 2.
     """
 
     title: ClassVar[str] = "Manual Switch"
@@ -166,7 +168,7 @@ class ManualSwitch(Block):
         return ("u1", "u2")
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the chosen input"),)
+        return (Port("y", "the selected input"),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": common_unit(inputs)}

@@ -1,1 +1,1 @@
-"""Blocks that show or store signals, or end a run."""
+"""Blocks that display or store signals, or end a run."""

@@ -1,4 +1,4 @@
-"""Blocks that show or keep what they receive: they have no outputs, only views."""
+"""Blocks that display or store their inputs; they have views and no outputs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WINDOWS = ("hann", "hamming", "blackman", "flat top", "rectangular")
 
 @dataclass(frozen=True, kw_only=True)
 class Scope(Block):
-    """Traces of all inputs over time."""
+    """A scope: traces of all inputs over time."""
 
     title: ClassVar[str] = "Scope"
     card_size: ClassVar[tuple[float, float]] = (72.0, 60.0)
@@ -38,10 +38,10 @@ class Scope(Block):
         inputs={"u1": made("SineWave"), "u2": made("PulseGenerator")},
     )
 
-    inputs: int = parameter(1, minimum=1, doc="how many inputs")
+    inputs: int = parameter(1, minimum=1, doc="number of inputs")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", self.inputs, "what is traced")
+        return numbered_ports("u", self.inputs, "signal to plot")
 
     def views(self) -> tuple[View, ...]:
         return (View(kind=ViewKind.TRACES, signals=tuple(port.name for port in self.input_ports())),)
@@ -49,17 +49,17 @@ class Scope(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class XYGraph(Block):
-    """The path of one signal over another."""
+    """An x-y plot of two signals."""
 
     title: ClassVar[str] = "XY Graph"
     card_size: ClassVar[tuple[float, float]] = (72.0, 60.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A figure of Lissajous: two sines of different frequency, one over the other.",
+        shows="A Lissajous figure: two sines of different frequencies.",
         inputs={"x": made("SineWave", frequency=2.0), "y": made("SineWave", frequency=3.0)},
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("x", "along the horizontal axis"), Port("y", "along the vertical axis"))
+        return (Port("x", "signal of the horizontal axis"), Port("y", "signal of the vertical axis"))
 
     def views(self) -> tuple[View, ...]:
         return (View(kind=ViewKind.PATH, signals=("x", "y")),)
@@ -67,18 +67,18 @@ class XYGraph(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Display(Block):
-    """The numbers themselves: of one signal, or of several."""
+    """A numeric display of one or several signals."""
 
     title: ClassVar[str] = "Display"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The number as it stands at the end of the run.",
+        shows="The value at the end of the run.",
         inputs={"u": made("Ramp", slope=0.5)},
     )
 
-    inputs: int = parameter(1, minimum=1, doc="how many inputs")
+    inputs: int = parameter(1, minimum=1, doc="number of inputs")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", self.inputs, "what is shown")
+        return numbered_ports("u", self.inputs, "signal to show")
 
     def views(self) -> tuple[View, ...]:
         return (View(kind=ViewKind.VALUE, signals=tuple(port.name for port in self.input_ports())),)
@@ -86,11 +86,11 @@ class Display(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ToWorkspace(Block):
-    """Keeps the signal under a name in the exported data."""
+    """Stores the signal under a name in the exported data."""
 
     title: ClassVar[str] = "To Workspace"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The signal is kept under the name that is given; a scope shows it here.",
+        shows="The signal is stored under the given name; a scope shows it here.",
         inputs={"u": made("SineWave")},
         shown=("u",),
     )
@@ -101,7 +101,7 @@ class ToWorkspace(Block):
         return Words(self.variable)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is kept"),)
+        return (Port("u", "signal to store"),)
 
     def views(self) -> tuple[View, ...]:
         return (View(kind=ViewKind.DATA, signals=("u",), labels=(self.variable,)),)
@@ -109,26 +109,26 @@ class ToWorkspace(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class ToFile(Block):
-    """Keeps the signal in a file of its own: CSV, NPZ, MAT or Parquet by the file's ending.
+    """Stores the signal in a separate file: CSV, NPZ, MAT or Parquet, by the file name extension.
 
-    The run itself writes nothing. ``write_report``, and so ``armblocks run``, writes the file into the
-    report's folder, ``write_files`` into a folder that is given; never outside of it. Rows are the recorded
-    instants: every ``decimation``-th from the first on, of these the last ``limit``.
+    The run itself writes no file. ``write_report`` (and thus ``armblocks run``) writes the file into the
+    report's folder; ``write_files`` writes it into a given folder. The path must be inside that folder. Rows
+    are recorded sample times: every ``decimation``-th from the first on, of these the last ``limit``.
     """
 
     title: ClassVar[str] = "To File"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The signal goes to a file beside the report; a scope shows it here.",
+        shows="The signal is written to a file beside the report; a scope shows it here.",
         parameters={"file": "wave.csv", "variable": "wave"},
         inputs={"u": made("SineWave")},
         shown=("u",),
     )
 
-    file: str = parameter("simout.csv", doc="path of the file in the folder that the caller gives")
-    variable: str = parameter("simout", doc="the name of the variable in it")
-    decimation: int = parameter(1, minimum=1, doc="of how many recorded instants one is kept")
+    file: str = parameter("simout.csv", doc="path of the file, relative to the folder of the report")
+    variable: str = parameter("simout", doc="the name of the variable in the file")
+    decimation: int = parameter(1, minimum=1, doc="one of this many recorded sample times is stored")
     limit: int = parameter(
-        1_000_000, minimum=1, maximum=10_000_000, doc="at most so many rows, the last ones"
+        1_000_000, minimum=1, maximum=10_000_000, doc="maximum number of rows; the last ones are stored"
     )
 
     def face_sign(self) -> FaceSign:
@@ -143,11 +143,11 @@ class ToFile(Block):
                 where="ToFile.file",
                 allowed="a path inside a folder that ends in "
                 + ", ".join("." + end for end in FILE_SUFFIXES),
-                fix="leave out '..' and leading '/'; the caller says which folder it is",
+                fix="omit '..' and a leading '/'; the path is relative to the folder of the report",
             )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is kept"),)
+        return (Port("u", "signal to store"),)
 
     def views(self) -> tuple[View, ...]:
         settings = FileSettings(file=self.file, decimation=self.decimation, limit=self.limit)
@@ -156,13 +156,13 @@ class ToFile(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Spectrum(Block):
-    """How a signal spreads over the frequencies: amplitudes, or power density by Welch's method.
+    """The spectrum of a signal: amplitudes, or power spectral density by Welch's method.
 
-    ``amplitude``: that of a sine at each frequency, A = 2 |X| / sum(w); ``power density``: one-sided,
-    2 |X|^2 / (rate sum(w^2)), its integral over the frequency the mean square. X is the discrete Fourier
-    transform of evenly spaced samples times the window w. Several half-overlapping segments are averaged
-    (Welch, IEEE Trans. Audio Electroacoustics 15, 1967). Signals are those of the recorded instants, straight
-    between them: record finely enough (``sample_time``), nothing filters what is faster.
+    ``amplitude``: that of a sine at each frequency, A = 2 |X| / sum(w); ``power density``: one-sided, 2 |X|^2
+    / (rate sum(w^2)); its integral over the frequency is the mean square. X is the discrete Fourier transform
+    of evenly spaced samples times the window w. Several half-overlapping segments are averaged (Welch, IEEE
+    Trans. Audio Electroacoustics 15, 1967). Signals are interpolated linearly between the recorded sample
+    times. There is no anti-aliasing filter: choose a sufficiently small ``sample_time``.
     """
 
     title: ClassVar[str] = "Spectrum"
@@ -181,20 +181,20 @@ class Spectrum(Block):
         shown=("u",),
     )
 
-    inputs: int = parameter(1, minimum=1, doc="how many inputs")
-    quantity: str = parameter("amplitude", choices=QUANTITIES, doc="what is shown")
-    window: str = parameter("hann", choices=WINDOWS, doc="the weights of a segment's samples")
-    averages: int = parameter(1, minimum=1, doc="how many half-overlapping segments are averaged")
+    inputs: int = parameter(1, minimum=1, doc="number of inputs")
+    quantity: str = parameter("amplitude", choices=QUANTITIES, doc="quantity to show")
+    window: str = parameter("hann", choices=WINDOWS, doc="window function of a segment")
+    averages: int = parameter(1, minimum=1, doc="number of half-overlapping segments to average")
     sample_rate: float = parameter(
-        0.0, minimum=0.0, tunable=False, unit="Hz", doc="samples a second; 0 takes the recorded instants"
+        0.0, minimum=0.0, tunable=False, unit="Hz", doc="sampling rate; 0 uses the recorded sample times"
     )
-    begin: float = parameter(0.0, tunable=False, unit="s", doc="what was before is left out")
-    remove_mean: bool = parameter(True, doc="whether the mean of each segment is taken off")
+    begin: float = parameter(0.0, tunable=False, unit="s", doc="start of the evaluated time range")
+    remove_mean: bool = parameter(True, doc="whether the mean of each segment is subtracted")
     decibels: bool = parameter(True, doc="whether the vertical axis is in decibels")
     logarithmic: bool = parameter(False, doc="whether the frequency axis is logarithmic")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return numbered_ports("u", self.inputs, "what is looked at")
+        return numbered_ports("u", self.inputs, "signal to analyse")
 
     def views(self) -> tuple[View, ...]:
         settings = SpectrumSettings(
@@ -213,13 +213,13 @@ class Spectrum(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Terminator(Block):
-    """Takes a signal that nobody needs."""
+    """Terminates an unused signal."""
 
     title: ClassVar[str] = "Terminator"
     card_size: ClassVar[tuple[float, float]] = (34.0, 34.0)
     sign: ClassVar[FaceSign] = Words("⊣")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Nothing is done with the signal; a scope shows it here.",
+        shows="The signal is not used; a scope shows it here.",
         inputs={"u": made("SineWave")},
         shown=("u",),
     )
@@ -228,4 +228,4 @@ class Terminator(Block):
         return ("u",)
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is not needed"),)
+        return (Port("u", "unused signal"),)

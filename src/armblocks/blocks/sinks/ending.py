@@ -1,4 +1,4 @@
-"""Blocks that watch a condition: one ends the run where it is met, the other where it is broken."""
+"""Blocks that monitor a condition: one ends the run when it is met, the other checks an assertion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.diagram import Block, Guard, Port, Shapes, Signals, WorkedExample
 
 @dataclass(frozen=True, kw_only=True)
 class StopSimulation(Block):
-    """Ends the run, exactly where its input becomes other than 0: the run is then complete, and says so."""
+    """Ends the run at the exact time at which its input becomes nonzero. The run counts as complete."""
 
     title: ClassVar[str] = "Stop Simulation"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -22,7 +22,7 @@ class StopSimulation(Block):
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "ends the run where it is not 0"),)
+        return (Port("u", "ends the run when it is not 0"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("stop", inputs["u"], "positive where u is not 0", 1, "stop"),)
@@ -33,20 +33,21 @@ class StopSimulation(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Assertion(Block):
-    """Says that its input is never 0: where it becomes 0 the run fails there, or tells so at its end."""
+    """Asserts that its input is not 0: when it becomes 0, the run fails, or reports it at the end."""
 
     title: ClassVar[str] = "Assertion"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="That the sine stays below 0.9 does not hold: the run goes on, and its message says so.",
+        shows="The assertion that the sine stays below 0.9 fails: the run continues, and its message "
+        "reports it.",
         parameters={"action": "warn"},
         inputs={"u": made("CompareToConstant", relation="<", constant=0.9).by(u=made("SineWave"))},
         shown=("u",),
     )
 
-    action: str = parameter("fail", choices=("fail", "warn"), doc="what happens where the input becomes 0")
+    action: str = parameter("fail", choices=("fail", "warn"), doc="action when the input becomes 0")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what must not be 0"),)
+        return (Port("u", "signal that must not be 0"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("broken", inputs["u"], "positive where u is 0", 1, self.action),)

@@ -1,1 +1,1 @@
-"""Blocks that make signals: constants, functions of time, sequences, noise, tables."""
+"""Blocks that generate signals: constants, functions of time, sequences, noise, tables."""

@@ -1,4 +1,4 @@
-"""Blocks that make a signal from nothing but the time."""
+"""Sources: blocks whose output depends on time alone."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Constant(Block):
 
     title: ClassVar[str] = "Constant"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The same value at all times.",
+        shows="A constant value.",
         parameters={"value": 2.0},
     )
 
-    value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="what comes out")
+    value: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="value of the output")
 
     def face_sign(self) -> FaceSign:
         return Words(self.stated_text("value"))
@@ -45,11 +45,11 @@ class Clock(Block):
     title: ClassVar[str] = "Clock"
     sign: ClassVar[FaceSign] = Words("t")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The time itself: a slope of 1.",
+        shows="The simulation time.",
     )
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "time since the start", "s", shape=()),)
+        return (Port("y", "simulation time", "s", shape=()),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"y": t}
@@ -57,7 +57,7 @@ class Clock(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Step(Block):
-    """A jump at a known time: y = initial for t < time, y = final from there on.
+    """A step at a given time: y = initial for t < time, y = final from there on.
 
     A Derivative block behind it ignores the jump.
     """
@@ -69,9 +69,9 @@ class Step(Block):
         parameters={"time": 2.0},
     )
 
-    time: float = parameter(1.0, doc="when it jumps", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the value before")
-    final: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the value from the jump on")
+    time: float = parameter(1.0, doc="time of the step", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before it")
+    final: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="value from the step on")
 
     def check(self) -> None:
         parameters_shape(self, "initial", "final")
@@ -91,18 +91,18 @@ class Step(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Ramp(Block):
-    """A straight rise from a known time on: y = initial + slope max(t - start, 0)."""
+    """A ramp from a given time on: y = initial + slope max(t - start, 0)."""
 
     title: ClassVar[str] = "Ramp"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.3, 0), (1, 1))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Level until 2 s, then a rise of 0.5 a second.",
+        shows="Constant until 2 s, then a slope of 0.5 per second.",
         parameters={"slope": 0.5, "start": 2.0},
     )
 
-    slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="rise per second", unit="1/s")
-    start: float = parameter(0.0, doc="when the rise begins", unit="s")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the value before")
+    slope: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="slope", unit="1/s")
+    start: float = parameter(0.0, doc="start time of the ramp", unit="s")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="value before it")
 
     def check(self) -> None:
         parameters_shape(self, "slope", "initial")
@@ -122,19 +122,19 @@ class Ramp(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SineWave(Block):
-    """A sine of the time: y = amplitude sin(frequency t + phase) + bias."""
+    """A sine of time: y = amplitude sin(frequency t + phase) + bias."""
 
     title: ClassVar[str] = "Sine Wave"
     sign: ClassVar[FaceSign] = swing(1.0)
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Two radians a second, about the bias 1.",
+        shows="A sine of 2 rad/s with bias 1.",
         parameters={"amplitude": 2.0, "frequency": 2.0, "bias": 1.0},
     )
 
-    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the way from peak to peak")
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="half the peak-to-peak value")
     frequency: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="angular frequency", unit="rad/s")
     phase: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="angle at t = 0", unit="rad")
-    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+    bias: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="mean value")
 
     def check(self) -> None:
         parameters_shape(self, "amplitude", "frequency", "phase", "bias")

@@ -24,12 +24,12 @@ from armblocks.diagram.signs import FaceSign, stairs
 
 @dataclass(frozen=True, kw_only=True)
 class CounterLimited(Block):
-    """Counts the ticks and starts again: y(k) = k mod (upper + 1)."""
+    """Counts the ticks up to a limit and restarts at 0: y(k) = k mod (upper + 1)."""
 
     title: ClassVar[str] = "Counter Limited"
     sign: ClassVar[FaceSign] = stairs((0.0, 0.5, 1.0, 0.0, 0.5, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Counts 0, 1, 2, 3 at its ticks and starts again.",
+        shows="Counts 0, 1, 2, 3 at its ticks and restarts at 0.",
         parameters={"upper": 3, "sample_time": 0.5},
     )
     sampled: ClassVar[bool] = True
@@ -60,7 +60,7 @@ class DigitalClock(Block):
     title: ClassVar[str] = "Digital Clock"
     sign: ClassVar[FaceSign] = stairs((0.0, 0.25, 0.5, 0.75, 1.0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The time of the last tick, beside the time itself.",
+        shows="The time of the last tick, and the simulation time.",
         inputs={},
         shown=("y", made("Clock")),
     )
@@ -87,7 +87,7 @@ class CounterFreeRunning(Block):
     )
     sampled: ClassVar[bool] = True
 
-    bits: int = parameter(16, minimum=1, maximum=52, doc="how many bits the count has")
+    bits: int = parameter(16, minimum=1, maximum=52, doc="number of bits of the counter")
     sample_time: ArrayLike = sample_time_parameter(1.0)
 
     def output_ports(self) -> tuple[Port, ...]:

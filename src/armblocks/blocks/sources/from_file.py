@@ -1,4 +1,4 @@
-"""Measurements played back: tables of any length, of which only the row of the moment is read."""
+"""Playback of measurements: tables of any length, of which only the rows at the present time are read."""
 
 from __future__ import annotations
 
@@ -27,19 +27,20 @@ from armblocks.equations import last_at_or_below, read_entry
 
 @dataclass(frozen=True, kw_only=True)
 class FromFile(Block):
-    """What a table holds: y = the values of the rows around t, between them straight lines or the last row.
+    """A signal from a table: y = values of the rows around t, interpolated linearly or held.
 
-    In a diagram's file ``data`` is the path of a CSV, NPZ, MAT or Parquet file beside it; in Python what
-    ``load_table`` gives, or rows (time, value, …). Each row is an event, so that no step passes over one,
-    and costs no more in a long table than in a short one. Before and after the table the first and the last
-    row are held, or the signal is ``zero`` (from the last instant on).
+    In the file of a diagram, ``data`` is the path of a CSV, NPZ, MAT or Parquet file, relative to the
+    diagram's file. In Python it is the result of ``load_table``, or rows (time, value, …). Each row is an
+    event, so that no step passes over a row. The cost of a row does not depend on the length of the table.
+    Before and after the table the first and the last row are held, or the signal is ``zero`` (after the
+    table, from the time of the last row on).
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "From File"
     sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Five rows, with straight lines between them.",
+        shows="Five rows with linear interpolation.",
         parameters={"data": ((0.0, 0.0), (1.0, 2.0), (2.5, -1.0), (4.0, 1.0), (5.0, 1.0))},
     )
 
@@ -48,20 +49,20 @@ class FromFile(Block):
         kind=ParameterKind.TABLE,
         of_type=TimeTable,
         tunable=True,
-        doc="rows of an instant (s) and m values",
+        doc="rows of a time (s) and m values",
     )
-    method: str = parameter("linear", choices=("linear", "flat"), doc="what to do between two rows")
-    outside: str = parameter("hold", choices=("hold", "zero"), doc="what to do before and after")
+    method: str = parameter("linear", choices=("linear", "flat"), doc="interpolation method")
+    outside: str = parameter("hold", choices=("hold", "zero"), doc="extrapolation method")
 
     def output_ports(self) -> tuple[Port, ...]:
         _, width = self._size
         return (Port("y", "the values", shape=(width - 1,) if width > 2 else ()),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("row", (), "the last row that has passed, from 0; -1 before the first"),)
+        return (State("row", (), "index of the last row in the past, from 0; -1 before the first row"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return (Guard("next", (), "t - the instant of the next row", 1),)
+        return (Guard("next", (), "t - the time of the next row", 1),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         count, width = self._size
@@ -94,7 +95,7 @@ class FromFile(Block):
         return {"row": logic_or(due, self._early(t, x, p))}
 
     def _early(self, t: SX, x: Signals, p: Signals) -> SX:
-        """Whether row 0 is still to come: at the start, where it is the first to hold."""
+        """Whether t is before row 0, while the first row is held."""
         return logic_and(x["row"] == 0.0, since(t, self._entry(p, SX(0.0), 0)) < 0.0)
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
@@ -106,5 +107,5 @@ class FromFile(Block):
         return rows, width
 
     def _entry(self, p: Signals, row: SX, column: int) -> SX:
-        # row by row in the vector of parameters, which is column by column in the transpose
+        # row-major in the parameter vector, which is column-major in the transpose
         return read_entry(p["data"].T, self._size[1] * row + float(column))

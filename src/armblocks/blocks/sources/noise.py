@@ -1,6 +1,6 @@
 """Random signals: seeded, the same on every machine to the last bit, drawn at the ticks of a clock.
 
-Every element of a vector has a stream of its own; blocks with different seeds never share one.
+Every element of a vector has a separate stream; blocks with different seeds never share a stream.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from armblocks.diagram import (
 from armblocks.diagram.signs import FaceSign, graph, stairs
 
 _MOST = float(2**SEED_BITS - 1)
-_SEED = f"which stream of numbers, 0 to {_MOST:.0f}; its whole part counts"
+_SEED = f"seed, an integer from 0 to {_MOST:.0f}"
 
 
 _NOISE = (0.5, 0.75, 0.3, 0.55, 0.05, 0.6, 1.0, 0.4, 0.65, 0.2, 0.45, 0.9, 0.35, 0.0, 0.6, 0.5)
@@ -44,7 +44,7 @@ _NOISE = (0.5, 0.75, 0.3, 0.55, 0.05, 0.6, 1.0, 0.4, 0.65, 0.2, 0.45, 0.9, 0.35,
 
 @dataclass(frozen=True, kw_only=True)
 class RandomNumber(Block):
-    """Gaussian random numbers, a new one at each tick: y(k) = mean + sqrt(variance) n(k), n of N(0, 1)."""
+    """Normal random numbers, one at each tick: y(k) = mean + sqrt(variance) n(k), n of N(0, 1)."""
 
     title: ClassVar[str] = "Random Number"
     sign: ClassVar[FaceSign] = stairs(_NOISE[:9])
@@ -82,7 +82,7 @@ class RandomNumber(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class UniformRandomNumber(Block):
-    """Evenly spread random numbers, a new one at each tick: minimum < y(k) < maximum."""
+    """Uniform random numbers, one at each tick: minimum < y(k) < maximum."""
 
     title: ClassVar[str] = "Uniform Random Number"
     sign: ClassVar[FaceSign] = stairs((0.9, 0.2, 0.6, 0.1, 1.0, 0.45, 0.75, 0.0))
@@ -123,14 +123,14 @@ class BandLimitedWhiteNoise(Block):
     """White noise for continuous systems: y(k) = sqrt(noise_power / T) n(k), n of N(0, 1), held for T.
 
     The height of its two-sided power spectral density is ``noise_power`` well below the frequency 1 / T (Hz),
-    so that the variance of what a system makes of it does not depend on T. Choose T a hundredth of the time
-    in which the fastest part of the system changes, as Simulink's documentation of the block advises.
+    so that the variance of a system's response does not depend on T. Choose T as about 1/100 of the smallest
+    time constant of the system, as Simulink's documentation of the block advises.
     """
 
     title: ClassVar[str] = "Band-Limited White Noise"
     sign: ClassVar[FaceSign] = graph(*((k / 15, v) for k, v in enumerate(_NOISE)))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Noise, and what a lag of 1 s lets through of it.",
+        shows="Noise, before and after a lag of 1 s.",
         parameters={"noise_power": 0.05},
         shown=("y", made("FirstOrderLag").named("lag").by(u="y")),
     )

@@ -27,9 +27,9 @@ from armblocks.diagram.signs import FaceSign, pulses
 class PWM(Block):
     """Pulse width modulation: y = amplitude for t_k <= t < t_k + D(t_k) T, else 0, with D held to 0 … 1.
 
-    The duty cycle D is looked at where a pulse may begin, as in Simulink's PWM; both edges are located
-    exactly. The mean of y over a period is D times the amplitude. A sampled block that ticks at an edge
-    sees y as it was just before.
+    The duty cycle D is sampled at the start of each period, as in Simulink's PWM. Both edges are located
+    exactly. The mean of y over a period is D times the amplitude. A sampled block that ticks at an edge reads
+    the left limit of y.
     """
 
     title: ClassVar[str] = "PWM"
@@ -40,9 +40,9 @@ class PWM(Block):
         inputs={"D": made("Ramp", slope=0.1)},
     )
 
-    period: float = parameter(0.1, above=0.0, doc="T, from pulse to pulse", unit="s")
-    offset: float = parameter(0.0, minimum=0.0, doc="when the first pulse may begin", unit="s")
-    amplitude: float = parameter(1.0, doc="the height of the pulses")
+    period: float = parameter(0.1, above=0.0, doc="period T of the pulses", unit="s")
+    offset: float = parameter(0.0, minimum=0.0, doc="start time of the first period", unit="s")
+    amplitude: float = parameter(1.0, doc="amplitude of the pulses")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("D", "the duty cycle, 0 … 1", shape=()),)

@@ -29,7 +29,7 @@ from armblocks.diagram.signs import FaceSign, pulses
 
 @dataclass(frozen=True, kw_only=True)
 class PulseGenerator(Block):
-    """Square pulses: y = amplitude during the first width % of each period after the delay, 0 elsewhere."""
+    """Square pulses: y = amplitude during the first width % of each period after the delay, else 0."""
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Pulse Generator"
@@ -39,10 +39,10 @@ class PulseGenerator(Block):
         parameters={"width": 30.0},
     )
 
-    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the height of the pulses")
-    period: float = parameter(2.0, above=0.0, doc="from one pulse to the next", unit="s")
-    width: float = parameter(50.0, above=0.0, maximum=99.999, doc="the length of a pulse in % of the period")
-    delay: float = parameter(0.0, minimum=0.0, doc="when the first pulse begins", unit="s")
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="amplitude of the pulses")
+    period: float = parameter(2.0, above=0.0, doc="period of the pulses", unit="s")
+    width: float = parameter(50.0, above=0.0, maximum=99.999, doc="width of a pulse in % of the period")
+    delay: float = parameter(0.0, minimum=0.0, doc="start time of the first pulse", unit="s")
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the pulses"),)
@@ -51,7 +51,7 @@ class PulseGenerator(Block):
         return {"y": shape_of(self.amplitude)}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("edges", (), "how many edges have passed"),)
+        return (State("edges", (), "number of past edges"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("edge", (), "t - the next edge", 1),)
@@ -65,7 +65,7 @@ class PulseGenerator(Block):
         return {"edge": since(t, p["delay"] + (pulses + high * p["width"] / 100.0) * p["period"])}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        # k * period / period may come out a little below k.
+        # k * period / period may be rounded to slightly less than k.
         periods = (t - p["delay"]) / p["period"] * (1.0 + 1e-14)
         pulses = floor(periods)
         over = (periods - pulses) * 100.0 >= p["width"] * (1.0 - 1e-12)

@@ -1,7 +1,7 @@
-"""Sources that repeat themselves: waves and sequences. Every edge happens at an exact instant.
+"""Periodic sources: waves and sequences with exact edge times.
 
-Edges of a wave in continuous time are events at multiples of the period, worked out and never accumulated;
-sampled sequences count ticks.
+Edges of a wave in continuous time are events at multiples of the period, which are computed by a product and
+not accumulated. Sampled sequences count ticks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from armblocks.diagram import (
 from armblocks.diagram.signs import FaceSign, graph, pulses, stairs, swing
 from armblocks.errors import InputError
 
-_ROUNDED = 1.0 + 1e-14  # k * period / period may come out a little below k
+_ROUNDED = 1.0 + 1e-14  # k * period / period may be slightly less than k
 
 
 _WAVES = {
@@ -46,7 +46,7 @@ _WAVES = {
 
 @dataclass(frozen=True, kw_only=True)
 class SignalGenerator(Block):
-    """A wave with the phase s = f t - floor(f t): sine A sin(2 pi s), sawtooth A (1 - 2 s), or square.
+    """A periodic wave; s = f t - floor(f t): sine A sin(2 pi s), sawtooth A (1 - 2 s), or square.
 
     The square is -A in the first half of the period and A in the second, and the sawtooth falls from A to
     -A, as with Simulink's block. Its fourth form, random numbers, is the block Uniform Random Number here,
@@ -61,9 +61,9 @@ class SignalGenerator(Block):
     )
 
     waveform: str = parameter("sine", choices=("sine", "square", "sawtooth"), doc="the form of the wave")
-    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="A, half the way from peak to peak")
-    frequency: float = parameter(1.0, above=0.0, doc="f, in the units chosen")
-    units: str = parameter("Hz", choices=("Hz", "rad/s"), doc="units of the frequency")
+    amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="A, half the peak-to-peak value")
+    frequency: float = parameter(1.0, above=0.0, doc="f, in the chosen unit")
+    units: str = parameter("Hz", choices=("Hz", "rad/s"), doc="unit of the frequency")
 
     def face_sign(self) -> FaceSign:
         return _WAVES[self.waveform]
@@ -75,7 +75,7 @@ class SignalGenerator(Block):
         return {"y": shape_of(self.amplitude)}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return () if self.waveform == "sine" else (State("edges", (), "how many edges have passed"),)
+        return () if self.waveform == "sine" else (State("edges", (), "number of past edges"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return () if self.waveform == "sine" else (Guard("edge", (), "t - the next edge", 1),)
@@ -113,7 +113,7 @@ class SignalGenerator(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatingSequence(Block):
-    """A polygon that repeats itself: y = values at times, straight lines between, period times[-1].
+    """A periodic piecewise linear signal: y = values at times, linear in between, period times[-1].
 
     Where the last value is not the first one, the signal jumps at the end of each period.
     """
@@ -122,14 +122,14 @@ class RepeatingSequence(Block):
     title: ClassVar[str] = "Repeating Sequence"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.5, 1), (0.5, 0), (1, 1), (1, 0))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A course of four points that begins again every three seconds.",
+        shows="Four points with a period of three seconds.",
         parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0)},
     )
 
     times: ArrayLike = parameter(
-        (0.0, 2.0), dimensions=(1,), tunable=False, doc="instants (n,) from 0", unit="s"
+        (0.0, 2.0), dimensions=(1,), tunable=False, doc="times (n,), starting at 0", unit="s"
     )
-    values: ArrayLike = parameter((0.0, 2.0), dimensions=(1,), doc="values there (n,)")
+    values: ArrayLike = parameter((0.0, 2.0), dimensions=(1,), doc="values at the times (n,)")
 
     def check(self) -> None:
         _check_times(self, self.times, shape_of(self.values)[0])
@@ -138,7 +138,7 @@ class RepeatingSequence(Block):
         return (Port("y", "the sequence", shape=()),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("pieces", (), "how many straight lines have passed"),)
+        return (State("pieces", (), "number of past segments"),)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("corner", (), "t - the next corner", 1),)
@@ -171,7 +171,7 @@ class RepeatingSequence(Block):
         return {"pieces": x["pieces"] + (e["corner"] > 0.0)}
 
     def _piece(self, pieces: SX) -> tuple[SX, SX]:
-        """Whole periods passed, and a vector that is 1 at the present line and 0 at the others."""
+        """The number of past periods, and a vector that is 1 for the present segment and 0 for the others."""
         count = shape_of(self.times)[0] - 1
         periods = floor(pieces / count)
         return periods, vertcat(*cells(pieces - count * periods, [k - 0.5 for k in range(1, count)]))
@@ -179,24 +179,24 @@ class RepeatingSequence(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatingSequenceInterpolated(Block):
-    """A sampled course that repeats itself: y(k) = values at times, read at kT modulo times[-1].
+    """A periodic sampled signal: y(k) = values at times, interpolated at kT modulo times[-1].
 
-    ``linear`` goes straight from one value to the next, ``nearest`` takes the nearest, ``flat`` the last one.
+    ``linear`` interpolates linearly, ``nearest`` takes the nearest value, ``flat`` the previous one.
     """
 
     title: ClassVar[str] = "Repeating Sequence Interpolated"
     sign: ClassVar[FaceSign] = graph((0, 0), (0.2, 1), (0.5, 0.3), (0.5, 0), (0.7, 1), (1, 0.3))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A course of four points, read every 0.1 s and held in between.",
+        shows="Four points, interpolated every 0.1 s and held in between.",
         parameters={"times": (0.0, 1.0, 2.0, 3.0), "values": (0.0, 2.0, 1.5, 0.0), "sample_time": 0.1},
     )
     sampled: ClassVar[bool] = True
 
     times: ArrayLike = parameter(
-        (0.0, 0.1, 0.5, 0.6, 1.0), dimensions=(1,), tunable=False, doc="instants (n,) from 0", unit="s"
+        (0.0, 0.1, 0.5, 0.6, 1.0), dimensions=(1,), tunable=False, doc="times (n,), starting at 0", unit="s"
     )
-    values: ArrayLike = parameter((3.0, 1.0, 4.0, 2.0, 1.0), dimensions=(1,), doc="values there (n,)")
-    method: str = parameter("linear", choices=("linear", "nearest", "flat"), doc="what to do in between")
+    values: ArrayLike = parameter((3.0, 1.0, 4.0, 2.0, 1.0), dimensions=(1,), doc="values at the times (n,)")
+    method: str = parameter("linear", choices=("linear", "nearest", "flat"), doc="interpolation method")
     sample_time: ArrayLike = sample_time_parameter(0.01)
 
     def check(self) -> None:
@@ -216,12 +216,12 @@ class RepeatingSequenceInterpolated(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatingSequenceStair(Block):
-    """One value after the other at each tick, then again from the first: y(k) = values[k mod n]."""
+    """A periodic sequence of values, one at each tick: y(k) = values[k mod n]."""
 
     title: ClassVar[str] = "Repeating Sequence Stair"
     sign: ClassVar[FaceSign] = stairs((0.2, 1.0, 0.6, 0.2, 1.0, 0.6))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Five values, one a second, then again from the first.",
+        shows="Five values, one per second, repeated.",
     )
     sampled: ClassVar[bool] = True
 
@@ -232,7 +232,7 @@ class RepeatingSequenceStair(Block):
         return (Port("y", "the stair", shape=()),)
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("k", (), "which value is next, from 0"),)
+        return (State("k", (), "index of the next value, from 0"),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         here = cells(x["k"], [k - 0.5 for k in range(1, p["values"].numel())])
@@ -251,8 +251,8 @@ def _check_times(block: Block, times: ArrayLike, count: int) -> None:
         raise InputError(
             f"the first of the times is {first}",
             where=f"{block.type_name()}.times",
-            allowed="times that begin at 0",
-            fix="subtract the first; the last one is the period",
+            allowed="times that start at 0",
+            fix="subtract the first time; the last time is the period",
         )
 
 

@@ -1,4 +1,4 @@
-"""Sources whose course is known beforehand: nothing, a pulse, a chirp, a table of times and values."""
+"""Sources with a given waveform: ground, a pulse, a chirp, a table of times and values."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Ground(Block):
-    """Nothing: y = 0, for inputs that are not used."""
+    """Ground: y = 0, for unused inputs."""
 
     title: ClassVar[str] = "Ground"
     sign: ClassVar[FaceSign] = Words("0")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Nothing: zero at all times.",
+        shows="Zero at all times.",
     )
 
     def output_ports(self) -> tuple[Port, ...]:
@@ -61,8 +61,8 @@ class Pulse(Block):
     )
 
     amplitude: ArrayLike = parameter(1.0, kind=ParameterKind.ARRAY, doc="the value during the pulse")
-    start: float = parameter(1.0, doc="when it begins", unit="s")
-    width: float = parameter(1.0, above=0.0, doc="how long it lasts", unit="s")
+    start: float = parameter(1.0, doc="start time of the pulse", unit="s")
+    width: float = parameter(1.0, above=0.0, doc="duration of the pulse", unit="s")
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the pulse"),)
@@ -80,10 +80,10 @@ class Pulse(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Chirp(Block):
-    """A sine whose frequency rises evenly: y = sin(2 pi (f1 t + (f2 - f1) t^2 / (2 T))).
+    """A chirp, a sine whose frequency rises linearly: y = sin(2 pi (f1 t + (f2 - f1) t^2 / (2 T))).
 
     The frequency is ``initial_frequency`` f1 at t = 0 and ``final_frequency`` f2 at ``target_time`` T; it
-    goes on rising after that.
+    continues to rise after T.
     """
 
     title: ClassVar[str] = "Chirp Signal"
@@ -113,30 +113,30 @@ class Chirp(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class FromTable(Block):
-    """A course given at some instants: y = values at times, between them by the method chosen.
+    """A signal given at sample times: y = values at times, interpolated by the chosen method.
 
-    ``linear`` straight lines, ``flat`` the value of the last instant, ``cubic`` the spline (not-a-knot).
-    Outside the table the first and the last value are held, or the signal is ``zero``, or straight lines go
-    on (``linear``). Steps of the solver end at the instants.
+    ``linear`` interpolates linearly, ``flat`` holds the previous value, ``cubic`` is the not-a-knot spline.
+    Outside the table the first and last value are held (``hold``), or the signal is ``zero``, or it is
+    extrapolated linearly (``linear``). Solver steps end at the given times.
     """
 
     title: ClassVar[str] = "From Workspace"
     sign: ClassVar[FaceSign] = graph((0, 0.2), (0.3, 0.9), (0.6, 0.4), (1, 0.7))
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A smooth curve through four points; after the last one its value is held.",
+        shows="A cubic spline through four points; after the last one its value is held.",
         parameters={"times": (0.0, 2.0, 5.0, 8.0), "values": (0.0, 1.0, -1.0, 0.5), "method": "cubic"},
     )
 
     times: ArrayLike = parameter((0.0, 1.0), dimensions=(1,), tunable=False, doc="instants (n,)", unit="s")
-    values: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2), doc="values there, (n,) or (n, m)")
-    method: str = parameter("linear", choices=("linear", "flat", "cubic"), doc="what to do in between")
-    outside: str = parameter("hold", choices=("hold", "linear", "zero"), doc="what to do before and after")
+    values: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2), doc="values at the times, (n,) or (n, m)")
+    method: str = parameter("linear", choices=("linear", "flat", "cubic"), doc="interpolation method")
+    outside: str = parameter("hold", choices=("hold", "linear", "zero"), doc="extrapolation method")
 
     def check(self) -> None:
         rising("FromTable", "times", self.times, shape_of(self.values)[0])
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the course: a scalar, or a vector (m,)"),)
+        return (Port("y", "the signal: a scalar, or a vector (m,)"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": shape_of(self.values)[1:]}
@@ -166,9 +166,9 @@ class FromTable(Block):
         return is_long(shape_of(self.times), self.method)
 
     def _read(self, t: SX, p: Signals) -> SX:
-        """The course, from the two rows around t."""
+        """The signal, from the two rows around t."""
         smooth = self.method == "cubic"
-        values = p["spline" if smooth else "values"].T  # row by row, as the vector of parameters has them
+        values = p["spline" if smooth else "values"].T  # row-major, as in the parameter vector
         times = p["knots" if smooth else "times"]
         first, last = times[0], times[times.numel() - 1]
         width = values.shape[0] if len(shape_of(self.values)) == 2 else 1
@@ -188,12 +188,12 @@ class FromTable(Block):
 
     @property
     def knots(self) -> Array:
-        """Of a long cubic course its instants, s."""
+        """The times of a long cubic table, s."""
         return np.asarray(self._times())
 
     @property
     def spline(self) -> Array:
-        """Of a long cubic course the values and slopes, row by row."""
+        """The values and derivatives of a long cubic table, row by row."""
         return with_slopes((tuple(self._times()),), self.values)
 
     def _times(self) -> list[float]:

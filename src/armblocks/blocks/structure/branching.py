@@ -1,4 +1,4 @@
-"""Blocks that choose which action subsystem works."""
+"""Blocks that select the active action subsystem."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from armblocks.diagram.expression_language import Formula
 from armblocks.errors import InputError
 
 JUST = 1e-300
-"""Beside a border by less than any signal can tell: it gives the border itself a side."""
+"""An offset below any signal resolution: it assigns the border itself to one side."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class If(Block):
-    """Chooses by conditions which action subsystem works: the first whose condition is true, else the last.
+    """Activates one action subsystem by conditions: the first whose condition is true, else the last.
 
     The conditions are formulas over the inputs (``u``, or ``u1``, ``u2``, … where there are several), written
-    as in the Expression block and separated by semicolons: ``u > 0.5; u > 0``. The output of the one that is
-    chosen is 1, and those of the others are 0.
+    as in the Expression block and separated by semicolons: ``u > 0.5; u > 0``. The output of the active
+    branch is 1, and the others are 0.
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "If"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The sine chooses the first output above one half, the second between zero and that.",
+        shows="The first output is 1 while the sine is above 0.5, the second while it is between 0 and 0.5.",
         parameters={"expressions": "u > 0.5; u > 0"},
     )
 
     expressions: str = parameter("u > 0", doc="formulas, separated by semicolons")
-    inputs: int = parameter(1, minimum=1, maximum=100, doc="how many inputs")
+    inputs: int = parameter(1, minimum=1, maximum=100, doc="number of inputs")
 
     def check(self) -> None:
         for text in self._texts():
@@ -51,7 +51,7 @@ class If(Block):
             Port(f"if{number}", f"1 where '{text}' is the first that is true", "", ())
             for number, text in enumerate(self._texts(), start=1)
         ]
-        return (*chosen, Port("else", "1 where none is true", "", ()))
+        return (*chosen, Port("else", "1 where no condition is true", "", ()))
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         u = {name: SX.sym(name, math.prod(shape)) for name, shape in inputs.items()}
@@ -60,13 +60,13 @@ class If(Block):
             if size != 1:
                 raise InputError(
                     f"the condition '{text}' has {size} values",
-                    allowed="one: true or false",
+                    allowed="one value: true or false",
                     fix="compare an element, such as u[1]",
                 )
         return {}
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("case", (), "which output is 1, from 1"),)
+        return (State("case", (), "index of the output that is 1, from 1"),)
 
     def _borders(self, t: SX, u: Signals) -> SX:
         names = {**u, "t": t}
@@ -102,32 +102,32 @@ class If(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class SwitchCase(Block):
-    """Chooses by a whole number which action subsystem works: u without its fraction is one of the cases.
+    """Activates one action subsystem by an integer: the case that contains u truncated to an integer.
 
     Cases are separated by semicolons, and a case may have several numbers: ``1; 2 3; 4``. The output of the
-    case that has the number is 1; where none has it, the default is.
+    case with that number is 1. If no case has it, the output ``default`` is 1.
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Switch Case"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="As the ramp passes 1, 2 and 3, the cases are chosen one after the other.",
+        shows="The ramp passes 1, 2 and 3, and activates the cases in turn.",
         parameters={"cases": "1; 2 3"},
         inputs={"u": made("Ramp", slope=0.5)},
     )
 
-    cases: str = parameter("1; 2", doc="whole numbers of each case; cases separated by semicolons")
+    cases: str = parameter("1; 2", doc="integers of each case; cases separated by semicolons")
 
     def check(self) -> None:
         found = [number for case in self._texts() for number in case]
         wrong = [text for text in found if not text.removeprefix("-").isdecimal() or not text.isascii()]
         twice = [text for text in found if found.count(text) > 1]
         if wrong or twice or not all(self._texts()):
-            said = f"'{(wrong or twice)[0]}' stands there" if wrong or twice else "a case has no number"
+            said = f"'{(wrong or twice)[0]}' is not allowed" if wrong or twice else "a case has no number"
             raise InputError(
                 f"the cases are '{self.cases}': {said}",
                 where="SwitchCase.cases",
-                allowed="whole numbers, each once, such as 1; 2 3; 4",
+                allowed="distinct integers, such as 1; 2 3; 4",
                 fix="correct the list",
             )
 
@@ -145,15 +145,15 @@ class SwitchCase(Block):
         return (*chosen, Port("default", "1 where no case has the number", "", ()))
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("case", (), "which output is 1, from 1"),)
+        return (State("case", (), "index of the output that is 1, from 1"),)
 
     def _edges(self) -> list[tuple[float, float]]:
-        """From where to where u has each number, its fraction cut off: 0 is what lies between -1 and 1."""
+        """The interval of u for each integer after truncation: 0 covers the interval from -1 to 1."""
         numbers = [float(number) for case in self._texts() for number in case]
         return [(n if n > 0.0 else n - 1.0, n if n < 0.0 else n + 1.0) for n in numbers]
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        return (Guard("borders", (2 * len(self._edges()),), "u passes a whole number"),)
+        return (Guard("borders", (2 * len(self._edges()),), "u passes an integer"),)
 
     def _case(self, u: SX) -> SX:
         whole = if_else(u < 0.0, -floor(fabs(u)), floor(u))

@@ -1,4 +1,4 @@
-"""Blocks that take poses apart and put them together. A pose is one 4x4 matrix on one wire."""
+"""Blocks that split and compose poses. A pose is one signal of shape (4, 4)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class T2xyz(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Xyz2T(Block):
-    """The pose at a position, not turned: T = [I, (x, y, z); 0 0 0 1]."""
+    """A pose with a given position and no rotation: T = [I, (x, y, z); 0 0 0 1]."""
 
     title: ClassVar[str] = "xyz2T"
     sign: ClassVar[FaceSign] = Words("xyz→T")

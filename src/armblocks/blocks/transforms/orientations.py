@@ -1,7 +1,7 @@
-"""Orientations told by angles, quaternions or an axis, to poses and back; a pose is one 4x4 matrix.
+"""Conversions between poses and angles, quaternions or axis and angle; a pose is one 4x4 matrix.
 
-The names are the toolbox's. What each convention means, and what happens where an orientation has more than
-one set of angles, stands in :mod:`armblocks.spatial.orientation`.
+The names are those of the toolbox. :mod:`armblocks.spatial.orientation` describes the conventions and the
+singularities, where an orientation has more than one set of angles.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _CONVENTIONS = tuple(orientation.RPY_CONVENTIONS)
 
 
 def pose(R: SX, p: SX | None = None) -> SX:
-    """[R p; 0 0 0 1]; without ``p`` at the origin."""
+    """The pose [R p; 0 0 0 1]; ``p`` defaults to the origin."""
     top = horzcat(R, SX.zeros(3) if p is None else p)
     return vertcat(top, horzcat(SX.zeros(1, 3), 1.0))
 
@@ -33,7 +33,7 @@ def _angles(*names: str) -> tuple[Port, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Rpy2T(Block):
-    """The pose turned by roll, pitch and yaw: zyx is T = Rz(yaw) Ry(pitch) Rx(roll), release 10's default.
+    """The rotation by roll, pitch and yaw: zyx (release 10) is T = Rz(yaw) Ry(pitch) Rx(roll).
 
     ``xyz`` is Rx(yaw) Ry(pitch) Rz(roll), ``yxz`` Ry(yaw) Rx(pitch) Rz(roll); ``release 9`` (and 8) is
     Rx(roll) Ry(pitch) Rz(yaw), ``release 7`` Rz(roll) Ry(pitch) Rx(yaw).
@@ -42,7 +42,7 @@ class Rpy2T(Block):
     title: ClassVar[str] = "rpy2T"
     sign: ClassVar[FaceSign] = Words("rpy→T")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A pose that only yaws: the corner of its rotation holds cosines and sines of the angle.",
+        shows="A pose with yaw only: the upper left entries are cosines and sines of the angle.",
         inputs={"roll": ZERO, "pitch": ZERO, "yaw": made("Ramp").named("yaw")},
         shown=(corner_of("T"),),
     )
@@ -63,14 +63,14 @@ class Rpy2T(Block):
 class T2rpy(Block):
     """Roll, pitch and yaw of a pose, the inverse of rpy2T of the same convention, with abs(pitch) <= pi/2.
 
-    At pitch = pi/2 or -pi/2 only the sum or the difference of the others is known: roll is 0 there, and the
-    angles still give the pose.
+    At pitch = pi/2 or -pi/2 only the sum or the difference of roll and yaw is determined: roll is 0 there,
+    and the angles still give the pose.
     """
 
     title: ClassVar[str] = "T2rpy"
     sign: ClassVar[FaceSign] = Words("T→rpy")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The three angles of a pose that was made of them come back; yaw wraps at pi.",
+        shows="The three angles of a pose that was computed from them; yaw wraps at pi.",
         inputs={
             "T": made("Rpy2T").by(
                 roll=made("SineWave", amplitude=0.5).named("roll"),
@@ -96,14 +96,12 @@ class T2rpy(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Eul2T(Block):
-    """The pose turned by Euler angles ZYZ: T = Rz(phi) Ry(theta) Rz(psi)."""
+    """The rotation by Euler angles ZYZ: T = Rz(phi) Ry(theta) Rz(psi)."""
 
     title: ClassVar[str] = "eul2T"
     sign: ClassVar[FaceSign] = Words("eul→T")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows=(
-            "A pose that turns about z only: the corner of its rotation holds cosines and sines of the angle."
-        ),
+        shows=("A pose that rotates about z: the upper left entries are cosines and sines of the angle."),
         inputs={"phi": made("Ramp").named("phi"), "theta": ZERO, "psi": ZERO},
         shown=(corner_of("T"),),
     )
@@ -122,14 +120,14 @@ class Eul2T(Block):
 class T2eul(Block):
     """Euler angles ZYZ of a pose, the inverse of eul2T, with 0 <= theta <= pi.
 
-    At theta = 0 or pi only the sum or the difference of the others is known: phi is 0 there, and the angles
-    still give the pose.
+    At theta = 0 or pi only the sum or the difference of phi and psi is determined: phi is 0 there, and the
+    angles still give the pose.
     """
 
     title: ClassVar[str] = "T2eul"
     sign: ClassVar[FaceSign] = Words("T→eul")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The three angles of a pose that was made of them come back; phi wraps at pi.",
+        shows="The three angles of a pose that was computed from them; phi wraps at pi.",
         inputs={
             "T": made("Eul2T").by(
                 phi=made("Ramp").named("phi"),
@@ -152,12 +150,12 @@ class T2eul(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Quaternion2T(Block):
-    """The pose turned by a quaternion (s, x, y, z), whose length does not matter: T = T(u / |u|)."""
+    """The rotation by a quaternion (s, x, y, z) of any length: T = T(u / |u|)."""
 
     title: ClassVar[str] = "Quaternion to Pose"
     sign: ClassVar[FaceSign] = Words("q→T")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A quaternion (cos t/2, 0, 0, sin t/2) is a turn by t about z.",
+        shows="A quaternion (cos t/2, 0, 0, sin t/2) is a rotation by t about z.",
         inputs={"u": HALF_ANGLE},
         shown=(corner_of("T"),),
     )
@@ -176,13 +174,13 @@ class Quaternion2T(Block):
 class T2Quaternion(Block):
     """The unit quaternion (s, x, y, z) of a pose with s >= 0: s = cos(angle / 2), the rest along the axis.
 
-    A pose that passes a half turn makes it jump to its opposite, which is the same orientation.
+    Where the rotation angle passes pi, the quaternion jumps to its negative, which is the same orientation.
     """
 
     title: ClassVar[str] = "Pose to Quaternion"
     sign: ClassVar[FaceSign] = Words("T→q")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The quaternion of a pose that turns about z: cosine and sine of half the angle.",
+        shows="The quaternion of a pose that rotates about z: cosine and sine of half the angle.",
         inputs={"T": SPINNING_POSE},
         shown=("y",),
     )
@@ -199,12 +197,12 @@ class T2Quaternion(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class AngleAxis2T(Block):
-    """The pose turned about an axis of any length: R = I + sin(angle) [k] + (1 - cos(angle)) [k]^2."""
+    """The rotation about an axis of any length: R = I + sin(angle) [k] + (1 - cos(angle)) [k]^2."""
 
     title: ClassVar[str] = "angvec2T"
     sign: ClassVar[FaceSign] = Words("θ, a→T")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A turn about the axis z: the corner of its rotation holds cosines and sines of the angle.",
+        shows="A rotation about z: the upper left entries are cosines and sines of the angle.",
         inputs={
             "angle": made("Ramp").named("angle"),
             "axis": made("Constant", value=(0.0, 0.0, 1.0)).named("axis"),
@@ -224,12 +222,12 @@ class AngleAxis2T(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class T2AngleAxis(Block):
-    """Angle and unit axis of a pose, 0 <= angle <= pi; where nothing is turned the axis is (0, 0, 0)."""
+    """Angle and unit axis of a pose, 0 <= angle <= pi; without rotation the axis is (0, 0, 0)."""
 
     title: ClassVar[str] = "T2angvec"
     sign: ClassVar[FaceSign] = Words("T→θ, a")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Angle and axis of a pose that turns about z: beyond pi the shorter turn is about -z.",
+        shows="Angle and axis of a pose that rotates about z: beyond pi the shorter rotation is about -z.",
         inputs={"T": SPINNING_POSE},
         shown=("angle", "axis"),
     )
@@ -247,12 +245,12 @@ class T2AngleAxis(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class QuaternionProduct(Block):
-    """Hamilton's product, one turn after the other: y = u v, R(y) = R(u) R(v)."""
+    """The Hamilton product, a composition of rotations: y = u v, R(y) = R(u) R(v)."""
 
     title: ClassVar[str] = "Quaternion Multiplication"
     sign: ClassVar[FaceSign] = Words("u v")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A turn about z after a quarter turn about x.",
+        shows="A rotation about z after a quarter turn about x.",
         inputs={
             "u": HALF_ANGLE,
             "v": made("Constant", value=(0.7071067811865476, 0.7071067811865476, 0.0, 0.0)).named(
@@ -274,12 +272,12 @@ class QuaternionProduct(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class QuaternionInverse(Block):
-    """The opposite turn: y = (s, -x, -y, -z) / |u|^2, so that u y = 1."""
+    """The inverse of a quaternion: y = (s, -x, -y, -z) / |u|^2, so that u y = 1."""
 
     title: ClassVar[str] = "Quaternion Inverse"
     sign: ClassVar[FaceSign] = Words("q⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The turn back: the vector part changes its sign.",
+        shows="The inverse of a unit quaternion: the vector part changes its sign.",
         inputs={"u": HALF_ANGLE},
     )
 
@@ -301,7 +299,7 @@ class QuaternionNormalize(Block):
     title: ClassVar[str] = "Quaternion Normalize"
     sign: ClassVar[FaceSign] = Words("q / |q|")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A quaternion that grows, brought to length 1.",
+        shows="A quaternion of growing length, normalized to length 1.",
         inputs={
             "u": made("Ramp", slope=(0.1, 0.0, 0.0, 0.3), initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion")
         },
@@ -319,13 +317,13 @@ class QuaternionNormalize(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class QuaternionRate(Block):
-    """How a quaternion changes at an angular velocity: y = 1/2 u w (body axes) or 1/2 w u (world axes)."""
+    """The derivative of a quaternion: y = 1/2 u w (body axes) or 1/2 w u (world axes)."""
 
     title: ClassVar[str] = "Quaternion Rate"
     sign: ClassVar[FaceSign] = Words("½ q ω")
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "Integrated at a steady angular velocity about z: the quaternion goes around with half the angle."
+            "The integral at a constant angular velocity about z: the quaternion rotates by half the angle."
         ),
         inputs={
             "u": made("Integrator", initial=(1.0, 0.0, 0.0, 0.0)).named("quaternion").by(u="y"),

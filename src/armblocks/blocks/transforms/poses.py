@@ -1,4 +1,4 @@
-"""Blocks that combine poses: one after the other, back, apart, and small steps between them."""
+"""Blocks that compose, invert and split poses, and differential motions between poses."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ _FRAMES = ("body", "world")
 
 
 def inverse(T: SX) -> SX:
-    """The pose of frame a in frame b from that of b in a."""
+    """The inverse pose: frame a in frame b, from frame b in frame a."""
     R = T[:3, :3]
     return pose(R.T, -mtimes(R.T, T[:3, 3]))
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseProduct(Block):
-    """Poses one after the other: T = T1 T2 …, that is T_ac = T_ab T_bc."""
+    """The composition of poses: T = T1 T2 …, that is T_ac = T_ab T_bc."""
 
     title: ClassVar[str] = "Pose Product"
     sign: ClassVar[FaceSign] = Words("T₁ T₂")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A frame that turns, and 1 m along its x axis a second one: its origin runs around a circle.",
+        shows="A rotating frame, and a second frame 1 m along its x axis, whose origin moves on a circle.",
         inputs={"T1": SPINNING_POSE, "T2": pose_along_x(made("Constant").named("one"))},
         across=position_of("T")[0],
         up=position_of("T")[1],
     )
 
-    inputs: int = parameter(2, minimum=1, doc="how many poses")
+    inputs: int = parameter(2, minimum=1, doc="number of poses")
 
     def input_ports(self) -> tuple[Port, ...]:
         return tuple(Port(f"T{k}", f"pose {k}", shape=(4, 4)) for k in range(1, self.inputs + 1))
@@ -61,12 +61,12 @@ class PoseProduct(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class PoseInverse(Block):
-    """The pose seen from the other frame: T^-1 = [R' -R'p; 0 0 0 1]."""
+    """The inverse of a pose: T^-1 = [R' -R'p; 0 0 0 1]."""
 
     title: ClassVar[str] = "Pose Inverse"
     sign: ClassVar[FaceSign] = Words("T⁻¹")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A pose that moves along x, and how the old frame is seen from it: it moves along -x.",
+        shows="A pose that moves along x; its inverse moves along -x.",
         inputs={
             "T": made("Xyz2T").by(
                 x=made("Ramp").named("x"), y=made("Constant").named("y"), z=made("Ground").named("z")
@@ -92,7 +92,7 @@ class Rp2T(Block):
     title: ClassVar[str] = "rt2tr"
     sign: ClassVar[FaceSign] = Words("R, p→T")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A fixed rotation and a position that swings make a pose; its upper rows are [R p].",
+        shows="A pose from a constant rotation and an oscillating position; its upper rows are [R p].",
         inputs={
             "R": made("Constant", value=((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))),
             "p": made("SineWave", amplitude=(0.5, 1.0, 1.5)),
@@ -134,12 +134,12 @@ class T2Rp(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class TransformPoint(Block):
-    """A point of frame b told in frame a: p_a = R_ab p_b + p_ab."""
+    """The coordinates of a point, transformed from frame b to frame a: p_a = R_ab p_b + p_ab."""
 
     title: ClassVar[str] = "Transform Point"
     sign: ClassVar[FaceSign] = Words("T p")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The point (1, 0, 0) of a frame that turns about z, seen from outside.",
+        shows="The point (1, 0, 0) of a frame that rotates about z, in world coordinates.",
         inputs={"T": SPINNING_POSE, "p": made("Constant", value=(1.0, 0.0, 0.0)).named("point")},
         shown=("y",),
     )
@@ -156,14 +156,14 @@ class TransformPoint(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class TransformTwist(Block):
-    """A velocity (v; w) of frame b's origin and axes told in frame a's: v_a = R v + p x R w, w_a = R w.
+    """A twist (v; w), transformed from frame b to frame a: v_a = R v + p x R w, w_a = R w.
 
-    This is the adjoint of the pose; its inverse pose goes back.
+    This is the adjoint of the pose; the inverse pose gives the inverse transformation.
     """
 
     title: ClassVar[str] = "Transform Twist"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A speed of 1 m/s along x of a frame that turns about z, told in the axes outside.",
+        shows="A velocity of 1 m/s along x of a frame that rotates about z, in world axes.",
         inputs={
             "T": SPINNING_POSE,
             "V": made("Constant", value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).named("twist"),
@@ -190,7 +190,7 @@ class Skew(Block):
     title: ClassVar[str] = "skew"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows=(
-            "The nine entries of the matrix: each element of the vector stands there twice, with both signs."
+            "The nine entries of the matrix: each element of the vector appears twice, with opposite signs."
         ),
         inputs={"u": made("SineWave", amplitude=(1.0, 2.0, 3.0))},
         shown=("S",),
@@ -208,16 +208,17 @@ class Skew(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Tr2Delta(Block):
-    """The small step from one pose to another, (d; r): body is (p; vex(R - I)) of T1^-1 T2, as in release 10.
+    """The differential motion (d; r) from T1 to T2: body is (p; vex(R - I)) of T1^-1 T2, as in release 10.
 
     ``world`` is that of the toolbox up to release 9: d = p2 - p1 and r = 1/2 (n1 x n2 + o1 x o2 + a1 x a2) of
-    the axes of both, in the axes of the frame in which the poses are told. Both are steps for small turns
+    the axes of both, in the axes of the reference frame of the poses. Both are accurate for small rotations
     only. vex is half the difference of the opposite entries.
     """
 
     title: ClassVar[str] = "tr2delta"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The step from a fixed pose to one that moves along x and turns about z by t / 10: (d; r).",
+        shows="The differential motion from a constant pose to one that moves along x and rotates about z "
+        "by t / 10.",
         inputs={
             "T1": pose_along_x(ZERO).named("start"),
             "T2": made("AngleAxis2T").by(
@@ -232,12 +233,12 @@ class Tr2Delta(Block):
 
     def input_ports(self) -> tuple[Port, ...]:
         return (
-            Port("T1", "pose at the beginning", shape=(4, 4)),
-            Port("T2", "pose at the end", shape=(4, 4)),
+            Port("T1", "first pose", shape=(4, 4)),
+            Port("T2", "second pose", shape=(4, 4)),
         )
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("dx", "step (dx, dy, dz, rx, ry, rz)", shape=(6,)),)
+        return (Port("dx", "differential motion (dx, dy, dz, rx, ry, rz)", shape=(6,)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         T1, T2 = u["T1"], u["T2"]
@@ -251,24 +252,24 @@ class Tr2Delta(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Delta2Tr(Block):
-    """The pose of a small step: T = [I + skew(r), d; 0 0 0 1], as in the toolbox.
+    """The pose of a differential motion: T = [I + skew(r), d; 0 0 0 1], as in the toolbox.
 
-    Its rotation is one to the first order of the step only. A step in body axes leads from T1 to T1 T, one in
-    world axes from R1 to (I + skew(r)) R1 and from p1 to p1 + d.
+    Its rotation part is a rotation to first order only. A motion in body axes leads from T1 to T1 T. A motion
+    in world axes leads from R1 to (I + skew(r)) R1 and from p1 to p1 + d.
     """
 
     title: ClassVar[str] = "delta2tr"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A step that grows evenly, as a pose: its corner is [1 -rz; rz 1].",
+        shows="A linearly growing differential motion as a pose: the upper left entries are [1 -rz; rz 1].",
         inputs={"dx": made("Ramp", slope=(0.1, 0.0, 0.0, 0.0, 0.0, 0.02))},
         shown=(corner_of("T"),),
     )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("dx", "step (dx, dy, dz, rx, ry, rz)", shape=(6,)),)
+        return (Port("dx", "differential motion (dx, dy, dz, rx, ry, rz)", shape=(6,)),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("T", "the pose of the step", shape=(4, 4)),)
+        return (Port("T", "the pose of the differential motion", shape=(4, 4)),)
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         return {"T": pose(SX.eye(3) + skew(u["dx"][3:]), u["dx"][:3])}
@@ -276,16 +277,16 @@ class Delta2Tr(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class PoseIntegration(Block):
-    """The pose that a velocity leads to: p' = v and Q' = 1/2 w Q (world axes), or p' = R v and Q' = 1/2 Q w.
+    """The integral of a twist, a pose: p' = v and Q' = 1/2 w Q (world axes), or p' = R v and Q' = 1/2 Q w.
 
-    V is (v; w), of the frame's origin: in world axes what ``jacob0`` gives, in the frame's own (body) axes
-    what ``jacobe`` does. The state is the position and a quaternion Q. The pose is that of Q / |Q|, so that
-    its rotation is exact at any step; |Q| is led back to 1 at the rate ``restoring``, which changes no pose.
+    V is (v; w) of the frame's origin: in world axes like ``jacob0``, in body axes like ``jacobe``. The states
+    are the position and a quaternion Q. The pose is that of Q / |Q|, so that its rotation matrix is always
+    orthonormal. |Q| returns to 1 at the rate ``restoring``, without effect on the pose.
     """
 
     title: ClassVar[str] = "Pose Integration"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A frame that goes forward and turns at constant rates, in its own axes, moves on a screw.",
+        shows="A frame with constant twist in body axes moves on a screw.",
         inputs={"V": made("Constant", value=(1.0, 0.0, 0.2, 0.0, 0.0, 1.0))},
         shown=(made("T2xyz").by(T="T").at("x"), made("T2xyz").by(T="T").at("z")),
     )
@@ -311,7 +312,7 @@ class PoseIntegration(Block):
             raise InputError(
                 "the quaternion is zero",
                 where="PoseIntegration",
-                allowed="one that is not",
+                allowed="a quaternion that is not zero",
                 fix="give (1, 0, 0, 0) for no rotation",
             )
 
