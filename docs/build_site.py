@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,7 +19,6 @@ DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 SITE = DOCS / "_build" / "html"
 STAMP = DOCS / "_build" / "built-from"
-DOCTREES = DOCS / "_build" / "doctrees"
 SOURCES = ("docs", "src/armblocks", "robots", "examples", "libraries")
 """The blocks, the robots, the examples and the docstrings are on the pages, too."""
 NOT_SOURCES = ("docs/_build", "docs/reference", "src/armblocks/studio/web")
@@ -56,12 +56,14 @@ def build() -> None:
     STAMP.unlink(missing_ok=True)
     shutil.rmtree(SITE, ignore_errors=True)  # Sphinx keeps pages whose documents are gone
     before = digest()
-    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-j", "auto"]
-    command += ["-b", "html", "-d", str(DOCTREES), str(DOCS), str(SITE)]
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
     # In a build of a wheel, armblocks itself is not installed.
     paths = [str(ROOT / "src"), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
-    done = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr)
+    # All pages are written anew: what an earlier build has read may come from other versions of the code.
+    with tempfile.TemporaryDirectory() as doctrees:
+        command += ["-d", doctrees, str(DOCS), str(SITE)]
+        done = subprocess.run(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr)
     if done.returncode != 0:
         raise SystemExit(
             "The documentation could not be built; the reason stands above.\n"

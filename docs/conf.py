@@ -10,12 +10,13 @@ sys.path.insert(0, str(HERE))
 os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
 
 from generated_pages import write_generated_pages  # noqa: E402
+from reference_signatures import ALIASES, readable_signature, shorten_annotations  # noqa: E402
 
 project = "armblocks"
 author = "The armblocks developers"
 copyright = "The armblocks developers"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build"]
 
@@ -33,8 +34,17 @@ myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_default_options = {"members": True, "show-inheritance": False}
+autodoc_type_aliases = ALIASES
+autodoc_default_options = {"members": True}
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 110
 add_module_names = False
+
+
+def setup(app):
+    """Called by Sphinx."""
+    shorten_annotations()
+    app.connect("autodoc-process-signature", readable_signature)
 
 
 # Before Sphinx looks for sources and static files.

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import warnings
 from pathlib import Path
 
-from block_pages import block_pages, style_sheet
+from block_pages import block_pages, prose, style_sheet
+from reference_signatures import arm_page
 
 import armblocks as ab
 from armblocks.integration.butcher_tableau import ButcherTableau
@@ -17,6 +20,8 @@ def write_generated_pages(folder: Path) -> None:
     pages = {
         "shipped.md": shipped_page(),
         "solver-table.txt": solver_table(),
+        "arm.txt": arm_page(),
+        "public-names.txt": public_names(),
         "static/pictures.css": style_sheet(),
         **dict(block_pages()),
     }
@@ -50,6 +55,22 @@ def shipped_page() -> str:
             cells = (f"`{name}`", diagram.description, f"{diagram.settings.stop_time:g} s", ", ".join(kinds))
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
+
+
+def public_names() -> str:
+    """Every name of ``armblocks`` with a link and the first sentence about it."""
+    lines = ["| name | what it is |", "|---|---|"]
+    for name in sorted(ab.__all__, key=str.casefold):
+        thing = getattr(ab, name)
+        if not inspect.ismodule(thing):
+            role = "class" if inspect.isclass(thing) else "func"
+            lines.append(f"| {{py:{role}}}`~armblocks.{name}` | {prose(_first_sentence(thing))} |")
+    return "\n".join(lines) + "\n"
+
+
+def _first_sentence(thing: object) -> str:
+    paragraph = inspect.cleandoc(thing.__doc__ or "").partition("\n\n")[0].replace("\n", " ")
+    return re.split(r"(?<=[.:]) (?=[A-Z])|::$", paragraph)[0].rstrip(":")
 
 
 def solver_table() -> str:

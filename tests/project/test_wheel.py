@@ -1,14 +1,20 @@
 """The wheel is pure Python, brings what is shipped and the documentation, and runs without the checkout."""
 
+import inspect
 import os
 import subprocess
 import sys
 import zipfile
+import zlib
+from collections.abc import Iterator
+from enum import Enum
+from functools import cached_property
 from pathlib import Path
 
 import pytest
 from hatchling.builders.wheel import WheelBuilder
 
+import armblocks as ab
 from armblocks.blocks import BLOCKS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,6 +51,34 @@ def test_the_wheel_brings_a_page_of_every_document_and_no_more_than_pages(wheel:
         assert f"armblocks/shipped/docs/{page}.html" in names
     for left_out in ("_sources", ".doctrees", "_modules"):
         assert not [name for name in names if f"docs/{left_out}" in name]
+
+
+def public_members(kind: type) -> Iterator[str]:
+    """Methods and properties without an underscore, those of public bases among them."""
+    for name, member in inspect.getmembers_static(kind):
+        described = isinstance(member, property | cached_property | classmethod | staticmethod)
+        if not name.startswith("_") and (described or inspect.isfunction(member)):
+            yield name
+
+
+def test_the_reference_has_every_public_name(wheel: Path) -> None:
+    inventory = zipfile.ZipFile(wheel).read("armblocks/shipped/docs/objects.inv")
+    # Four lines of comments, then compressed lines: name, what it is, and where.
+    lines = zlib.decompress(inventory.split(b"\n", maxsplit=4)[4]).decode().splitlines()
+    described = {line.split()[0] for line in lines if " py:" in line}
+    missing: list[str] = []
+    for name in ab.__all__:
+        thing = getattr(ab, name)
+        if inspect.ismodule(thing):
+            continue  # each block has a page; errors are below
+        wanted = [f"armblocks.{name}"]
+        if inspect.isclass(thing) and not issubclass(thing, Enum):
+            wanted += [f"armblocks.{name}.{member}" for member in public_members(thing)]
+        missing += [path for path in wanted if path not in described]
+    for name, kind in inspect.getmembers_static(ab.errors, inspect.isclass):
+        if issubclass(kind, ValueError | Warning) and f"armblocks.errors.{name}" not in described:
+            missing.append(name)
+    assert missing == []
 
 
 SCRIPT = """

@@ -136,33 +136,36 @@ class Arm:
     # ---- kinematics --------------------------------------------------------------------------------------
     @cached_property
     def fkine(self) -> OfConfiguration:
-        """``fkine(q)`` → T (4, 4): pose of the tool in the world."""
+        """``fkine(q)`` → T (4, 4): pose of the tool in the world, lengths in m."""
         return self._entry("fkine")
 
     @cached_property
     def link_poses(self) -> OfConfiguration:
-        """``link_poses(q)`` → (L + 2, 4, 4): poses in the world of the base, each link and the tool."""
+        """``link_poses(q)`` → (L + 2, 4, 4): poses in the world of the base, the L links and the tool."""
         return self._entry("link_poses")
 
     @cached_property
     def jacob0(self) -> OfConfiguration:
-        """``jacob0(q)`` → J (6, n): tool velocity in world axes per joint speed; linear rows first."""
+        """``jacob0(q)`` → J (6, n): velocity of the tool in world axes is ``J qd``.
+
+        Rows: linear velocity x y z in m/s, then angular velocity x y z in rad/s.
+        """
         return self._entry("jacob0")
 
     @cached_property
     def jacobe(self) -> OfConfiguration:
-        """``jacobe(q)`` → J (6, n): as ``jacob0`` but in tool axes."""
+        """``jacobe(q)`` → J (6, n): as ``jacob0``, the velocity of the tool in its own axes."""
         return self._entry("jacobe")
 
     @cached_property
     def manipulability(self) -> OfConfiguration:
-        """``manipulability(q)`` → Yoshikawa's sqrt(det(J J'))."""
+        """``manipulability(q)`` → one number, Yoshikawa's sqrt(det(J J')): 0 where the arm is singular."""
         return self._entry("manipulability")
 
     # ---- dynamics ----------------------------------------------------------------------------------------
     @cached_property
     def rne(self) -> OfMotion:
-        """``rne(q, qd, qdd)`` → tau (n,): joint torques of a motion, motor inertia and friction included.
+        """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
         ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
         or the mass (kg) of a point there.
@@ -171,42 +174,42 @@ class Arm:
 
     @cached_property
     def accel(self) -> OfDrivenState:
-        """``accel(q, qd, tau)`` → qdd (n,): joint accelerations under torques, friction acting."""
+        """``accel(q, qd, tau)`` → qdd (n,) rad/s² or m/s²: accelerations under joint torques and friction."""
         return self._loadable("accel")
 
     @cached_property
     def gravload(self) -> OfConfiguration:
-        """``gravload(q)`` → (n,): torques that hold the arm at rest."""
+        """``gravload(q)`` → (n,) N m or N: torques that hold the arm at rest."""
         return self._entry("gravload")
 
     @cached_property
     def inertia(self) -> OfConfiguration:
-        """``inertia(q)`` → M (n, n): joint-space mass matrix, motor inertia included."""
+        """``inertia(q)`` → M (n, n) kg m² or kg: joint-space mass matrix, motor inertia included."""
         return self._entry("inertia")
 
     @cached_property
     def coriolis(self) -> OfState:
-        """``coriolis(q, qd)`` → C (n, n): ``C qd`` are the velocity torques; dM/dt - 2 C is skew."""
+        """``coriolis(q, qd)`` → C (n, n): ``C qd`` are the velocity torques (N m, N); dM/dt - 2 C is skew."""
         return self._entry("coriolis")
 
     @cached_property
     def friction(self) -> OfSpeed:
-        """``friction(qd)`` → (n,): joint torques that friction takes, a part of ``rne``, signed as ``qd``."""
+        """``friction(qd)`` → (n,) N m or N: joint torques that friction takes, a part of ``rne``."""
         return self._entry("friction")
 
     @cached_property
     def kinetic_energy(self) -> OfState:
-        """``kinetic_energy(q, qd)`` → J, motor inertia included."""
+        """``kinetic_energy(q, qd)`` → energy in J, that of the rotors of motors included."""
         return self._entry("kinetic_energy")
 
     @cached_property
     def potential_energy(self) -> OfConfiguration:
-        """``potential_energy(q)`` → J, zero where the centre of mass is level with the world's origin."""
+        """``potential_energy(q)`` → energy in J, zero where the centre of mass is level with the origin."""
         return self._entry("potential_energy")
 
     @cached_property
     def centre_of_mass(self) -> OfConfiguration:
-        """``centre_of_mass(q)`` → (3,) m: of all links, in the world."""
+        """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
         return self._entry("centre_of_mass")
 
     # ---- how it was made ---------------------------------------------------------------------------------

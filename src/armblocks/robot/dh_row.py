@@ -23,8 +23,9 @@ class DhConvention(Enum):
 
 @dataclass(frozen=True, kw_only=True)
 class DhRow:
-    """``alpha`` rad, ``a`` m, ``d`` m, ``theta`` rad, ``sigma`` 0 revolute or 1 prismatic, ``offset`` rad, m.
+    """One row of a Denavit-Hartenberg table: a joint and the link that it carries.
 
+    ``alpha`` rad, ``a`` m, ``d`` m, ``theta`` rad, ``sigma`` 0 revolute or 1 prismatic, ``offset`` rad, m.
     As in the toolbox, the row's own ``theta`` of a revolute joint and ``d`` of a prismatic joint are places
     of the joint variable and not used: the variable is ``q + offset``.
 

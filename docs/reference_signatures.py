@@ -1,0 +1,112 @@
+"""How signatures read in the Python reference: short names of types, and the fields of dataclasses."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any
+
+from sphinx.util.inspect import TypeAliasForwardRef
+
+import armblocks as ab
+from armblocks.face import arm as arm_module
+
+SHORT = {
+    r"NDArray\[np\.(float64|bool_)\]": "Array",
+    r"NDArray\[np\.complex128\]": "ComplexArray",
+    r"\b_Array\b": "Array",
+    r"\bComplex\b": "ComplexArray",
+    r"\bValues\b": "Mapping[str, ArrayLike]",
+}
+"""What stands in annotations, and what the reference shows in its place."""
+ALIASES = {"Array": "Array", "ArrayLike": "ArrayLike", "ComplexArray": "ComplexArray"}
+"""What stays as it is written: the page says what both mean."""
+
+
+def shorten_annotations() -> None:
+    """Write ``Array`` for the types of NumPy arrays in all annotations of armblocks that are loaded."""
+    TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # inside of Mapping[...] Sphinx shows this
+    for function in _functions():
+        for name, text in function.__annotations__.items():
+            if isinstance(text, str):
+                function.__annotations__[name] = short(text)
+
+
+def short(annotation: str) -> str:
+    """The annotation with the short names of types."""
+    for written, shown in SHORT.items():
+        annotation = re.sub(written, shown, annotation)
+    return annotation
+
+
+def _functions() -> Iterator[Callable[..., object]]:
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == "armblocks":
+            for thing in list(vars(module).values()):
+                members = vars(thing).values() if inspect.isclass(thing) else (thing,)
+                for member in members:
+                    found = getattr(member, "fget", None) or getattr(member, "func", None)
+                    found = found or getattr(member, "__func__", None) or member
+                    if inspect.isfunction(found) and found.__module__.startswith("armblocks"):
+                        yield found
+
+
+def readable_signature(
+    _app: object, what: str, _name: str, thing: Any, _options: object, *written: str | None
+) -> tuple[str | None, ...]:
+    """Of a dataclass the fields: its ``__new__``, which checks the names of arguments, takes anything."""
+    if what == "class" and dataclasses.is_dataclass(thing):
+        return _fields(thing), None
+    # Defaults such as <the diagram's> are no Python; Sphinx would show the whole signature as one line.
+    return tuple(text and re.sub(r"= <[^>]*>", "= ...", text) for text in written)
+
+
+def _fields(thing: Any) -> str:
+    texts: list[str] = []
+    for field in dataclasses.fields(thing):
+        if field.init and not field.name.startswith("_"):
+            text = f"{field.name}: {short(str(field.type))}"
+            if field.default is not dataclasses.MISSING:
+                text += f" = {_default(field.default)}"
+            elif field.default_factory is not dataclasses.MISSING:
+                text += " = ..."
+            if field.kw_only and "*" not in texts:
+                texts.append("*")
+            texts.append(text)
+    return f"({', '.join(texts)})"
+
+
+def _default(value: object) -> str:
+    """The default as Python, as far as it is short."""
+    text = repr(value)
+    return text if len(text) <= 30 and not text.startswith("<") and "object at" not in text else "..."
+
+
+def arm_page() -> str:
+    """The class Arm, whose methods are made when they are first asked for, with their call signatures."""
+    found: dict[str, list[str]] = {}
+    for name, member in vars(ab.Arm).items():
+        if isinstance(member, cached_property) and not name.startswith("_"):
+            call = getattr(arm_module, str(member.func.__annotations__["return"])).__call__
+            names = [part.replace(annotation=inspect.Parameter.empty) for part in _parameters(call)]
+            text = inspect.cleandoc(member.func.__doc__ or "")
+            text = f"Returns {text.partition(' → ')[2]}"
+            found[name] = [
+                f"   .. py:method:: {name}{inspect.Signature(names)}",
+                "",
+                *(f"      {line}".rstrip() for line in text.splitlines()),
+                "",
+            ]
+    lines = ["```{eval-rst}", ".. currentmodule:: armblocks", "", ".. autoclass:: Arm"]
+    lines += [f"   :exclude-members: {', '.join(found)}", ""]
+    for method in found.values():
+        lines += method
+    return "\n".join([*lines, "```", ""])
+
+
+def _parameters(call: Callable[..., object]) -> list[inspect.Parameter]:
+    return [part for name, part in inspect.signature(call).parameters.items() if name != "self"]
