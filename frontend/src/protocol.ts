@@ -100,21 +100,21 @@ export interface Change {
   inside?: string[];
   edit:
     | AddBlocks
-    | PasteBlocks
-    | RemoveBlocks
-    | Connect
-    | MoveBlocks
     | BendWires
-    | SetNotes
-    | Rename
-    | SetParameters
-    | SetMask
+    | BreakLink
+    | Connect
+    | Describe
+    | GroupBlocks
     | KeepTuned
     | LogSignal
-    | GroupBlocks
-    | BreakLink
-    | SetSettings
-    | Describe;
+    | SetMask
+    | MoveBlocks
+    | SetNotes
+    | SetParameters
+    | PasteBlocks
+    | RemoveBlocks
+    | Rename
+    | SetSettings;
 }
 /**
  * Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
@@ -160,27 +160,18 @@ export interface Wire {
   bends?: number[];
 }
 /**
- * Put what was copied on the sheet: ``text`` is a diagram as a file holds it.
- *
- * ``names``: what its blocks and notes are to be called here, where that is not as there. ``shift``: px that
- * they stand further right and down than there.
+ * Lead wires along the bends that they have here; without any the way is chosen again.
  */
-export interface PasteBlocks {
-  kind: "paste";
-  text: string;
-  names?: {
-    [k: string]: string;
-  };
-  shift?: number;
+export interface BendWires {
+  kind: "bend";
+  wires: Wire[];
 }
 /**
- * Take blocks, wires and notes off the sheet; the wires of the blocks go with them.
+ * Make a block that is linked to a library a copy of one's own, which may be changed inside.
  */
-export interface RemoveBlocks {
-  kind: "remove";
-  blocks?: string[];
-  wires?: Wire[];
-  notes?: string[];
+export interface BreakLink {
+  kind: "break_link";
+  block: string;
 }
 /**
  * Draw a wire. With ``replace`` the input's present wire gives way.
@@ -191,66 +182,36 @@ export interface Connect {
   replace?: boolean;
 }
 /**
- * Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
- *
- * Ways that are drawn between blocks that move alike move with them. ``wires`` are new, and those of
- * ``instead`` give way: a block is put into a wire, or taken out of its wires.
+ * Change the model's one-line description.
  */
-export interface MoveBlocks {
-  kind: "move";
-  places?: {
-    [k: string]: Place;
-  };
-  notes?: {
-    [k: string]: SheetNote;
-  };
-  wires?: Wire[];
-  instead?: Wire[];
-}
-/**
- * Words on the sheet: their top left corner in px.
- *
- * This interface was referenced by `undefined`'s JSON-Schema definition
- * via the `patternProperty` "^/\S+$".
- */
-export interface SheetNote {
-  x: number;
-  y: number;
+export interface Describe {
+  kind: "describe";
   text: string;
 }
 /**
- * Lead wires along the bends that they have here; without any the way is chosen again.
+ * Put blocks into a subsystem of their own; its ports are the wires that are cut thereby.
  */
-export interface BendWires {
-  kind: "bend";
-  wires: Wire[];
-}
-/**
- * Write notes, or change what they say.
- */
-export interface SetNotes {
-  kind: "notes";
-  notes: {
-    [k: string]: SheetNote;
-  };
-}
-/**
- * Give a block another name; its wires and its place go with it.
- */
-export interface Rename {
-  kind: "rename";
-  block: string;
+export interface GroupBlocks {
+  kind: "group";
+  blocks: string[];
   name: string;
 }
 /**
- * Change parameters of one block. Wires to ports that thereby vanish are removed.
+ * Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them.
  */
-export interface SetParameters {
-  kind: "parameters";
-  block: string;
+export interface KeepTuned {
+  kind: "keep_tuned";
   values: {
     [k: string]: unknown;
   };
+}
+/**
+ * Log an output ``block/port``, so that it is seen without a Scope; or log it no longer.
+ */
+export interface LogSignal {
+  kind: "log";
+  port: string;
+  logged: boolean;
 }
 /**
  * Declare the parameters of a subsystem, or of the sheet itself where no block is named, in this order.
@@ -284,36 +245,82 @@ export interface MaskParameter {
   choices?: string[];
 }
 /**
- * Take values that were tried in a run, ``block.parameter``, into the model: one step for all of them.
+ * Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
+ *
+ * Ways that are drawn between blocks that move alike move with them. ``wires`` are new, and those of
+ * ``instead`` give way: a block is put into a wire, or taken out of its wires.
  */
-export interface KeepTuned {
-  kind: "keep_tuned";
+export interface MoveBlocks {
+  kind: "move";
+  places?: {
+    [k: string]: Place;
+  };
+  notes?: {
+    [k: string]: SheetNote;
+  };
+  wires?: Wire[];
+  instead?: Wire[];
+}
+/**
+ * Words on the sheet: their top left corner in px.
+ *
+ * This interface was referenced by `undefined`'s JSON-Schema definition
+ * via the `patternProperty` "^/\S+$".
+ */
+export interface SheetNote {
+  x: number;
+  y: number;
+  text: string;
+}
+/**
+ * Write notes, or change what they say.
+ */
+export interface SetNotes {
+  kind: "notes";
+  notes: {
+    [k: string]: SheetNote;
+  };
+}
+/**
+ * Change parameters of one block. Wires to ports that thereby vanish are removed.
+ */
+export interface SetParameters {
+  kind: "parameters";
+  block: string;
   values: {
     [k: string]: unknown;
   };
 }
 /**
- * Log an output ``block/port``, so that it is seen without a Scope; or log it no longer.
+ * Put what was copied on the sheet: ``text`` is a diagram as a file holds it.
+ *
+ * ``names``: what its blocks and notes are to be called here, where that is not as there. ``shift``: px that
+ * they stand further right and down than there.
  */
-export interface LogSignal {
-  kind: "log";
-  port: string;
-  logged: boolean;
+export interface PasteBlocks {
+  kind: "paste";
+  text: string;
+  names?: {
+    [k: string]: string;
+  };
+  shift?: number;
 }
 /**
- * Put blocks into a subsystem of their own; its ports are the wires that are cut thereby.
+ * Take blocks, wires and notes off the sheet; the wires of the blocks go with them.
  */
-export interface GroupBlocks {
-  kind: "group";
-  blocks: string[];
-  name: string;
+export interface RemoveBlocks {
+  kind: "remove";
+  blocks?: string[];
+  wires?: Wire[];
+  notes?: string[];
 }
 /**
- * Make a block that is linked to a library a copy of one's own, which may be changed inside.
+ * Give a block another name; its wires and its place go with it.
  */
-export interface BreakLink {
-  kind: "break_link";
+export interface Rename {
+  kind: "rename";
   block: string;
+  name: string;
 }
 /**
  * Change how the model is run, by the names of ``SimulationOptions``; ``None`` leaves it to armblocks.
@@ -323,13 +330,6 @@ export interface SetSettings {
   values: {
     [k: string]: number | string | null;
   };
-}
-/**
- * Change the model's one-line description.
- */
-export interface Describe {
-  kind: "describe";
-  text: string;
 }
 /**
  * Put a document away; ``discard`` where it has edits that no file holds.
@@ -501,7 +501,14 @@ export interface RobotChange {
   robot: string;
   kind: "robot_change";
   gesture?: string;
-  edit: SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention;
+  edit: AddJoint | SetCell | SetConvention | MoveJoint | RemoveJoint | RenameLink;
+}
+/**
+ * Put a new link behind another one, or at the base where ``after`` is empty.
+ */
+export interface AddJoint {
+  kind: "add";
+  after: string;
 }
 /**
  * Type into one cell: of a link, or of the robot where ``link`` is empty.
@@ -514,26 +521,12 @@ export interface SetCell {
   angles: "deg" | "rad";
 }
 /**
- * Give a link another name.
+ * Read the rows by the other convention, or write the same arm in it (``keep_arm``).
  */
-export interface RenameLink {
-  kind: "rename";
-  link: string;
-  name: string;
-}
-/**
- * Put a new link behind another one, or at the base where ``after`` is empty.
- */
-export interface AddJoint {
-  kind: "add";
-  after: string;
-}
-/**
- * Take a link out; what hangs on it hangs on its parent then.
- */
-export interface RemoveJoint {
-  kind: "remove";
-  link: string;
+export interface SetConvention {
+  kind: "convention";
+  convention: "standard" | "modified";
+  keep_arm: boolean;
 }
 /**
  * Let a link of a chain change places with its neighbour.
@@ -544,12 +537,19 @@ export interface MoveJoint {
   by: -1 | 1;
 }
 /**
- * Read the rows by the other convention, or write the same arm in it (``keep_arm``).
+ * Take a link out; what hangs on it hangs on its parent then.
  */
-export interface SetConvention {
-  kind: "convention";
-  convention: "standard" | "modified";
-  keep_arm: boolean;
+export interface RemoveJoint {
+  kind: "remove";
+  link: string;
+}
+/**
+ * Give a link another name.
+ */
+export interface RenameLink {
+  kind: "rename";
+  link: string;
+  name: string;
 }
 /**
  * Ask which tables a robot has and what stands in their columns.

@@ -54,18 +54,18 @@ class Sheet:
         return do.SheetNote(x=self.chance.random(), y=2.0, text=self.one(("a", "b\nc", "ä")))
 
 
-def add(s: Sheet) -> do.Edit:
+def add(s: Sheet) -> do.DiagramEdit:
     name = s.one(NEW_NAMES)
     return do.AddBlocks(blocks=[do.NewBlock(name=name, type=s.one(TYPES), place=s.place())])
 
 
-def paste(s: Sheet) -> do.Edit:
+def paste(s: Sheet) -> do.DiagramEdit:
     names = s.some(s.blocks)
     called = {name: f"{name} copy {s.chance.randrange(100)}" for name in names}
     return do.PasteBlocks(text=clipped(s.diagram, names, [], load_robot), names=called, shift=20.0)
 
 
-def remove(s: Sheet) -> do.Edit:
+def remove(s: Sheet) -> do.DiagramEdit:
     return s.one(
         (
             do.RemoveBlocks(blocks=[s.one(s.blocks)] if s.blocks else []),
@@ -75,13 +75,13 @@ def remove(s: Sheet) -> do.Edit:
     )
 
 
-def move(s: Sheet) -> do.Edit:
+def move(s: Sheet) -> do.DiagramEdit:
     places = {name: s.place() for name in s.some(s.blocks)}
     notes = {name: s.note() for name in s.diagram.notes}
     return do.MoveBlocks(places=places, notes=notes, instead=s.some(s.wires)[: s.chance.randint(0, 1)])
 
 
-def bend(s: Sheet) -> do.Edit:
+def bend(s: Sheet) -> do.DiagramEdit:
     ways = [[], [10.0, 40.0, 90.0], [1.5]]
     return do.BendWires(wires=[w.model_copy(update={"bends": tuple(s.one(ways))}) for w in s.some(s.wires)])
 
@@ -96,21 +96,21 @@ def numbers(s: Sheet) -> list[str]:
     ]
 
 
-def parameters(s: Sheet) -> do.Edit:
+def parameters(s: Sheet) -> do.DiagramEdit:
     block, _, parameter = s.one(numbers(s)).rpartition(".")
     return do.SetParameters(block=block, values={parameter: s.one((2.0, "2*pi", "k", "1/3"))})
 
 
-def mask(s: Sheet) -> do.Edit:
+def mask(s: Sheet) -> do.DiagramEdit:
     declared = [do.MaskParameter(name="k", default=s.one((1.0, "3*pi")), unit=s.one(("", "m")))]
     return do.SetMask(block=s.one(["", *s.insides]), parameters=declared[: s.chance.randint(0, 3)])
 
 
-def keep_tuned(s: Sheet) -> do.Edit:
+def keep_tuned(s: Sheet) -> do.DiagramEdit:
     return do.KeepTuned(values={s.one(numbers(s)): s.chance.random()})
 
 
-MAKERS: dict[type[do.Edit], Callable[[Sheet], do.Edit]] = {
+MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.AddBlocks: add,
     do.PasteBlocks: paste,
     do.RemoveBlocks: remove,
@@ -130,7 +130,7 @@ MAKERS: dict[type[do.Edit], Callable[[Sheet], do.Edit]] = {
 }
 
 
-def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.Edit]:
+def random_edit(document: Document, chance: random.Random) -> tuple[list[str], do.DiagramEdit]:
     """A sheet of the drawing, by its path, and an edit of it."""
     path: list[str] = []
     diagram = document.diagram

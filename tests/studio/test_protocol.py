@@ -9,7 +9,11 @@ import pytest
 
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.message import Request, messages_of, reply_type
+from armblocks.studio.protocol.messages.robot_edits import RobotEdit
+from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit
+from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.server.hub import Hub
+from armblocks.studio.sheet.edits import EDITS
 
 
 def test_every_request_is_answered_with_the_reply_that_it_declares(tmp_path: Path) -> None:
@@ -23,6 +27,11 @@ def test_every_request_is_answered_with_the_reply_that_it_declares(tmp_path: Pat
 def expected(request: type[Request[Any]]) -> Any:
     declared = reply_type(request)
     return type(None) if declared is None else declared
+
+
+def test_every_edit_is_carried_out_and_has_a_title() -> None:
+    for table, edits in ((EDITS, DiagramEdit), (ROBOT_EDITS, RobotEdit)):
+        assert set(table.entries) == set(messages_of(edits).values())
 
 
 def test_a_request_without_a_reply_type_is_refused() -> None:

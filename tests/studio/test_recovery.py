@@ -17,7 +17,7 @@ from armblocks.studio.documents import open_files
 from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
-    Edit,
+    DiagramEdit,
     MoveBlocks,
     NewBlock,
     Place,
@@ -33,7 +33,7 @@ def disk(tmp_path: Path) -> Disk:
     return Disk(tmp_path / "first")
 
 
-def change(key: str, edit: Edit, **more: Any) -> say.Change:
+def change(key: str, edit: DiagramEdit, **more: Any) -> say.Change:
     return say.Change(document="", key=key, edit=edit, **more)
 
 
@@ -51,7 +51,7 @@ def random_requests(seed: int, count: int) -> list[Any]:
     requests: list[Any] = []
     for k in range(count):
         some = f"b{random_.randrange(8)}"
-        edits: list[Edit] = [
+        edits: list[DiagramEdit] = [
             add(f"b{random_.randrange(8)}", random_.choice(["Gain", "Integrator", "Sum"])),
             SetParameters(block=some, values={"gain": random_.random()}),
             MoveBlocks(places={some: Place(x=float(k), y=1.5)}),

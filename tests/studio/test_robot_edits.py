@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import pytest
@@ -18,9 +18,10 @@ from armblocks.formats import list_robots, load_robot, write_robot
 from armblocks.robot import FrictionModel, JointLimits, Link, Robot, standard_dh
 from armblocks.studio.documents.history import History
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.message import AnyOf
 from armblocks.studio.protocol.messages.robot_edits import RobotEdit
 from armblocks.studio.robots.columns import ROBOT_COLUMNS, Quantity
-from armblocks.studio.robots.edits import angle_value, robot_applied, robot_summary
+from armblocks.studio.robots.edits import ROBOT_EDITS, angle_value
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
 from armblocks.studio.robots.robot_kind import RobotKind
 from armblocks.studio.robots.tables import robot_shown, robot_tables
@@ -30,11 +31,11 @@ PAPER_COLUMNS = (
     *("Jm", "G", "B", "Tc+", "Tc-", "lowest", "highest", "speed"),
 )
 KIND = RobotKind(ProjectFolder("."))
-EDIT: TypeAdapter[RobotEdit] = TypeAdapter(RobotEdit)
+EDIT: TypeAdapter[RobotEdit] = TypeAdapter(Annotated[RobotEdit, AnyOf()])
 
 
 def edited(robot: Robot, kind: str, **values: Any) -> Robot:
-    return robot_applied(EDIT.validate_python({"kind": kind, **values}), robot)
+    return ROBOT_EDITS.applied(EDIT.validate_python({"kind": kind, **values}), robot)
 
 
 def typed(robot: Robot, link: str, column: str, text: str, angles: str = "deg") -> Robot:
@@ -258,12 +259,12 @@ def test_any_sequence_of_edits_undone_gives_the_same_file(edits: list[dict[str, 
     for one in edits:
         edit = EDIT.validate_python(one)
         try:
-            after = robot_applied(edit, history.value)
+            after = ROBOT_EDITS.applied(edit, history.value)
         except ArmblocksError as error:
             assert error.what and (error.allowed or error.fix)
             continue
-        assert robot_summary(edit)
-        history.replace(robot_summary(edit), after)
+        assert ROBOT_EDITS.title(edit)
+        history.replace(ROBOT_EDITS.title(edit), after)
         forms.append(write_robot(history.value))
         robot_shown("key", history, None, "", []).model_dump_json()
     for form in forms[-2::-1]:

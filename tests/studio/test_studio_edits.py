@@ -18,7 +18,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     BendWires,
     Connect,
     Describe,
-    Edit,
+    DiagramEdit,
     GroupBlocks,
     KeepTuned,
     LogSignal,
@@ -33,11 +33,10 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SetSettings,
     SheetNote,
     Wire,
-    summary,
 )
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.document import Document
-from armblocks.studio.sheet.edits import applied
+from armblocks.studio.sheet.edits import EDITS, applied
 from armblocks.studio.sheet.nesting import inside
 from armblocks.studio.sheet.outline import find, outline
 from armblocks.studio.sheet.parameter_values import parameter_value
@@ -70,7 +69,7 @@ values = st.sampled_from(
 )
 parameters = st.dictionaries(st.sampled_from(["gain", "signs", "inputs", "nothing"]), values, max_size=2)
 blocks = st.builds(NewBlock, name=names, type=st.sampled_from(TYPES), parameters=parameters, place=places)
-edits: st.SearchStrategy[Edit] = st.one_of(
+edits: st.SearchStrategy[DiagramEdit] = st.one_of(
     st.builds(AddBlocks, blocks=st.lists(blocks, max_size=2), wires=st.lists(wires, max_size=1)),
     st.builds(RemoveBlocks, blocks=st.lists(names, max_size=2), wires=st.lists(wires, max_size=1)),
     st.builds(Connect, wire=wires, replace=st.booleans()),
@@ -103,7 +102,7 @@ def empty() -> Document:
 
 @settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(edits, max_size=25))
-def test_all_edits_undone_give_the_same_file_and_redone_the_same_again(todo: list[Edit]) -> None:
+def test_all_edits_undone_give_the_same_file_and_redone_the_same_again(todo: list[DiagramEdit]) -> None:
     document = empty()
     history = [content(document)]
     for edit in todo:
@@ -113,7 +112,7 @@ def test_all_edits_undone_give_the_same_file_and_redone_the_same_again(todo: lis
         except ArmblocksError:
             assert document.diagram is before
             continue
-        assert summary(edit) == document.undo_title
+        assert EDITS.title(edit) == document.undo_title
         history.append(content(document))
     for expected in reversed(history[:-1]):
         document.undo()
@@ -217,7 +216,7 @@ def chain() -> Document:
     return document
 
 
-def refused(*todo: Edit) -> str:
+def refused(*todo: DiagramEdit) -> str:
     document = chain()
     with pytest.raises(ArmblocksError) as caught:
         for edit in todo:

@@ -16,7 +16,7 @@ from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     Connect,
-    Edit,
+    DiagramEdit,
     GroupBlocks,
     MoveBlocks,
     NewBlock,
@@ -39,7 +39,7 @@ def drawing() -> Document:
     return document
 
 
-def change(author: str, base: int, edit: Edit, *inside: str) -> say.Change:
+def change(author: str, base: int, edit: DiagramEdit, *inside: str) -> say.Change:
     return say.Change(document="", author=author, base=base, edit=edit, inside=list(inside))
 
 
@@ -47,7 +47,7 @@ def gain(block: str, value: float) -> SetParameters:
     return SetParameters(block=block, values={"gain": value})
 
 
-CLASHES: list[tuple[Edit, Edit]] = [
+CLASHES: list[tuple[DiagramEdit, DiagramEdit]] = [
     (gain("b0", 2.0), gain("b0", 3.0)),
     (gain("b0", 2.0), RemoveBlocks(blocks=["b0"])),
     (gain("b0", 2.0), Rename(block="b0", name="other")),
@@ -59,7 +59,7 @@ CLASHES: list[tuple[Edit, Edit]] = [
     (Connect(wire=Wire(source="b0/y", target="b2/u")), RemoveBlocks(blocks=["b0"])),
     (gain("b0", 2.0), GroupBlocks(blocks=["b0", "b1"], name="S")),
 ]
-PEACE: list[tuple[Edit, Edit]] = [
+PEACE: list[tuple[DiagramEdit, DiagramEdit]] = [
     (gain("b0", 2.0), gain("b1", 3.0)),
     (gain("b0", 2.0), MoveBlocks(places={"b0": Place(x=9, y=0)})),
     (RemoveBlocks(blocks=["b0"]), gain("b1", 2.0)),
@@ -70,7 +70,7 @@ PEACE: list[tuple[Edit, Edit]] = [
 
 
 @pytest.mark.parametrize(("theirs", "mine"), CLASHES)
-def test_an_edit_of_what_another_page_changed_is_refused(theirs: Edit, mine: Edit) -> None:
+def test_an_edit_of_what_another_page_changed_is_refused(theirs: DiagramEdit, mine: DiagramEdit) -> None:
     document = drawing()
     base = document.version
     document.perform(change("other", base, theirs))
@@ -86,7 +86,7 @@ def test_an_edit_of_what_another_page_changed_is_refused(theirs: Edit, mine: Edi
 
 
 @pytest.mark.parametrize(("theirs", "mine"), PEACE)
-def test_edits_of_different_things_are_both_carried_out(theirs: Edit, mine: Edit) -> None:
+def test_edits_of_different_things_are_both_carried_out(theirs: DiagramEdit, mine: DiagramEdit) -> None:
     document, other_order = drawing(), drawing()
     base = document.version
     document.perform(change("other", base, theirs))
@@ -154,7 +154,7 @@ class Page:
         self.wires = (self.wires - set(told.wires_removed)) | set(told.wires_added)
 
 
-def random_edit(random_: random.Random, page: Page) -> Edit:
+def random_edit(random_: random.Random, page: Page) -> DiagramEdit:
     """Something that a person does to what the page shows."""
     names = sorted(page.blocks) or ["b0"]
     block, other = random_.choice(names), random_.choice(names)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from collections import Counter
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from crashed_disk import Disk, going
@@ -14,8 +13,8 @@ from sheet_edits import MAKERS, random_edit
 from armblocks.errors import ArmblocksError
 from armblocks.formats import diagram_to_bytes, load_robot
 from armblocks.studio.protocol.messages import documents as say
-from armblocks.studio.protocol.messages.sheet_edits import Edit, summary
 from armblocks.studio.sheet.document import Document
+from armblocks.studio.sheet.edits import EDITS
 
 BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
 SEEDS = 24
@@ -28,7 +27,7 @@ def content(document: Document) -> bytes:
 
 
 def test_every_kind_of_edit_is_made() -> None:
-    assert set(MAKERS) == set(get_args(get_args(Edit)[0]))
+    assert set(MAKERS) == set(EDITS.entries)
 
 
 def test_all_is_undone_and_redone_and_comes_back_from_the_journal(tmp_path: Path) -> None:
@@ -53,7 +52,7 @@ def test_all_is_undone_and_redone_and_comes_back_from_the_journal(tmp_path: Path
                 except ArmblocksError:
                     assert document.diagram is forms[-1]
                     continue
-                assert document.undo_title == summary(edit)
+                assert document.undo_title == EDITS.title(edit)
                 done[type(edit)] += 1
                 inner += bool(path)
                 forms.append(document.diagram)

@@ -36,6 +36,10 @@ class Event(Message):
     """What the server tells a front end of its own accord."""
 
 
+class Edit(Message):
+    """One step of work on a document, as data: what can be undone."""
+
+
 class Fault(Message):
     """Why a request was refused, in the parts of an ``ArmblocksError``."""
 

@@ -10,7 +10,7 @@ from armblocks.studio.documents.aspects import Aspect
 from armblocks.studio.documents.edited import Edited, Outcome
 from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.columns import ROBOT_COLUMNS
-from armblocks.studio.robots.edits import robot_applied, robot_summary
+from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
 
 
@@ -23,8 +23,8 @@ class RobotDocument(Edited[Robot]):
         """What the step is called, the robot after it, and the cell that is being typed into."""
         with warnings.catch_warnings():  # what it warns of stands among the findings
             warnings.simplefilter("ignore", ArmblocksWarning)
-            after = robot_applied(request.edit, self.value)
-        return Outcome(robot_summary(request.edit), after, request.gesture)
+            after = ROBOT_EDITS.applied(request.edit, self.value)
+        return Outcome(ROBOT_EDITS.title(request.edit), after, request.gesture)
 
     def aspects(self, before: Robot, after: Robot) -> set[Aspect]:
         """The cells that differ, links that came or went, and the order of the links."""

@@ -16,12 +16,12 @@ from typing import Literal
 from armblocks.errors import InputError, RobotError
 from armblocks.robot import DhConvention, DhRow, Link, Robot, link_from_dh, serial_chain
 from armblocks.robot.dh_conversion import converted, reread
+from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.robot_edits import (
     AddJoint,
     MoveJoint,
     RemoveJoint,
     RenameLink,
-    RobotEdit,
     SetCell,
     SetConvention,
 )
@@ -34,45 +34,20 @@ _UNIT_BEHIND = re.compile(r"(?<=[0-9.)])\s*(deg|rad)\b")
 _DEGREES = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(?:\*?\s*deg|°)\s*")
 
 
-def robot_summary(edit: RobotEdit) -> str:
-    """What undo calls it."""
-    match edit:
-        case SetCell():
-            column = LINK_COLUMNS.get(edit.column) or ROBOT_COLUMNS.get(edit.column)
-            title = column.title if column else edit.column
-            return f"{title} of {edit.link or (column.group.lower() if column and column.group else 'robot')}"
-        case RenameLink():
-            return f"name of {edit.link}"
-        case AddJoint():
-            return "new joint"
-        case RemoveJoint() | MoveJoint():
-            return f"{edit.kind} {edit.link}"
-        case SetConvention():
-            return f"{edit.convention} D-H"
-
-
-def robot_applied(edit: RobotEdit, robot: Robot) -> Robot:
-    """The robot after an edit. Raises ``InputError`` or ``RobotError`` with link and column."""
-    match edit:
-        case SetCell():
-            return _with_cell(robot, edit)
-        case RenameLink():
-            return _renamed(robot, edit.link, edit.name.strip())
-        case AddJoint():
-            return _with_joint(robot, edit.after)
-        case RemoveJoint():
-            return _without_joint(robot, edit.link)
-        case MoveJoint():
-            return _with_joint_moved(robot, edit.link, edit.by)
-        case SetConvention():
-            change = converted if edit.keep_arm else reread
-            return change(robot, DhConvention(edit.convention))
+ROBOT_EDITS: EditTable[Robot, []] = EditTable()
 
 
 # -- cells ---------------------------------------------------------------------------------------------------
 
 
-def _with_cell(robot: Robot, edit: SetCell) -> Robot:
+def _cell_title(edit: SetCell) -> str:
+    column = LINK_COLUMNS.get(edit.column) or ROBOT_COLUMNS.get(edit.column)
+    title = column.title if column else edit.column
+    return f"{title} of {edit.link or (column.group.lower() if column and column.group else 'robot')}"
+
+
+@ROBOT_EDITS.on(SetCell, _cell_title)
+def _set_cell(edit: SetCell, robot: Robot) -> Robot:
     if not edit.link:
         column = _known(ROBOT_COLUMNS, edit.column)
         return column.write(robot, _typed(column, robot, edit, f"robot '{robot.name}'", turns=False))
@@ -153,8 +128,9 @@ def _one_number(text: str, where: str) -> float:
 # -- links ---------------------------------------------------------------------------------------------------
 
 
-def _renamed(robot: Robot, old: str, name: str) -> Robot:
-    robot.link(old)
+@ROBOT_EDITS.on(RenameLink, lambda edit: f"name of {edit.link}")
+def _rename(edit: RenameLink, robot: Robot) -> Robot:
+    old, name = robot.link(edit.link).name, edit.name.strip()
     links = tuple(
         replace(
             link,
@@ -170,8 +146,10 @@ def _is_chain(robot: Robot) -> bool:
     return robot.links == serial_chain(robot.links)
 
 
-def _with_joint(robot: Robot, after: str) -> Robot:
+@ROBOT_EDITS.on(AddJoint, lambda edit: "new joint")
+def _add_joint(edit: AddJoint, robot: Robot) -> Robot:
     """A new revolute link of the neighbour's convention between a link and what hangs on it."""
+    after = edit.after
     links = list(robot.links)
     place = links.index(robot.link(after)) + 1 if after else 0
     near = next((link.dh for link in links[place - 1 :: -1] + links if link.dh is not None), None)
@@ -191,8 +169,9 @@ def _free_name(links: Sequence[Link]) -> str:
     return next(name for k in range(1, len(links) + 2) if (name := f"link{len(links) + k}") not in taken)
 
 
-def _without_joint(robot: Robot, name: str) -> Robot:
-    gone = robot.link(name)
+@ROBOT_EDITS.on(RemoveJoint, lambda edit: f"remove {edit.link}")
+def _remove_joint(edit: RemoveJoint, robot: Robot) -> Robot:
+    gone = robot.link(edit.link)
     if len(robot.links) == 1:
         raise RobotError(
             "a robot has one link at least",
@@ -201,14 +180,16 @@ def _without_joint(robot: Robot, name: str) -> Robot:
             fix="change this link instead",
         )
     links = tuple(
-        replace(link, parent=gone.parent) if link.parent == name else link
+        replace(link, parent=gone.parent) if link.parent == gone.name else link
         for link in robot.links
         if link is not gone
     )
     return replace(robot, links=links)
 
 
-def _with_joint_moved(robot: Robot, name: str, by: int) -> Robot:
+@ROBOT_EDITS.on(MoveJoint, lambda edit: f"move {edit.link}")
+def _move_joint(edit: MoveJoint, robot: Robot) -> Robot:
+    name, by = edit.link, edit.by
     links = list(robot.links)
     place = links.index(robot.link(name))
     if not _is_chain(robot):
@@ -227,3 +208,9 @@ def _with_joint_moved(robot: Robot, name: str, by: int) -> Robot:
         )
     links[place], links[place + by] = links[place + by], links[place]
     return replace(robot, links=serial_chain(links))
+
+
+@ROBOT_EDITS.on(SetConvention, lambda edit: f"{edit.convention} D-H")
+def _set_convention(edit: SetConvention, robot: Robot) -> Robot:
+    change = converted if edit.keep_arm else reread
+    return change(robot, DhConvention(edit.convention))

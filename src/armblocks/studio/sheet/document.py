@@ -9,9 +9,9 @@ from armblocks.diagram import Diagram
 from armblocks.studio.documents.aspects import Aspect, changed_aspects
 from armblocks.studio.documents.edited import Edited, Outcome
 from armblocks.studio.protocol.messages import documents as say
-from armblocks.studio.protocol.messages.sheet_edits import Edit, ModelEdit, summary
+from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit, ModelEdit
 from armblocks.studio.sheet.clipping import ReadDiagram
-from armblocks.studio.sheet.edits import applied
+from armblocks.studio.sheet.edits import EDITS, applied
 from armblocks.studio.sheet.nesting import check_own, inside, with_inside
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 from armblocks.studio.sheet.placing import arranged
@@ -39,7 +39,7 @@ class Document(Edited[Diagram]):
         """The diagram as it is now."""
         return self.value
 
-    def edit(self, edit: Edit, path: Sequence[str] = ()) -> None:
+    def edit(self, edit: DiagramEdit, path: Sequence[str] = ()) -> None:
         """Carry out an edit in the diagram inside the subsystem of this path.
 
         Raises what :func:`~armblocks.studio.sheet.edits.applied` and
@@ -60,17 +60,17 @@ class Document(Edited[Diagram]):
     def outcome(self, request: say.Change | say.ArrangeBlocks) -> Outcome[Diagram]:
         """What the step is called, and the diagram after it."""
         if isinstance(request, say.Change) and isinstance(request.edit, ModelEdit):
-            return Outcome(summary(request.edit), self._applied(request.edit, self.diagram))
+            return Outcome(EDITS.title(request.edit), self._applied(request.edit, self.diagram))
         check_own(self.diagram, request.inside)
         sheet = inside(self.diagram, request.inside)
         if isinstance(request, say.Change):
-            title = summary(request.edit)
+            title = EDITS.title(request.edit)
             after = self._applied(request.edit, sheet)
         else:
             title, after = "arrange", arranged(sheet)
         return Outcome(title, with_inside(self.diagram, request.inside, after))
 
-    def _applied(self, edit: Edit, sheet: Diagram) -> Diagram:
+    def _applied(self, edit: DiagramEdit, sheet: Diagram) -> Diagram:
         return applied(edit, sheet, self._resolve_robot, self._read_diagram)
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:

@@ -11,7 +11,7 @@ Parameters arrive as JSON values and are checked by the block's own declarations
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from typing import Any
 
 from armblocks.blocks import BLOCKS
@@ -31,13 +31,14 @@ from armblocks.diagram.mask import Scope
 from armblocks.diagram.names import folded
 from armblocks.drawing.diagram_layout import standing_box
 from armblocks.errors import DiagramError, UnknownNameError
+from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
     BendWires,
     BreakLink,
     Connect,
     Describe,
-    Edit,
+    DiagramEdit,
     GroupBlocks,
     KeepTuned,
     LogSignal,
@@ -67,54 +68,37 @@ MOST_BLOCKS = 20_000
 """Blocks that one sheet may hold in the editor."""
 
 
+@dataclasses.dataclass(frozen=True)
+class EditContext:
+    """What edits need besides the diagram: to find the robots that they name, and to read what was copied."""
+
+    resolve_robot: ResolveRobot
+    read_diagram: ReadDiagram
+
+
+EDITS: EditTable[Diagram, [EditContext]] = EditTable()
+
+
 def applied(
-    edit: Edit, diagram: Diagram, resolve_robot: ResolveRobot, read_diagram: ReadDiagram | None = None
+    edit: DiagramEdit,
+    diagram: Diagram,
+    resolve_robot: ResolveRobot,
+    read_diagram: ReadDiagram | None = None,
 ) -> Diagram:
     """The diagram after an edit; the one given stays as it is. ``resolve_robot`` finds the robots it names.
 
     ``read_diagram`` reads what was copied; without it only what needs no files of a project can be pasted.
     Raises ``DiagramError``, ``UnknownNameError`` or ``InputError`` for an edit that cannot be carried out.
     """
-    match edit:
-        case AddBlocks():
-            return _add(edit, diagram, resolve_robot)
-        case PasteBlocks():
-            copied = (read_diagram or reader(resolve_robot))(edit.text, "what was copied")
-            _check_room(diagram, len(copied.blocks))
-            return pasted(diagram, copied, edit.names, edit.shift)
-        case RemoveBlocks():
-            return _remove(edit, diagram)
-        case Connect():
-            return _connect([edit.wire], diagram, replace=edit.replace)
-        case MoveBlocks():
-            return _move(edit, diagram)
-        case BendWires():
-            return _bend(edit.wires, diagram)
-        case SetNotes():
-            return _note(edit.notes, diagram)
-        case Rename():
-            return _rename(edit, diagram)
-        case SetParameters():
-            return _set_parameters(edit, diagram, resolve_robot)
-        case SetMask():
-            return with_mask(edit, diagram, resolve_robot)
-        case KeepTuned():
-            return with_parameters(
-                diagram, {path: tuned_value(value, path) for path, value in edit.values.items()}
-            )
-        case LogSignal():
-            return _log(edit, diagram)
-        case GroupBlocks():
-            return grouped(edit.blocks, edit.name, diagram)
-        case BreakLink():
-            return unlinked(diagram, _known(edit.block, diagram))
-        case SetSettings():
-            return _set_settings(edit, diagram)
-        case Describe():
-            return dataclasses.replace(diagram, description=edit.text)
+    context = EditContext(resolve_robot, read_diagram or reader(resolve_robot))
+    return EDITS.applied(edit, diagram, context)
 
 
-def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+# -- blocks --------------------------------------------------------------------------------------------------
+
+
+@EDITS.on(AddBlocks, lambda edit: f"add {_listed([block.name for block in edit.blocks])}")
+def _add(edit: AddBlocks, diagram: Diagram, context: EditContext) -> Diagram:
     where = f"diagram '{diagram.name}'"
     blocks, layout = dict(diagram.blocks), dict(diagram.layout)
     _check_room(diagram, len(edit.blocks))
@@ -122,12 +106,19 @@ def _add(edit: AddBlocks, diagram: Diagram, resolve_robot: ResolveRobot) -> Diag
     for new in edit.blocks:
         check_free(new.name, taken, where)
         taken[folded(new.name)] = new.name
-        blocks[new.name] = _made(new, diagram.mask_values, resolve_robot)
+        blocks[new.name] = _made(new, diagram.mask_values, context.resolve_robot)
         layout[new.name] = _placement(new.place)
     added = dataclasses.replace(diagram, blocks=blocks, layout=layout)
     if edit.instead:
-        added = _remove(RemoveBlocks(wires=edit.instead), added)
-    return _connect(edit.wires, added, replace=False)
+        added = _without(RemoveBlocks(wires=edit.instead), added)
+    return _connected(edit.wires, added, replace=False)
+
+
+@EDITS.on(PasteBlocks, lambda edit: "paste")
+def _paste(edit: PasteBlocks, diagram: Diagram, context: EditContext) -> Diagram:
+    copied = context.read_diagram(edit.text, "what was copied")
+    _check_room(diagram, len(copied.blocks))
+    return pasted(diagram, copied, edit.names, edit.shift)
 
 
 def _check_room(diagram: Diagram, more: int) -> None:
@@ -157,7 +148,18 @@ def _made(new: NewBlock, scope: Scope, resolve_robot: ResolveRobot) -> Block:
     return dataclasses.replace(made, diagram=placed(made.diagram)) if isinstance(made, DiagramBlock) else made
 
 
-def _remove(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
+def _removed(edit: RemoveBlocks) -> str:
+    if edit.blocks:
+        return f"delete {_listed(edit.blocks)}"
+    return f"delete {_counted(edit.wires, 'wire') if edit.wires else _counted(edit.notes, 'note')}"
+
+
+@EDITS.on(RemoveBlocks, _removed)
+def _remove(edit: RemoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
+    return _without(edit, diagram)
+
+
+def _without(edit: RemoveBlocks, diagram: Diagram) -> Diagram:
     gone = {_known(name, diagram) for name in edit.blocks}
     cut = {_connection(wire) for wire in edit.wires}
     for wire in cut:
@@ -187,14 +189,20 @@ def _present(wire: Connection, diagram: Diagram) -> Connection:
     return wire
 
 
-def _log(edit: LogSignal, diagram: Diagram) -> Diagram:
+@EDITS.on(LogSignal, lambda edit: f"{'log' if edit.logged else 'stop logging'} {edit.port}")
+def _log(edit: LogSignal, diagram: Diagram, _: EditContext) -> Diagram:
     ref = _port(edit.port)
     _check_port(ref, diagram, output=True)
     others = tuple(other for other in diagram.logged if other != ref)
     return dataclasses.replace(diagram, logged=(*others, ref) if edit.logged else others)
 
 
-def _connect(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
+@EDITS.on(Connect, lambda edit: f"connect {edit.wire.source} to {edit.wire.target}")
+def _connect(edit: Connect, diagram: Diagram, _: EditContext) -> Diagram:
+    return _connected([edit.wire], diagram, replace=edit.replace)
+
+
+def _connected(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagram:
     connections = {wire.target: wire for wire in diagram.connections}
     for wire in wires:
         made = _connection(wire)
@@ -212,7 +220,7 @@ def _connect(wires: Sequence[Wire], diagram: Diagram, *, replace: bool) -> Diagr
     if not wires:
         return diagram
     connected = dataclasses.replace(diagram, connections=tuple(connections.values()))
-    return _bend([wire for wire in wires if wire.bends], connected)
+    return _bent([wire for wire in wires if wire.bends], connected)
 
 
 def _connection(wire: Wire) -> Connection:
@@ -239,7 +247,15 @@ def _check_port(ref: PortRef, diagram: Diagram, *, output: bool) -> None:
         raise UnknownNameError(f"{side} port", ref.port, ports, where=f"block '{ref.block}' ({block.title})")
 
 
-def _move(edit: MoveBlocks, diagram: Diagram) -> Diagram:
+def _moved(edit: MoveBlocks) -> str:
+    if edit.instead and edit.places:
+        into = len(edit.wires) > len(edit.instead)
+        return f"{'insert' if into else 'disconnect'} {_listed(list(edit.places))}"
+    return f"move {_listed(list(edit.places)) if edit.places else _counted(edit.notes, 'note')}"
+
+
+@EDITS.on(MoveBlocks, _moved)
+def _move(edit: MoveBlocks, diagram: Diagram, _: EditContext) -> Diagram:
     layout = dict(diagram.layout)
     shifts: dict[str, tuple[float, float]] = {}
     for name, place in edit.places.items():
@@ -253,8 +269,8 @@ def _move(edit: MoveBlocks, diagram: Diagram) -> Diagram:
         if shift is not None and shift == shifts.get(wire.target.block):
             flat = _leaves_sideways(wire, diagram)
             bends[wire] = tuple(value + shift[(k + flat + 1) % 2] for k, value in enumerate(values))
-    moved = _note(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
-    return _connect(edit.wires, _remove(RemoveBlocks(wires=edit.instead), moved), replace=False)
+    moved = _noted(edit.notes, dataclasses.replace(diagram, layout=layout, bends=bends), known=True)
+    return _connected(edit.wires, _without(RemoveBlocks(wires=edit.instead), moved), replace=False)
 
 
 def _leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
@@ -263,14 +279,24 @@ def _leaves_sideways(wire: Connection, diagram: Diagram) -> bool:
     return any(spot.name == wire.source.port and spot.dx != 0 for spot in spots)
 
 
-def _bend(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
+@EDITS.on(BendWires, lambda edit: f"bend {_counted(edit.wires, 'wire')}")
+def _bend(edit: BendWires, diagram: Diagram, _: EditContext) -> Diagram:
+    return _bent(edit.wires, diagram)
+
+
+def _bent(wires: Sequence[Wire], diagram: Diagram) -> Diagram:
     bends = dict(diagram.bends)
     for wire in wires:
         bends[_present(_connection(wire), diagram)] = tuple(wire.bends)
     return dataclasses.replace(diagram, bends=bends)
 
 
-def _note(notes: Mapping[str, SheetNote], diagram: Diagram, *, known: bool = False) -> Diagram:
+@EDITS.on(SetNotes, lambda edit: f"write {_counted(edit.notes, 'note')}")
+def _write_notes(edit: SetNotes, diagram: Diagram, _: EditContext) -> Diagram:
+    return _noted(edit.notes, diagram)
+
+
+def _noted(notes: Mapping[str, SheetNote], diagram: Diagram, *, known: bool = False) -> Diagram:
     if not notes:
         return diagram
     for name in notes if known else ():
@@ -284,7 +310,8 @@ def _placement(place: Place) -> Placement:
     return Placement(**place.model_dump())
 
 
-def _rename(edit: Rename, diagram: Diagram) -> Diagram:
+@EDITS.on(Rename, lambda edit: f"rename {edit.block}")
+def _rename(edit: Rename, diagram: Diagram, _: EditContext) -> Diagram:
     _known(edit.block, diagram)
     taken = {folded(name): name for name in diagram.blocks if name != edit.block}
     check_free(edit.name, taken, f"diagram '{diagram.name}'")
@@ -306,7 +333,8 @@ def _rename(edit: Rename, diagram: Diagram) -> Diagram:
     )
 
 
-def _set_parameters(edit: SetParameters, diagram: Diagram, resolve_robot: ResolveRobot) -> Diagram:
+@EDITS.on(SetParameters, lambda edit: f"change {edit.block}")
+def _set_parameters(edit: SetParameters, diagram: Diagram, context: EditContext) -> Diagram:
     old = diagram.blocks[_known(edit.block, diagram)]
     rules = {rule.name: rule for rule in old.own_parameters()}
     where = f"block '{edit.block}' ({old.title})"
@@ -314,16 +342,56 @@ def _set_parameters(edit: SetParameters, diagram: Diagram, resolve_robot: Resolv
     for name, value in edit.values.items():
         if name not in rules:
             raise UnknownNameError("parameter", name, rules, where=where)
-        values[name] = parameter_value(rules[name], value, where, resolve_robot, diagram.mask_values)
+        values[name] = parameter_value(rules[name], value, where, context.resolve_robot, diagram.mask_values)
     changed = block_in_scope(edit.block, old.with_parameters(**values), diagram.mask_values)
     return with_block(diagram, edit.block, changed)
 
 
-def _set_settings(edit: SetSettings, diagram: Diagram) -> Diagram:
+@EDITS.on(GroupBlocks, lambda edit: f"group {_counted(edit.blocks, 'block')}")
+def _group(edit: GroupBlocks, diagram: Diagram, _: EditContext) -> Diagram:
+    return grouped(edit.blocks, edit.name, diagram)
+
+
+@EDITS.on(BreakLink, lambda edit: f"break the link of {edit.block}")
+def _break_link(edit: BreakLink, diagram: Diagram, _: EditContext) -> Diagram:
+    return unlinked(diagram, _known(edit.block, diagram))
+
+
+# -- the whole model -----------------------------------------------------------------------------------------
+
+
+@EDITS.on(SetMask, lambda edit: f"mask {edit.block}" if edit.block else "mask the model")
+def _set_mask(edit: SetMask, diagram: Diagram, context: EditContext) -> Diagram:
+    return with_mask(edit, diagram, context.resolve_robot)
+
+
+@EDITS.on(KeepTuned, lambda edit: f"keep {_counted(edit.values, 'tuned value')}")
+def _keep_tuned(edit: KeepTuned, diagram: Diagram, _: EditContext) -> Diagram:
+    return with_parameters(diagram, {path: tuned_value(value, path) for path, value in edit.values.items()})
+
+
+@EDITS.on(SetSettings, lambda edit: "change the settings")
+def _set_settings(edit: SetSettings, diagram: Diagram, _: EditContext) -> Diagram:
     return dataclasses.replace(diagram, settings=with_settings(diagram.settings, edit.values))
+
+
+@EDITS.on(Describe, lambda edit: "change the description")
+def _describe(edit: Describe, diagram: Diagram, _: EditContext) -> Diagram:
+    return dataclasses.replace(diagram, description=edit.text)
+
+
+# -- names ---------------------------------------------------------------------------------------------------
 
 
 def _known(name: str, diagram: Diagram) -> str:
     if name not in diagram.blocks:
         raise UnknownNameError("block", name, diagram.blocks, where=f"diagram '{diagram.name}'")
     return name
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else _counted(names, "block")
+
+
+def _counted(things: Sized, thing: str) -> str:
+    return f"{len(things)} {thing}{'' if len(things) == 1 else 's'}"

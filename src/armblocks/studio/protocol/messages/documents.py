@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from armblocks.studio.protocol.alteration import Alteration
-from armblocks.studio.protocol.message import Event, Message, Request
+from armblocks.studio.protocol.message import AnyOf, Event, Message, Request
 from armblocks.studio.protocol.messages.robots import Opening
-from armblocks.studio.protocol.messages.sheet_edits import Edit
+from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit
 from armblocks.studio.protocol.messages.sheets import Sheet, SheetChange
 
 
@@ -95,7 +95,7 @@ class Change(DiagramAlteration):
     kind: Literal["change"] = "change"
     inside: list[str] = Field(default_factory=list[str])
     """Names of the subsystems on the way to the sheet that is edited."""
-    edit: Edit
+    edit: Annotated[DiagramEdit, AnyOf()]
 
 
 class Undo(DiagramAlteration):

@@ -1,15 +1,19 @@
-"""What a person does to a robot, as data; :mod:`armblocks.studio.robots.edits` carries it out."""
+"""The edits of robots; :mod:`armblocks.studio.robots.edits` carries them out."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
-from armblocks.studio.protocol.message import Message
+from armblocks.studio.protocol.message import Edit
 
 
-class SetCell(Message):
+class RobotEdit(Edit):
+    """An edit of a robot."""
+
+
+class SetCell(RobotEdit):
     """Type into one cell: of a link, or of the robot where ``link`` is empty."""
 
     kind: Literal["cell"] = "cell"
@@ -20,7 +24,7 @@ class SetCell(Message):
     """What a plain number means in a column of angles; a text that says pi, deg or rad says it itself."""
 
 
-class RenameLink(Message):
+class RenameLink(RobotEdit):
     """Give a link another name."""
 
     kind: Literal["rename"] = "rename"
@@ -28,21 +32,21 @@ class RenameLink(Message):
     name: str = Field(max_length=200)
 
 
-class AddJoint(Message):
+class AddJoint(RobotEdit):
     """Put a new link behind another one, or at the base where ``after`` is empty."""
 
     kind: Literal["add"] = "add"
     after: str
 
 
-class RemoveJoint(Message):
+class RemoveJoint(RobotEdit):
     """Take a link out; what hangs on it hangs on its parent then."""
 
     kind: Literal["remove"] = "remove"
     link: str
 
 
-class MoveJoint(Message):
+class MoveJoint(RobotEdit):
     """Let a link of a chain change places with its neighbour."""
 
     kind: Literal["move"] = "move"
@@ -50,14 +54,9 @@ class MoveJoint(Message):
     by: Literal[-1, 1]
 
 
-class SetConvention(Message):
+class SetConvention(RobotEdit):
     """Read the rows by the other convention, or write the same arm in it (``keep_arm``)."""
 
     kind: Literal["convention"] = "convention"
     convention: Literal["standard", "modified"]
     keep_arm: bool
-
-
-RobotEdit = Annotated[
-    SetCell | RenameLink | AddJoint | RemoveJoint | MoveJoint | SetConvention, Field(discriminator="kind")
-]

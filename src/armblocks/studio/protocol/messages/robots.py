@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from armblocks.studio.protocol.alteration import Alteration
-from armblocks.studio.protocol.message import Event, Message, Request
+from armblocks.studio.protocol.message import AnyOf, Event, Message, Request
 from armblocks.studio.protocol.messages.robot_edits import RobotEdit
 from armblocks.studio.protocol.robot_scene import RobotScene
 
@@ -143,7 +143,7 @@ class RobotChange(RobotAlteration):
 
     kind: Literal["robot_change"] = "robot_change"
     gesture: str = ""
-    edit: RobotEdit
+    edit: Annotated[RobotEdit, AnyOf()]
 
 
 class RobotUndo(RobotAlteration):

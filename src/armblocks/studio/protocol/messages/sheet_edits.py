@@ -1,13 +1,12 @@
-"""What a person does to a drawing, as data: the edits that a page asks for, and what each is called."""
+"""The edits of diagrams; :mod:`armblocks.studio.sheet.edits` carries them out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from armblocks.studio.protocol.message import Message
+from armblocks.studio.protocol.message import Edit, Message
 
 Px = Annotated[float, Field(ge=-1e7, le=1e7)]
 """A place on the sheet; further out nothing could be drawn exactly."""
@@ -54,7 +53,11 @@ class Wire(Message):
     bends: tuple[Px, ...] = ()
 
 
-class AddBlocks(Message):
+class DiagramEdit(Edit):
+    """An edit of a diagram: of the sheet on the screen, unless it is a :class:`ModelEdit`."""
+
+
+class AddBlocks(DiagramEdit):
     """Put blocks on the sheet, with wires among them or to what is there: insert, paste and duplicate.
 
     ``instead``: wires that give way, as where a block is dropped on one.
@@ -66,7 +69,7 @@ class AddBlocks(Message):
     instead: list[Wire] = Field(default_factory=list[Wire])
 
 
-class PasteBlocks(Message):
+class PasteBlocks(DiagramEdit):
     """Put what was copied on the sheet: ``text`` is a diagram as a file holds it.
 
     ``names``: what its blocks and notes are to be called here, where that is not as there. ``shift``: px that
@@ -79,7 +82,7 @@ class PasteBlocks(Message):
     shift: Px = 0.0
 
 
-class RemoveBlocks(Message):
+class RemoveBlocks(DiagramEdit):
     """Take blocks, wires and notes off the sheet; the wires of the blocks go with them."""
 
     kind: Literal["remove"] = "remove"
@@ -88,7 +91,7 @@ class RemoveBlocks(Message):
     notes: list[str] = Field(default_factory=list[str])
 
 
-class Connect(Message):
+class Connect(DiagramEdit):
     """Draw a wire. With ``replace`` the input's present wire gives way."""
 
     kind: Literal["connect"] = "connect"
@@ -96,7 +99,7 @@ class Connect(Message):
     replace: bool = False
 
 
-class MoveBlocks(Message):
+class MoveBlocks(DiagramEdit):
     """Put blocks and notes elsewhere, or turn blocks: one drag is one edit, however much was in hand.
 
     Ways that are drawn between blocks that move alike move with them. ``wires`` are new, and those of
@@ -110,21 +113,21 @@ class MoveBlocks(Message):
     instead: list[Wire] = Field(default_factory=list[Wire])
 
 
-class BendWires(Message):
+class BendWires(DiagramEdit):
     """Lead wires along the bends that they have here; without any the way is chosen again."""
 
     kind: Literal["bend"] = "bend"
     wires: list[Wire]
 
 
-class SetNotes(Message):
+class SetNotes(DiagramEdit):
     """Write notes, or change what they say."""
 
     kind: Literal["notes"] = "notes"
     notes: dict[Annotated[str, Field(pattern=r"^/\S+$", max_length=100)], SheetNote]
 
 
-class Rename(Message):
+class Rename(DiagramEdit):
     """Give a block another name; its wires and its place go with it."""
 
     kind: Literal["rename"] = "rename"
@@ -132,7 +135,7 @@ class Rename(Message):
     name: str
 
 
-class SetParameters(Message):
+class SetParameters(DiagramEdit):
     """Change parameters of one block. Wires to ports that thereby vanish are removed."""
 
     kind: Literal["parameters"] = "parameters"
@@ -158,7 +161,7 @@ class MaskParameter(Message):
     choices: list[str] = Field(default_factory=list[str])
 
 
-class SetMask(Message):
+class SetMask(DiagramEdit):
     """Declare the parameters of a subsystem, or of the sheet itself where no block is named, in this order.
 
     ``name`` is what its face says; empty leaves that as it is.
@@ -170,7 +173,7 @@ class SetMask(Message):
     parameters: Annotated[list[MaskParameter], Field(max_length=200)]
 
 
-class LogSignal(Message):
+class LogSignal(DiagramEdit):
     """Log an output ``block/port``, so that it is seen without a Scope; or log it no longer."""
 
     kind: Literal["log"] = "log"
@@ -178,7 +181,7 @@ class LogSignal(Message):
     logged: bool
 
 
-class ModelEdit(Message):
+class ModelEdit(DiagramEdit):
     """An edit of the whole model, whatever sheet of it is on the screen."""
 
 
@@ -189,7 +192,7 @@ class KeepTuned(ModelEdit):
     values: dict[str, Any]
 
 
-class GroupBlocks(Message):
+class GroupBlocks(DiagramEdit):
     """Put blocks into a subsystem of their own; its ports are the wires that are cut thereby."""
 
     kind: Literal["group"] = "group"
@@ -197,7 +200,7 @@ class GroupBlocks(Message):
     name: str
 
 
-class BreakLink(Message):
+class BreakLink(DiagramEdit):
     """Make a block that is linked to a library a copy of one's own, which may be changed inside."""
 
     kind: Literal["break_link"] = "break_link"
@@ -211,82 +214,8 @@ class SetSettings(ModelEdit):
     values: dict[str, float | str | None]
 
 
-class Describe(Message):
+class Describe(DiagramEdit):
     """Change the model's one-line description."""
 
     kind: Literal["describe"] = "describe"
     text: Annotated[str, Field(max_length=2000)]
-
-
-Edit = Annotated[
-    AddBlocks
-    | PasteBlocks
-    | RemoveBlocks
-    | Connect
-    | MoveBlocks
-    | BendWires
-    | SetNotes
-    | Rename
-    | SetParameters
-    | SetMask
-    | KeepTuned
-    | LogSignal
-    | GroupBlocks
-    | BreakLink
-    | SetSettings
-    | Describe,
-    Field(discriminator="kind"),
-]
-"""Everything that can be done to a drawing, and so everything that can be undone."""
-
-
-def summary(edit: Edit) -> str:
-    """The edit in a few words, for the menu entry "Undo …"."""
-    match edit:
-        case AddBlocks():
-            return f"add {_listed([block.name for block in edit.blocks])}"
-        case PasteBlocks():
-            return "paste"
-        case RemoveBlocks(blocks=blocks, wires=wires, notes=notes):
-            if blocks:
-                return f"delete {_listed(blocks)}"
-            return f"delete {_counted(len(wires), 'wire') if wires else _counted(len(notes), 'note')}"
-        case Connect():
-            return f"connect {edit.wire.source} to {edit.wire.target}"
-        case MoveBlocks():
-            if edit.instead and edit.places:
-                into = len(edit.wires) > len(edit.instead)
-                return f"{'insert' if into else 'disconnect'} {_listed(list(edit.places))}"
-            if edit.places:
-                return f"move {_listed(list(edit.places))}"
-            return f"move {_counted(len(edit.notes), 'note')}"
-        case BendWires():
-            return f"bend {_counted(len(edit.wires), 'wire')}"
-        case SetNotes():
-            return f"write {_counted(len(edit.notes), 'note')}"
-        case Rename():
-            return f"rename {edit.block}"
-        case SetParameters():
-            return f"change {edit.block}"
-        case SetMask():
-            return f"mask {edit.block}" if edit.block else "mask the model"
-        case KeepTuned():
-            return f"keep {_counted(len(edit.values), 'tuned value')}"
-        case LogSignal():
-            return f"{'log' if edit.logged else 'stop logging'} {edit.port}"
-        case GroupBlocks():
-            return f"group {_counted(len(edit.blocks), 'block')}"
-        case BreakLink():
-            return f"break the link of {edit.block}"
-        case SetSettings():
-            return "change the settings"
-        case Describe():
-            return "change the description"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else _counted(len(names), "block")
-
-
-def _counted(count: int, thing: str) -> str:
-    return f"{count} {thing}{'' if count == 1 else 's'}"

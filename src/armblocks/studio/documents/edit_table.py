@@ -1,0 +1,56 @@
+"""What carries out the edits of one kind of document: a function and a title for each class of edits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
+
+from armblocks.studio.protocol.message import Edit
+
+Value = TypeVar("Value")
+EditT = TypeVar("EditT", bound=Edit)
+More = ParamSpec("More")
+
+
+@dataclass(frozen=True)
+class EditEntry(Generic[Value, More]):
+    """What undo calls an edit, and the pure function from one value to the next that carries it out."""
+
+    title: Callable[[Any], str]
+    carry_out: Callable[Concatenate[Any, Value, More], Value]
+
+
+class EditTable(Generic[Value, More]):
+    """One entry for each class of edits. A test checks that none is missing."""
+
+    def __init__(self) -> None:
+        self._entries: dict[type[Edit], EditEntry[Value, More]] = {}
+
+    def on(
+        self, edit: type[EditT], title: Callable[[EditT], str]
+    ) -> Callable[
+        [Callable[Concatenate[EditT, Value, More], Value]], Callable[Concatenate[EditT, Value, More], Value]
+    ]:
+        """Register the function below as what carries out the edits of a class."""
+
+        def register(
+            carry_out: Callable[Concatenate[EditT, Value, More], Value],
+        ) -> Callable[Concatenate[EditT, Value, More], Value]:
+            self._entries[edit] = EditEntry(title, carry_out)
+            return carry_out
+
+        return register
+
+    @property
+    def entries(self) -> Mapping[type[Edit], EditEntry[Value, More]]:
+        """What belongs to each class of edits."""
+        return self._entries
+
+    def title(self, edit: Edit) -> str:
+        """The edit in a few words, for the menu entry "Undo …"."""
+        return self._entries[type(edit)].title(edit)
+
+    def applied(self, edit: Edit, value: Value, *more: More.args, **named: More.kwargs) -> Value:
+        """The value after an edit; raises ``ArmblocksError`` where it cannot be carried out."""
+        return self._entries[type(edit)].carry_out(edit, value, *more, **named)
