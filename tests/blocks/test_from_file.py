@@ -124,9 +124,9 @@ def test_names_with_commas_in_a_header(tmp_path: Path) -> None:
 
 
 def test_tables_that_are_none_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"the table has shape \(2,\).*instants \(s\) into the first column"):
+    with pytest.raises(InputError, match=r"the table has shape \(2,\).*times \(s\) into the first column"):
         FromFile(data=(0.0, 1.0))
-    with pytest.raises(InputError, match=r"row 3 of the table is \[1\.0, 5\.0\].*drop repeated ones"):
+    with pytest.raises(InputError, match=r"row 3 of the table is \[1\.0, 5\.0\].*drop repeated times"):
         TimeTable([[0.0, 1.0], [1.0, 2.0], [1.0, 5.0]])
     with pytest.raises(InputError, match="the value is 'x'"):
         FromFile(data="x")

@@ -258,5 +258,5 @@ def test_what_a_mask_makes_of_a_long_spline_is_never_stale() -> None:
     run.set("k", 2.0)
     run.advance()
     np.testing.assert_allclose(run.result()["curve"], expected * -2 / 3, rtol=1e-9, atol=1e-11)
-    with pytest.raises(InputError, match=r"'curve\.table', which belongs to the structure, follows from 'k'"):
+    with pytest.raises(InputError, match=r"'curve\.table', which is not tunable, depends on 'k'"):
         ab.sensitivity(diagram, "k", "curve")

@@ -104,7 +104,7 @@ def test_a_file_names_the_function_and_needs_trust(tmp_path: Path) -> None:
     [
         ("control.py:missing", r"control\.py has no function named 'missing'"),
         ("control.py:number", r"control\.py has no function named 'number'"),
-        ("other.py:law", "names no function of a file"),
+        ("other.py:law", "is not a function of a file"),
         ("broken.py:law", r"the code of broken\.py fails: ZeroDivisionError"),
     ],
 )

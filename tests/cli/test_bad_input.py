@@ -88,7 +88,7 @@ def test_an_assigned_vector_has_the_right_length(refused: Refused) -> None:
 
 
 def test_code_is_no_value(refused: Refused) -> None:
-    assert "is no formula" in refused("run", "kr180model", "--set", "jtraj.tmax=__import__('os')")
+    assert "is not a formula" in refused("run", "kr180model", "--set", "jtraj.tmax=__import__('os')")
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_the_run(refused: Refused, tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ def test_other_names_are_legal(name: str) -> None:
 def test_the_same_name_twice_is_refused() -> None:
     builder = DiagramBuilder("d")
     builder.add("clock", Clock())
-    with pytest.raises(DiagramError, match=r"two blocks are named 'clock'.*every name once"):
+    with pytest.raises(DiagramError, match=r"two blocks are named 'clock'.*unique names"):
         builder.add("clock", Clock())
 
 
@@ -98,7 +98,7 @@ def test_the_same_name_twice_is_refused() -> None:
 def test_names_that_look_alike_are_refused(first: str, second: str) -> None:
     builder = DiagramBuilder("d")
     builder.add(first, Clock())
-    with pytest.raises(DiagramError, match="differs only by case or by how accents are encoded"):
+    with pytest.raises(DiagramError, match="differs only in case or Unicode encoding"):
         builder.add(second, Clock())
 
 
@@ -153,7 +153,7 @@ def test_an_unknown_block_says_the_nearest() -> None:
 def test_a_block_with_several_outputs_must_say_which() -> None:
     builder = DiagramBuilder("d")
     traj = builder.add("traj", JTraj())
-    with pytest.raises(DiagramError, match=r"the block has 3 outputs, so its name alone does not tell which"):
+    with pytest.raises(DiagramError, match=r"the block has 3 outputs, so its name alone is ambiguous"):
         builder.add("gain", Gain(), traj)
     with pytest.raises(DiagramError, match=r"the block has 0 inputs.*Allowed: a block with one"):
         builder.connect(traj["q"], traj)

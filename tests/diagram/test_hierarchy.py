@@ -387,7 +387,7 @@ def test_wrong_uses_of_buses_are_refused() -> None:
     with pytest.raises(DiagramError, match="the input 'bus' is the single signal 'c/y'"):
         builder.build()
     for wrong in ("", "a, a", "a b"):
-        with pytest.raises(InputError, match=r"the list is empty|stands in '"):
+        with pytest.raises(InputError, match=r"the list is empty|in .* is not allowed"):
             BusCreator(names=wrong)
     with pytest.raises(InputError, match="an element is named 'bus'"):
         BusAssignment(elements="bus")
@@ -400,5 +400,5 @@ def test_names_of_blocks_may_be_the_same_in_different_subsystems() -> None:
             sub.output("y", sub.add("gain", Gain(gain=gain), sub.add("c", Constant(value=1.0))))
     result = ab.simulate(builder.build(), stop_time=1.0)
     assert (result["one/gain"][-1], result["two/gain"][-1]) == (2.0, 3.0)
-    with pytest.raises(DiagramError, match="differs only by case"):
+    with pytest.raises(DiagramError, match="differs only in case"):
         builder.add("ONE", Outport(), builder["one"])

@@ -188,7 +188,7 @@ def mistakes() -> list[tuple[object, type[Exception], str]]:
             "block 'block' .Constant., parameter 'value': there is no "
             "mask parameter named 'gian'.*did you mean 'gain'",
         ),
-        (add(lambda: Gain(gain=formula("2*"))), InputError, "'2.*' is no formula"),
+        (add(lambda: Gain(gain=formula("2*"))), InputError, "'2.*' is not a formula"),
         (
             add(lambda: Ramp(start=formula("[gain gain]"))),
             DiagramError,
@@ -205,7 +205,7 @@ def mistakes() -> list[tuple[object, type[Exception], str]]:
         (
             lambda: Subsystem(diagram=Diagram(name="d", blocks={}, mask=(mask_parameter("diagram", 1.0),))),
             InputError,
-            "diagram 'd': the mask has a parameter 'diagram', and so has every Subsystem",
+            "diagram 'd': the mask parameter 'diagram' is also a parameter of every Subsystem",
         ),
         (
             lambda: Diagram(name="d", blocks={}, mask=(mask_parameter("k", 1.0),), mask_values={"kk": 2.0}),
@@ -215,12 +215,12 @@ def mistakes() -> list[tuple[object, type[Exception], str]]:
         (
             lambda: with_parameters(oscillator(masked=True), {"one.m": 2.0}),
             DiagramError,
-            "block 'one': 'one.m' follows by the formula 'K'. Allowed: K. Fix: change what it follows from",
+            "block 'one': 'one.m' is set by the formula 'K'. Allowed: K. Fix: change the parameters",
         ),
         (
             lambda: with_parameters(oscillator(masked=False), {"one/push.gain": 2.0}),
             DiagramError,
-            "'one/push.gain' follows by the formula '1/m'. Allowed: one.m",
+            "'one/push.gain' is set by the formula '1/m'. Allowed: one.m",
         ),
         (
             lambda: with_parameters(oscillator(masked=True), {"one.f": -1.0}),

@@ -104,5 +104,5 @@ def test_a_loop_that_widens_itself_without_end_is_refused() -> None:
     builder = DiagramBuilder("d")
     x = builder.add("x", Integrator())
     builder.connect(builder.add("mux", Mux(), x, builder.add("one", Constant())), x)
-    with pytest.raises(DiagramError, match=r"does not settle: it was \(\d+,\) and becomes \(\d+,\)"):
+    with pytest.raises(DiagramError, match=r"is inconsistent: it was \(\d+,\) and becomes \(\d+,\)"):
         builder.build()

@@ -169,7 +169,7 @@ def test_a_python_function_is_pickled_by_its_name(tmp_path: Path) -> None:
     trusted = ab.load_diagram(tmp_path / "model.json", trust=True)
     assert pickle.loads(pickle.dumps(trusted)) == trusted
     file.unlink()
-    with pytest.raises(errors.FormatError, match=r"laws\.py:twice' names no function of a file"):
+    with pytest.raises(errors.FormatError, match=r"laws\.py:twice' is not a function of a file"):
         pickle.loads(pickle.dumps(trusted))
 
 
@@ -181,7 +181,7 @@ def test_what_cannot_be_found_by_a_name_is_refused() -> None:
 
     for function in (scaled, lambda u: 2.0 * u):
         diagram = diagram_with(function)
-        with pytest.raises(errors.InputError, match=r"cannot be pickled.*Fix: write it with def at the top"):
+        with pytest.raises(errors.InputError, match=r"cannot be pickled.*Fix: define it with def at the top"):
             pickle.dumps(diagram)
         assert copy.deepcopy(diagram) == diagram  # within one process the function itself is there
 

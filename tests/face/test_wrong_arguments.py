@@ -45,7 +45,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "payload": (lambda: ab.Payload(mass="much"), r"not made of 1 \+ 3 \+ 6 finite numbers"),
     "trajectory": (lambda: ab.jtraj(["a"], [1], 3), r"jtraj: q0 = \['a'\]"),
     "robot of a block": (lambda: Fkine(robot=3), r"Fkine.robot: the value is 3. Allowed: a Robot, or an Arm"),
-    "a block": (lambda: added(3), r"a int is added in the place of a block"),
+    "a block": (lambda: added(3), r"a int is added instead of a block"),
     "a source": (lambda: added(Gain(), 3), r"an output is a int.*add a Constant block"),
 }
 

@@ -160,7 +160,7 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
         ("base.json", FormatError, "'base.json' is no entry of a library"),
         ("parts#", FormatError, "'parts#' is no entry of a library"),
         ("parts\x01/a.json#A", FormatError, "there is no such file"),
-        ("code.json#A", FormatError, "parameter 'value'.*no meaning in a formula|is no formula"),
+        ("code.json#A", FormatError, "parameter 'value'.*no meaning in a formula|is not a formula"),
         ("value.json#A", FormatError, "the key 'default' is missing"),
         ("kind.json#A", FormatError, "'numbre'.*number, array, integer"),
     ]
@@ -188,7 +188,7 @@ def test_blocks_name_what_the_library_has(folder: Path) -> None:
         read({**base, "parameters": {"k": 3}, "formulas": {"k": "2"}})
     with pytest.raises(FormatError, match="the block has a diagram and a library"):
         read({**base, "diagram": {"blocks": {}}})
-    with pytest.raises(FormatError, match=r"'2.' is no formula"):
+    with pytest.raises(FormatError, match=r"'2.' is not a formula"):
         read({**base, "formulas": {"k": "2*"}})
     with pytest.raises(UnknownNameError, match="there is no mask parameter named 'K'"):
         read({**base, "formulas": {"k": "2*K"}})

@@ -27,7 +27,7 @@ def test_tree_must_be_one():
         make(*(Link(name=str(i)) for i in range(1001)))
     with refused("robot 'arm': a link has no name"):
         make(Link(name=""))
-    with refused("robot 'arm': two links are named 'a'. Allowed: every name once. Fix: rename one"):
+    with refused("robot 'arm': two links are named 'a'. Allowed: unique names. Fix: rename one"):
         make(Link(name="a"), Link(name="a"))
     with refused("robot 'arm': link 'b' hangs on 'c', which does not exist. Allowed: a, b. Fix: name an"):
         make(Link(name="a"), Link(name="b", parent="c"))

@@ -235,9 +235,9 @@ def test_refusals_say_what_is_in_the_way() -> None:
     many = [NewBlock(name=f"b{k}", type="Gain", place=place) for k in range(20_000)]
     assert "the sheet would hold 20002 blocks" in refused(AddBlocks(blocks=many))
     wrong = SetParameters(block="gain", values={"gain": "import os"})
-    assert "'import os' is no formula" in refused(wrong)
+    assert "'import os' is not a formula" in refused(wrong)
     assert "there is no name named 'os'" in refused(SetParameters(block="gain", values={"gain": "2*os"}))
-    assert "is no formula" in refused(SetParameters(block="gain", values={"gain": "1; x = 2"}))
+    assert "is not a formula" in refused(SetParameters(block="gain", values={"gain": "1; x = 2"}))
     assert "this is no value" in refused(SetParameters(block="gain", values={"gain": " "}))
     plot = AddBlocks(blocks=[NewBlock(name="p", type="RobotPlot", parameters={"robot": 3}, place=place)])
     assert "a robot is asked for, and int was given" in refused(plot)

@@ -335,7 +335,7 @@ def test_what_cannot_wait_for_a_trigger_is_refused() -> None:
         builder.build()
     named = DiagramBuilder("named")
     named.add("enable", Clock())
-    with pytest.raises(DiagramError, match="a block inside is named 'enable', as an input of"):
+    with pytest.raises(DiagramError, match="an inner block is named 'enable', like an input of"):
         EnabledSubsystem(diagram=named.build())
 
 
@@ -456,7 +456,7 @@ def test_wrong_conditions_and_merges_are_refused() -> None:
     with pytest.raises(DiagramError, match="input 'u1' is 'c/y', which no conditional subsystem gives"):
         builder.add("merge", Merge(inputs=1), builder.add("c", Clock()))
         builder.build()
-    with pytest.raises(InputError, match="is no formula"):
+    with pytest.raises(InputError, match="is not a formula"):
         If(expressions="u >")
     with pytest.raises(DiagramError, match="the condition 'u > 0' has 2 values"):
         builder = DiagramBuilder("if")

@@ -1,4 +1,4 @@
-"""Diagrams: what a block is, how blocks are wired and checked, and how the whole becomes equations."""
+"""Diagrams: blocks, connections, checks, and the translation into equations."""
 
 from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.block_equations import BlockEquations, SlotKind, block_equations

@@ -1,6 +1,6 @@
-"""Points of a diagram at which it is linearised: signals that are moved a little, and wires that are cut.
+"""Linearisation points of a diagram: perturbed inputs and loop openings.
 
-Both are ordinary blocks put into the wires, so that nothing else has to know about them.
+Both are ordinary blocks that are inserted into connections, so that no other module depends on them.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ from armblocks.errors import InputError, UnknownNameError
 
 @dataclass(frozen=True, kw_only=True)
 class InputPoint(Block):
-    """A small change is added to a signal: y = u + offset."""
+    """An input perturbation: y = u + offset."""
 
     title: ClassVar[str] = "Input Point"
 
-    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="perturbation")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal", shape=shape_of(self.offset)),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the signal with the change", shape=shape_of(self.offset)),)
+        return (Port("y", "the perturbed signal", shape=shape_of(self.offset)),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -55,18 +55,18 @@ class InputPoint(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class LoopOpening(Block):
-    """What arrives goes no further; a fixed level comes out: y = level + offset."""
+    """A loop opening: the input is not used, and the output is y = level + offset."""
 
     title: ClassVar[str] = "Loop Opening"
 
     level: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="the signal at the operating point")
-    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="what is added")
+    offset: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="perturbation")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the signal", shape=shape_of(self.level)),)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the level with the change", shape=shape_of(self.level)),)
+        return (Port("y", "the perturbed level", shape=shape_of(self.level)),)
 
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
@@ -77,10 +77,11 @@ class LoopOpening(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedDiagram:
-    """A diagram with its points in place: flat, or the one that was given where it needs no points.
+    """A diagram with linearisation points: flat, or the given diagram if it needs no points.
 
-    ``inputs``: for every input that was asked for the path of the parameter that moves it. ``levels``: for
-    every opened wire the parameter that holds its signal, and the path of the signal in the first diagram.
+    ``inputs``: for every requested input, the path of the parameter that perturbs it. ``levels``: for every
+    opened connection, the parameter that holds its signal, and the path of the signal in the original
+    diagram.
     """
 
     diagram: Diagram
@@ -91,13 +92,13 @@ class PreparedDiagram:
 def with_analysis_points(
     diagram: Diagram, inputs: Sequence[str] = (), openings: Sequence[str] = ()
 ) -> PreparedDiagram:
-    """Put the points of a linearisation into a diagram.
+    """Insert the linearisation points into a diagram.
 
-    An input or opening is an output port ``block/port`` (all wires that leave it), an input port (that one
-    wire), or a block with a single output. An input may also be a tunable parameter, ``block.parameter``,
-    or that of a mask, for which :func:`~armblocks.diagram.mask_tuning.added_parameter` makes the equations.
-    Where a signal is both, the change comes in behind the cut. Raises ``UnknownNameError`` and ``InputError``
-    for names that mean nothing of the kind or stand twice.
+    An input or opening is an output port ``block/port`` (all its connections), an input port (its
+    connection), or a block with a single output. An input may also be a tunable parameter,
+    ``block.parameter``, or that of a mask, for which :func:`~armblocks.diagram.mask_tuning.added_parameter`
+    makes the equations. Where a signal is both, the perturbation is inserted after the opening. Raises
+    ``UnknownNameError`` for unknown names and ``InputError`` for duplicate or unsuitable ones.
     """
     form = flatten_hierarchy(diagram)
     given, diagram = diagram, form.diagram
@@ -117,7 +118,7 @@ def with_analysis_points(
     blocks, wires = dict(diagram.blocks), list(diagram.connections)
     levels: dict[str, str] = {}
     chosen = {*moved, *opened}
-    # Output ports first: a point at an input port then stands behind that of its driver.
+    # Output ports first: a point at an input port is then inserted after the point of its driver.
     for ref in sorted(chosen, key=lambda ref: (not _is_output(diagram, ref), ref)):
         source = ref if _is_output(diagram, ref) else diagram.drivers[ref]
         name = _new_name(ref, blocks)
@@ -139,15 +140,15 @@ def _once(names: Sequence[str], kind: str) -> Sequence[str]:
         if name in names[:index]:
             raise InputError(
                 f"the {kind} '{name}' is given twice",
-                allowed="every point once",
+                allowed="each point once",
                 where="analysis points",
-                fix="leave one of them out",
+                fix="remove one of them",
             )
     return names
 
 
 def _parameter(diagram: Diagram, name: str) -> str | None:
-    """The path of a tunable parameter, or ``None`` where the name is no parameter's."""
+    """The path of a tunable parameter, or ``None`` if the name is not a parameter."""
     block, dot, parameter_name = name.rpartition(".")
     if not dot or "/" in parameter_name:
         return None
@@ -198,7 +199,7 @@ def _new_name(ref: PortRef, taken: Mapping[str, Block]) -> str:
 
 
 def _rewired(wires: Sequence[Connection], ref: PortRef, point: str, source: PortRef) -> list[Connection]:
-    """The wires with a point in those that leave or reach a port."""
+    """The connections, with the point inserted into those that start or end at a port."""
     entry, way_out = PortRef(point, "u"), PortRef(point, "y")
     if ref == source:
         changed = [

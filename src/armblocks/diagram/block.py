@@ -1,4 +1,4 @@
-"""What a block is: frozen parameters plus pure equations over ``t, x, u, p``. It stores no state."""
+"""The base class of blocks: frozen parameters and pure equations over ``t, x, u, p``, without state."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from armblocks.equations import Shape
 from armblocks.errors import UnknownNameError, check_arguments
 
 _LONGEST_FORMULA = 16
-"""Characters of a formula that a face shows in the place of its value."""
+"""Maximum number of characters of a formula that a block's face shows instead of the value."""
 Shapes = Mapping[str, Shape]
 """Shapes by port name."""
 Signals = Mapping[str, SX]
@@ -30,66 +30,66 @@ Signals = Mapping[str, SX]
 
 @dataclass(frozen=True, kw_only=True)
 class Block(ABC):
-    """One kind of block. Subclasses are final frozen dataclasses whose fields are parameters.
+    """Base class of block types. Subclasses are final frozen dataclasses whose fields are parameters.
 
-    A subclass sets ``title``, declares its parameters with
-    :func:`~armblocks.diagram.parameter.parameter`, and overrides what it has: ports, states, equations.
-    In the equations ``t`` is the time (s), ``x`` the block's states of all kinds, ``u`` its inputs, ``p`` its
-    tunable parameters, all symbolic; the other parameters are plain attributes. An equation must not read a
-    tunable parameter from ``self``, only from ``p``: the compiled system may be run with another value.
+    A subclass sets ``title``, declares its parameters with :func:`~armblocks.diagram.parameter.parameter`,
+    and overrides the methods for its ports, states and equations. In the equations ``t`` is the time (s),
+    ``x`` the block's states of all kinds, ``u`` its inputs, ``p`` its tunable parameters, all symbolic; the
+    other parameters are plain attributes. An equation must not read a tunable parameter from ``self``, only
+    from ``p``: the compiled system can run with other values.
 
-    A *sampled* block (``sampled = True``, parameter ``sample_time``) works at the ticks of its clock only:
-    its outputs are worked out there from the discrete states as they were before, then held, and its
-    ``updates`` say what the discrete states become. Its equations find the period (s) as ``p["T"]``.
+    A *sampled* block (``sampled = True``, parameter ``sample_time``) is active at the ticks of its clock
+    only. At a tick its outputs are computed from the previous discrete states and then held; ``updates``
+    gives the next discrete states. Its equations find the period (s) as ``p["T"]``.
 
-    A block with *modes* switches between equations at *events*. A mode keeps its value while the time flows,
-    so that the flow is smooth; ``guards`` say where an event happens, ``resets`` what it changes, and
-    ``mode_values`` what a mode has to be by the values of the moment (at the start, and within a sampled
-    part of a diagram, which only looks at its ticks).
+    A block with *modes* switches between equations at *events*. A mode is constant between events, so that
+    the continuous equations are smooth. ``guards`` gives the functions whose zeros are events and ``resets``
+    the changes at events. ``mode_values`` gives the mode that is consistent with the present values (at the
+    start, and in sampled parts of a diagram, which are evaluated at ticks only).
 
-    Where a mode is no more than whether some quantity is positive, the block states *conditions* instead:
-    ``condition_values`` gives the quantity, the equations find 1 or 0 as ``x[name]``, and mode, guard and
-    reset follow. A block that only sampled blocks and constants feed asks its conditions directly.
+    Where a mode is just the sign of a quantity, the block declares *conditions* instead: ``condition_values``
+    gives the quantity, the equations read 1 or 0 as ``x[name]``, and mode, guard and reset are generated. If
+    all inputs are sampled or constant, conditions are evaluated directly, without a mode.
 
-    A block may read what an input was some time ago: ``delay_lines`` names such values, ``delay_times`` says
-    how long ago. The equations find them as ``x[name]``; the numerics keep the past.
+    A block may read delayed values of its inputs: ``delay_lines`` declares them and ``delay_times`` gives the
+    delays. The equations read them as ``x[name]``; the integrator stores the history.
 
-    A parameter may be given as a :func:`~armblocks.diagram.mask.formula` over the mask of the diagram that
-    the block stands in. The diagram gives it the value; the text stays in ``formulas``.
+    A parameter may be given as a :func:`~armblocks.diagram.mask.formula` over the mask of the enclosing
+    diagram. The diagram evaluates it; ``formulas`` keeps the text.
 
-    The first line of a subclass's docstring says in one sentence what the block does, with its equation.
+    The first line of a subclass's docstring describes the block in one sentence, with its equation.
     """
 
     title: ClassVar[str]
-    """The name people know the block by, as Simulink or the toolbox shows it: ``XY Graph``."""
+    """The displayed name of the block, as in Simulink or the toolbox: ``XY Graph``."""
     time_derivatives: ClassVar[Mapping[str, str]] = {}
     """Output ports that are the exact time derivative of an input: output name to input name.
 
-    They have no equation: the tracing differentiates what feeds the input."""
+    They have no equation: tracing differentiates the signal at the input."""
     output_rates: ClassVar[Mapping[str, str]] = {}
     """Outputs whose exact time derivative is another output: ``{"q": "qd"}``.
 
-    A Derivative block behind ``q`` then gives ``qd`` itself, to the last bit: a joint that stands still has
-    the speed 0, and not 1e-17, which Coulomb friction would see."""
+    A Derivative block with the input ``q`` then outputs exactly ``qd``. A joint at rest has exactly the speed
+    0; a speed of 1e-17 would change the sign of Coulomb friction."""
 
     implicit_outputs: ClassVar[tuple[str, ...]] = ()
-    """Outputs that are unknowns: what ``outputs`` gives for such a one is not its value but what has to be 0
-    by the choice of it. Where Newton's method has to search, it begins at ``initial_guesses``."""
+    """Implicit outputs: ``outputs`` returns their residual. The solver finds the value
+    that makes it zero. Newton's method starts from ``initial_guesses``."""
     sampled: ClassVar[bool] = False
-    """Whether the block works at the ticks of a clock only; it then has the parameter ``sample_time``."""
+    """Whether the block is sampled: active at the ticks of a clock, with the parameter ``sample_time``."""
     called: ClassVar[bool] = False
-    """Whether Python is called at each tick of a sampled block, before it: :meth:`call` is given the discrete
-    states ``port?`` of the inputs, as they are at the tick, and says what those of the outputs become."""
+    """Whether a sampled block calls Python before each of its ticks. :meth:`call` takes the discrete states
+    ``port?`` of the inputs at the tick and returns those of the outputs."""
     virtual: ClassVar[bool] = False
-    """Whether the block stands for wires only: it has no equations and is gone before a diagram is traced."""
+    """Whether the block represents connections only: it has no equations and is removed before tracing."""
     spreads: ClassVar[tuple[str, ...]] = ()
-    """Array parameters whose shape the outputs share with the inputs, scalars spreading over it."""
+    """Array parameters whose shape is broadcast with the input shapes to the output shape."""
     memoryless: ClassVar[bool] = False
-    """Whether all modes are functions of the signals alone, and all guards only locate their changes."""
+    """Whether all modes are functions of the present signals, and all guards only locate their changes."""
     rated_inputs: ClassVar[tuple[str, ...]] = ()
     """Inputs whose exact time derivative the equations read, as ``u["name'"]``."""
     example: ClassVar[WorkedExample] = WorkedExample()
-    """What shows the block at work; left out, it is fed with signals that fit its ports."""
+    """The worked example; by default the block gets inputs that fit its ports."""
 
     formulas: tuple[tuple[str, str], ...] = field(default=(), repr=False, metadata={"formulas": True})
     """The parameters that are formulas, by name, with their texts."""
@@ -99,11 +99,11 @@ class Block(ABC):
         return super().__new__(cls)
 
     sign: ClassVar[FaceSign | None] = None
-    """What stands on the block's face, where no parameter matters for it; left out, its title."""
+    """The sign on the block's face, if it does not depend on parameters; by default the title."""
     outline: ClassVar[Outline] = Outline.CARD
-    """The block's outline, where no parameter matters for it."""
+    """The block's outline, if it does not depend on parameters."""
     card_size: ClassVar[tuple[float, float] | None] = None
-    """Width and height of a card, px; left out, as much as the sign takes. Names of ports may widen it."""
+    """Width and height of a card, px; by default the size of the sign. Port names may widen it."""
 
     def __post_init__(self) -> None:
         formulas, open_ones = dict(self.formulas), False
@@ -113,7 +113,7 @@ class Block(ABC):
             if isinstance(value, ParameterFormula):
                 formulas[rule.name] = value.text
                 if formula_names(value.text):
-                    open_ones = True  # the diagram that the block is put into knows the names
+                    open_ones = True  # names are resolved in the diagram that contains the block
                     continue
                 value = formula_value(rule, value.text, {}, type(self).__name__)
             object.__setattr__(self, rule.name, rule.check(value, where))
@@ -129,43 +129,42 @@ class Block(ABC):
         return _parameters_of(cls)
 
     def inputs_of_the_run(self) -> tuple[Parameter, ...]:
-        """The parameters that stay inputs of the compiled system: all tunable ones, and those that this block
-        reads by index."""
+        """The run inputs of the compiled system: tunable parameters and those that are read by index."""
         return tuple(rule for rule in self.parameters() if rule.tunable)
 
     def parameters_behind_inputs(self) -> tuple[str, ...]:
-        """Parameters that the equations know only by inputs of the run that follow from them.
+        """Parameters that the equations replace by run inputs computed from them.
 
-        Such an input is no parameter of the block but an attribute of the same name.
+        Such a run input is not a parameter of the block but an attribute of the same name.
         """
         return ()
 
     def structure_of_the_run(self) -> tuple[Parameter, ...]:
-        """The parameters that the equations are made with; others change without anything being traced."""
+        """The parameters that are constants of the equations; other parameters change without a new trace."""
         inputs, behind = self.inputs_of_the_run(), self.parameters_behind_inputs()
         return tuple(rule for rule in self.parameters() if rule not in inputs and rule.name not in behind)
 
     def face_outline(self) -> Outline:
-        """The outline of the block."""
+        """The outline of the block's face."""
         return self.outline
 
     def face_sign(self) -> FaceSign:
-        """What stands on the block's face."""
+        """The sign on the block's face."""
         return self.sign or Title(self.title)
 
     def stated_text(self, name: str) -> str:
-        """What a face shows for a parameter: its formula where that is short, else its value."""
+        """The text of a parameter on the face: its formula if that is short, else its value."""
         text = dict(self.formulas).get(name, "")
         return text if 0 < len(text) <= _LONGEST_FORMULA else value_text(self.parameter_value(name))
 
     @classmethod
     def type_name(cls) -> str:
-        """The name of this kind of block in files: the class's own."""
+        """The name of this block type in files: the class name."""
         return cls.__name__
 
     @classmethod
     def summary(cls) -> str:
-        """One sentence for people: the docstring's first line."""
+        """A one-sentence description: the first line of the docstring."""
         return (cls.__doc__ or "").strip().splitlines()[0]
 
     def own_parameters(self) -> tuple[Parameter, ...]:
@@ -177,14 +176,14 @@ class Block(ABC):
         return getattr(self, name)
 
     def stated_value(self, name: str) -> Value | ParameterFormula:
-        """What somebody has written for a parameter: its formula where it has one, else its value."""
+        """The formula of a parameter if it has one, else its value."""
         text = dict(self.formulas).get(name)
         return self.parameter_value(name) if text is None else ParameterFormula(text)
 
     def with_parameters(self, **values: Any) -> Self:
         """The block with other values or formulas of some of its parameters.
 
-        Raises ``UnknownNameError`` for a parameter that it has not, ``InputError`` for a value.
+        Raises ``UnknownNameError`` for an unknown parameter, ``InputError`` for an invalid value.
         """
         known = [rule.name for rule in self.own_parameters()]
         for name in values:
@@ -196,9 +195,9 @@ class Block(ABC):
         return self.replaced({**plain, "formulas": tuple(sorted(kept.items()))})
 
     def in_scope(self, scope: Scope, where: str) -> Self:
-        """The block with the values that its formulas give in a scope.
+        """The block with its formulas evaluated in a scope.
 
-        Raises ``UnknownNameError`` for a name that is not in scope, ``InputError`` for a value.
+        Raises ``UnknownNameError`` for a name that is not in scope, ``InputError`` for an invalid value.
         """
         if not self.formulas:
             return self
@@ -213,11 +212,11 @@ class Block(ABC):
         return self.replaced(values)
 
     def replaced(self, values: Mapping[str, Any]) -> Self:
-        """A copy with other values of parameters; formulas stay as they are, unless they are given."""
+        """A copy with other parameter values; formulas that are not replaced are kept."""
         return dataclasses.replace(self, **values)
 
-    def check(self) -> None:  # noqa: B027 - optional, most blocks have nothing to add
-        """Raise ``InputError`` where parameters contradict each other; each alone is already checked."""
+    def check(self) -> None:  # noqa: B027 - optional, most blocks have no such checks
+        """Raise ``InputError`` for inconsistent parameters; each value alone is already checked."""
 
     # -- ends --------------------------------------------------------------------------------------------
 
@@ -230,14 +229,14 @@ class Block(ABC):
         return ()
 
     def bus_inputs(self) -> tuple[str, ...]:
-        """Inputs that may be buses, all with the same elements: what passes a signal on unchanged has some.
+        """Inputs that may be buses with equal elements, for blocks that pass signals on unchanged.
 
-        There is then a block for each signal, and every output is a bus of what they give.
+        The block is then copied for each signal, and every output is a bus of the copies' outputs.
         """
         return ()
 
     def record_ports(self) -> tuple[Port, ...]:
-        """Signals that a run records as ``block/name`` but that nothing can be connected to.
+        """Signals that a run records as ``block/name`` but that cannot be connected.
 
         Their shape must be given.
         """
@@ -252,39 +251,39 @@ class Block(ABC):
         return ()
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        """Which of its equations holds: changed by events, numbered as ``doc`` says."""
+        """Modes: they select the active equations and change at events; ``doc`` explains their values."""
         return ()
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        """Quantities at whose zeros an event happens."""
+        """Guards: quantities whose zero crossings are events."""
         return ()
 
     def all_modes(self, inputs: Shapes) -> tuple[State, ...]:
-        """The modes, each with whether it follows the signals."""
+        """The modes, each with a flag that says whether it is a function of the present signals."""
         return tuple(
             dataclasses.replace(mode, follows=mode.follows or self.memoryless) for mode in self.modes(inputs)
         )
 
     def all_guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        """The guards, each with whether it only locates a change of modes."""
+        """The guards, each with a flag that says whether it only locates a mode change."""
         return tuple(
             dataclasses.replace(guard, locates=guard.locates or self.memoryless)
             for guard in self.guards(inputs)
         )
 
     def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
-        """What the equations ask of the values, in an order in which each may depend on those before it."""
+        """The conditions that the equations read; each may depend on those before it."""
         return ()
 
     def delay_lines(self, inputs: Shapes) -> tuple[DelayLine, ...]:
-        """Inputs whose values of some time ago the equations read, each in ``rated_inputs`` too."""
+        """Delayed inputs that the equations read, each in ``rated_inputs`` too."""
         return ()
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
-        """Shapes of those outputs whose port does not state one, given the shapes of all inputs.
+        """Shapes of the outputs whose port does not declare one, from the shapes of all inputs.
 
-        Unless a block says otherwise, that is the common shape of the inputs without a stated one and of the
-        parameters in ``spreads``. Raises ``InputError`` where they do not fit together.
+        By default it is the broadcast shape of the inputs without a declared shape and of the parameters in
+        ``spreads``. Raises ``InputError`` where the shapes do not fit.
         """
         ends = [port.name for port in self.output_ports() if port.shape is None]
         if self.virtual or not ends:
@@ -296,9 +295,9 @@ class Block(ABC):
         return dict.fromkeys(ends, broadcast(wide))
 
     def assumed_output_shapes(self) -> Shapes:
-        """Shapes to assume for outputs in a loop, before the inputs are known (an integrator's start value).
+        """Shapes to assume for outputs in a loop before the inputs are known (an integrator's initial value).
 
-        They are only ever widened from a scalar to what the inputs turn out to need.
+        An assumed scalar may be widened to the shape that the inputs require.
         """
         return {}
 
@@ -307,11 +306,11 @@ class Block(ABC):
         return {}
 
     def input_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
-        """SI units of inputs that follow from those of the other inputs, as of the terms of a sum."""
+        """SI units of inputs that follow from other inputs, such as the terms of a sum."""
         return {}
 
     def views(self) -> tuple[View, ...]:
-        """The pictures that this block asks for: sinks have one or more."""
+        """The views of this block: sinks have one or more."""
         return ()
 
     # -- equations ---------------------------------------------------------------------------------------
@@ -321,7 +320,7 @@ class Block(ABC):
         return {}
 
     def derivatives(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """Time derivative of every state, each of its state's shape (a scalar is spread over it)."""
+        """Time derivative of every state, with the state's shape (a scalar is broadcast)."""
         return {}
 
     def records(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -329,7 +328,7 @@ class Block(ABC):
         return {}
 
     def initial_states(self, p: Signals) -> Signals:
-        """Start value of every continuous and discrete state (a scalar is spread over it)."""
+        """Initial value of every continuous and discrete state (a scalar is broadcast)."""
         return {}
 
     def initial_outputs(self, p: Signals) -> Signals:
@@ -337,15 +336,15 @@ class Block(ABC):
         return {}
 
     def initial_guesses(self, p: Signals) -> Signals:
-        """Where to begin the search for every one of ``implicit_outputs``."""
+        """Start value of the iteration for each of ``implicit_outputs``."""
         return {}
 
     def updates(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """What every discrete state of a sampled block becomes at a tick."""
+        """The next value of every discrete state of a sampled block, at a tick."""
         return {}
 
     def call(self, t: float, inputs: Mapping[str, Any]) -> Mapping[str, Any]:
-        """What a ``called`` block gives at a tick: numbers or arrays by output port, for those by input port.
+        """The outputs of a ``called`` block at a tick: numbers or arrays by port name.
 
         Raises ``InputError``.
         """
@@ -356,59 +355,59 @@ class Block(ABC):
         return {}
 
     def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """The quantity of every condition: the answer is 1 where it is positive."""
+        """The quantity of every condition; the condition is 1 where it is positive."""
         return {}
 
     def delay_times(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """How long ago (s), one number for each delay line."""
+        """The delay (s) of each delay line, a scalar."""
         return {}
 
     def delay_bounds(self, p: Signals) -> Mapping[str, tuple[SX, SX]]:
-        """The shortest and the longest that each delay may be (s), above 0: no step is longer."""
+        """The lower and upper limit of each delay (s), above 0; no step exceeds the lower limit."""
         return {}
 
     def initial_past(self, p: Signals) -> Signals:
-        """What each delay line gives for times before the start."""
+        """The value of each delay line for times before the start."""
         return {}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """The consistent value of every mode at this moment.
+        """The consistent value of every mode at the present time.
 
-        It follows from the values of the moment. ``x`` has the modes as they are, for modes with a memory, or
-        as they were before the instant, for those that remember it.
+        It is computed from the present values. ``x`` has the present modes (for modes with memory), or the
+        modes before the event time (for modes that remember them).
         """
         return {}
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """By mode, 1 where the mode is not consistent with the values of this moment, else 0.
+        """By mode, 1 where the mode is not consistent with the present values, else 0.
 
-        A mode that contradicts its condition takes the value of :meth:`mode_values`: after every jump, and at
-        the first instant of a step at which it does. By default a mode contradicts wherever it differs from
-        that value. Blocks override this where a mode is allowed to differ (hysteresis, counted edges), or
-        where its value costs more than the question.
+        An inconsistent mode takes the value of :meth:`mode_values`: after every jump, and at the first time
+        within a step at which it is inconsistent. By default a mode is inconsistent where it differs from
+        that value. Blocks override this where a mode may differ (hysteresis, counted edges), or where the
+        test is cheaper than the value.
         """
         before = {mode: x[name_before(mode)] for mode in x if name_before(mode) in x}
         found = self.mode_values(t, {**x, **before}, u, p)
         return {name: logic_or(value > x[name], value < x[name]) for name, value in found.items()}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        """New values of those states and modes that an event may change.
+        """New values of the states and modes that an event may change.
 
-        ``e``, by guard: +1 or -1 where it fired upwards or downwards, 0 elsewhere. Where it is 0 everywhere,
-        some other block has had an event, and the old values must come out unless the inputs or states of
-        this moment alone ask for others.
+        ``e``, by guard: +1 or -1 where it triggered upwards or downwards, else 0. If all are 0, the event
+        belongs to another block; the result must then equal the old values, unless the present inputs or
+        states require others.
         """
         return {}
 
     def captures(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        """What those discrete states become that keep how things were just before a tick or event."""
+        """New values of discrete states that store left limits, taken just before a tick or event."""
         return {}
 
     def breakpoints(self, p: Signals) -> tuple[SX, ...]:
-        """Instants (s) at which an output or a derivative of it jumps, as far as parameters tell.
+        """Times (s) at which an output or its derivative jumps, as far as they follow from parameters.
 
-        At such an instant ``outputs`` gives what follows: its condition ``t >= instant`` has the expression
-        that stands here, because another one may be rounded to another time.
+        At such a time ``outputs`` gives the right limit. Its condition ``t >= time`` must use the same
+        expression as here, because another expression may be rounded to another time.
         """
         return ()
 
@@ -420,7 +419,7 @@ def _parameters_of(kind: type[Block]) -> tuple[Parameter, ...]:
 
 
 def _declared(field: dataclasses.Field[Any]) -> Parameter:
-    # A plain field would be invisible to files and dialogs: this is a mistake of the block's author.
+    # A plain field would be missing in files and dialogs: an error of the block's author.
     if "parameter" not in field.metadata:
         raise TypeError(f"field '{field.name}' of a block must be declared with parameter(...)")
     return field.metadata["parameter"]

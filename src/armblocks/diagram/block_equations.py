@@ -1,11 +1,11 @@
 """The equations of one block, traced once for all blocks that differ in tunable numbers only.
 
-The values that a block works out, its *slots* (outputs, derivatives of states, records), are put together
-into *groups* that depend on the same inputs and states. A group is the unit of ordering: the position
-output of a robot block is there before the torque that moves it.
+The values that a block computes, its *slots* (outputs, derivatives of states, records), are collected in
+*groups* that depend on the same inputs and states. Groups are the unit of the evaluation order: the position
+output of a robot block is available before its torque input.
 
-Dependence is read off the sparsity of the traced equations, with every tunable parameter symbolic, so that
-a gain of zero hides nothing.
+Dependence is read from the sparsity of the traced equations. Tunable parameters are symbolic, so that a gain
+of zero does not remove a dependence.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from armblocks.errors import DiagramError
 
 
 class SlotKind(Enum):
-    """What a value of a block is for."""
+    """The role of a value of a block."""
 
     OUTPUT = "output"
     DERIVATIVE = "derivative"
@@ -35,17 +35,17 @@ class SlotKind(Enum):
     UPDATE = "update"
     GUARD = "guard value"
     MODE = "mode value"
-    CONTRADICTION = "contradiction of a mode"
+    CONTRADICTION = "inconsistency of a mode"
     RESET = "reset"
     DELAYED = "delayed signal"
-    DELAYED_RATE = "slope of a delayed signal"
+    DELAYED_RATE = "derivative of a delayed signal"
     DELAY = "delay"
     CAPTURE = "capture"
 
 
 @dataclass(frozen=True)
 class BlockSlot:
-    """One value that a block works out; a derivative has the name of its state."""
+    """One value that a block computes; a derivative has the name of its state."""
 
     kind: SlotKind
     name: str
@@ -53,7 +53,7 @@ class BlockSlot:
 
     @property
     def size(self) -> int:
-        """Count of scalars."""
+        """Number of scalars."""
         return Slot(self.name, self.shape).size
 
 
@@ -63,8 +63,8 @@ class Group:
 
     ``expression`` is the flat column of all slots over ``t``, the flat column ``p`` of the block's tunable
     parameters, and ``z``: the flat continuous states, discrete states and modes, inputs, and events, that the
-    group depends on. An input ``u'`` is the time derivative of the input ``u``. ``timed``: whether time
-    itself stands in it.
+    group depends on. An input ``u'`` is the time derivative of the input ``u``. ``timed``: whether it depends
+    on time explicitly.
     """
 
     slots: tuple[BlockSlot, ...]
@@ -82,7 +82,7 @@ class Group:
     _elementary: dict[int, bool] = field(default_factory=dict[int, bool])
 
     def value(self, order: int, arguments: Sequence[SX]) -> SX:
-        """What :meth:`rate` gives for these arguments: symbols, expressions, constants."""
+        """The result of :meth:`rate` for these arguments: symbols, expressions, constants."""
         function = self.rate(order)
         if order not in self._elementary:
             self._elementary[order] = has_elementary(function)
@@ -114,21 +114,21 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class BlockEquations:
-    """All equations of one block: its states and the groups of what it works out."""
+    """All equations of one block: its states and its groups of slots."""
 
     states: tuple[State, ...]
     discrete: tuple[State, ...]
-    """Discrete states, then delayed values, then their slopes (``name'``), then modes."""
+    """Discrete states, then delayed values, then their derivatives (``name'``), then modes."""
     modes: tuple[State, ...]
     guards: tuple[Guard, ...]
     groups: tuple[Group, ...]
     delays: tuple[DelayLine, ...] = ()
     fixed_delays: frozenset[str] = frozenset()
-    """Those that only parameters say."""
+    """Delays that depend on parameters alone."""
 
     @cached_property
     def group_of(self) -> dict[tuple[SlotKind, str], int]:
-        """In which group a slot is."""
+        """The index of the group of each slot."""
         return {
             (slot.kind, slot.name): index for index, group in enumerate(self.groups) for slot in group.slots
         }
@@ -136,7 +136,7 @@ class BlockEquations:
 
 @dataclass(frozen=True)
 class _Structure:
-    """Everything of a block that its equations depend on but the tunable numbers."""
+    """Everything that a block's equations depend on, except the values of tunable parameters."""
 
     kind: type[Block]
     fixed: tuple[object, ...]
@@ -159,8 +159,8 @@ def block_equations(
 ) -> BlockEquations:
     """Trace a block whose inputs have these shapes; equal structures are traced once.
 
-    ``period`` s: of a sampled block's clock. ``settled``: with modes that follow the values of the moment
-    instead of events. ``hidden``: the hidden inputs of a block in a conditional subsystem.
+    ``period`` s: of a sampled block's clock. ``settled``: with modes computed from the present values instead
+    of by events. ``hidden``: the hidden inputs of a block in a conditional subsystem.
     """
     clocked = block.sampled and FIRE not in hidden
     inputs = block.inputs_of_the_run()
@@ -188,7 +188,7 @@ def tunable_slots(block: Block) -> tuple[Slot, ...]:
 
 
 def natural(slots: Sequence[Slot], flat: SX) -> Signals:
-    """Cut a flat column into named values in their natural shapes."""
+    """Split a flat column into named values of natural shape."""
     values: dict[str, SX] = {}
     start = 0
     for slot in slots:
@@ -198,7 +198,7 @@ def natural(slots: Sequence[Slot], flat: SX) -> Signals:
 
 
 def spread(value: SX, shape: Shape) -> SX:
-    """The flat column of a value; a scalar is spread over the shape."""
+    """The flat column of a value; a scalar is broadcast to the shape."""
     slot = Slot("", shape)
     if value.numel() == 1:
         return densify(SX.ones(slot.size) * value)
@@ -225,7 +225,7 @@ def _trace(structure: _Structure) -> BlockEquations:
     states, discrete, lines = block.states(shapes), block.discrete_states(shapes), block.delay_lines(shapes)
     past = tuple(State(f"{line.name}{mark}", line.shape, line.doc) for mark in ("", "'") for line in lines)
     conditions = block.conditions(shapes)
-    # Those whose change is an event are modes; all others are asked where they are needed.
+    # Conditions whose change is an event are modes; the others are evaluated directly.
     located = () if structure.settled else tuple(entry for entry in conditions if entry.located)
     asked = tuple(entry for entry in conditions if entry not in located)
     modes, guards = _modes_and_guards(block, shapes, located)
@@ -245,7 +245,7 @@ def _trace(structure: _Structure) -> BlockEquations:
         p["T"] = SX(structure.period)
     x.update(z)
     x.update(_answers(block, asked, t, x, u, p))
-    # What a mode is follows from what it was before the instant, and not from what it is in between.
+    # Such a mode follows from its value before the event time, not from values during mode iteration.
     earlier = x | {mode.name: x[mode.before] for mode in modes if mode.remembers}
     if structure.settled:
         x.update(block.mode_values(t, x, u, p))
@@ -304,7 +304,7 @@ def _trace(structure: _Structure) -> BlockEquations:
 def _modes_and_guards(
     block: Block, shapes: Shapes, located: Sequence[Condition]
 ) -> tuple[tuple[State, ...], tuple[Guard, ...]]:
-    """Those of a block, and one of each for every condition whose change is an event."""
+    """The modes and guards of a block, plus one of each for every located condition."""
     modes = (State(entry.name, entry.shape, entry.doc, follows=True) for entry in located)
     guards = (Guard(entry.name, entry.shape, entry.doc, locates=True) for entry in located)
     return (*block.all_modes(shapes), *modes), (*block.all_guards(shapes), *guards)
@@ -319,7 +319,7 @@ def _output_shapes(block: Block, inputs: Shapes) -> dict[str, Shape]:
 
 
 def _moving_delays(groups: Sequence[Group]) -> frozenset[str]:
-    """Those that hang on more than parameters."""
+    """The values that depend on more than parameters."""
     return frozenset(
         slot.name
         for group in groups
@@ -333,19 +333,19 @@ def _positive(quantity: SX, closed: bool) -> SX:
 
 
 def _sides_after(located: Sequence[Condition], x: Signals, e: Signals) -> Signals:
-    """What the modes of conditions become at events."""
+    """The new modes of conditions at events."""
     return {
         entry.name: if_else(e[entry.name] == 0.0, x[entry.name], e[entry.name] > 0.0) for entry in located
     }
 
 
 def _sided(quantity: SX, closed: bool) -> SX:
-    """The quantity with a side for its zero: moved by less than any signal can tell."""
+    """The quantity with an offset below any signal resolution, which assigns zero to one side."""
     return quantity + 1e-300 if closed else quantity - 1e-300
 
 
 def _answers(block: Block, asked: Sequence[Condition], t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-    """Conditions by the values of the moment, each put into those after it."""
+    """Conditions from the present values, each substituted into those after it."""
     unknown = {
         entry.name: unflatten(SX.sym(entry.name, Slot(entry.name, entry.shape).size), entry.shape)
         for entry in asked

@@ -1,4 +1,4 @@
-"""The only mutable thing of the diagram layer: it collects blocks and wires, and ``build`` checks them."""
+"""The diagram builder, the only mutable class of this layer: it collects blocks and connections."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from armblocks.errors import DiagramError, InputError, UnknownNameError
 
 
 class BlockHandle:
-    """A block that a builder has added: ``handle["q"]`` is its port q, for use as a source or a target."""
+    """A block in a builder: ``handle["q"]`` is its port q, for use as a source or a target."""
 
     def __init__(self, name: str, block: Block) -> None:
         self.name = name
@@ -45,7 +45,7 @@ class BlockHandle:
 
 
 Source = PortRef | BlockHandle
-"""What may feed an input: an output port, or a block that has exactly one output."""
+"""A signal source for an input: an output port, or a block with exactly one output."""
 
 
 class DiagramBuilder:
@@ -65,15 +65,15 @@ class DiagramBuilder:
             inner.output("force", inner.add("gain", Gain(gain=5.0), error))
         builder.connect(builder["controller"], motor["force"])
 
-    It may have parameters of its own, its *mask*, that are seen from outside as ``"controller.kp"``, and that
-    the values of blocks inside follow by formulas::
+    It may declare parameters, its *mask*, which have the paths ``"controller.kp"`` outside. Parameters of
+    blocks inside can be formulas of them::
 
         with builder.subsystem("controller", …) as inner:
             kp = inner.parameter("kp", 5.0, unit="N/m", doc="how hard it pulls")
             inner.add("gain", Gain(gain=kp), …)
             inner.add("filter", FirstOrderLag(time_constant=formula("1 / (10*kp)")), …)
 
-    Errors are ``DiagramError``, ``InputError`` or ``UnknownNameError``, at the line that makes them.
+    Errors are ``DiagramError``, ``InputError`` or ``UnknownNameError``, raised at the line that causes them.
     """
 
     def __init__(
@@ -107,13 +107,13 @@ class DiagramBuilder:
         """Declare a parameter of this diagram, and return the formula that is its name.
 
         ``rules`` are those of a block's parameter: ``minimum``, ``above``, ``maximum``, ``choices``, …
-        ``value`` is what it is here, where that is not its default; inside a ``with builder.subsystem(…)``
-        it may be a formula over the parameters of the diagram around. Raises ``InputError``.
+        ``value`` is its present value, if that is not the default; inside a ``with builder.subsystem(…)`` it
+        may be a formula of the parameters of the enclosing diagram. Raises ``InputError``.
         """
         return self.declare(mask_parameter(name, default, doc=doc, unit=unit, **rules), value)
 
     def declare(self, rule: Parameter, value: Any = None) -> Any:
-        """Declare a parameter of this diagram that is described already; see :meth:`parameter`."""
+        """Declare a parameter of this diagram by its rule object; see :meth:`parameter`."""
         checked_mask((*self._mask, rule), f"diagram '{self.name}'")
         if isinstance(value, ParameterFormula):
             self._outer[rule.name] = value
@@ -135,11 +135,11 @@ class DiagramBuilder:
         check_block_name(name, where)
         other = self._taken.get(folded(name))
         if other is not None:
-            same = f"a block is named '{other}', which differs only by case or by how accents are encoded"
+            same = f"a block is named '{other}', which differs only in case or Unicode encoding"
             raise DiagramError(
                 f"two blocks are named '{name}'" if other == name else f"'{name}': {same}",
                 where=where,
-                allowed="every name once",
+                allowed="unique names",
                 fix="rename one of them",
             )
         self._count += 1 + (block_count(block.diagram) if isinstance(block, DiagramBlock) else 0)
@@ -187,7 +187,7 @@ class DiagramBuilder:
         self.add(name, block, *inputs, **inputs_by_port)
 
     def connect(self, source: Source, target: Source) -> None:
-        """Connect an output port to an input port; a block stands for its only output or only input."""
+        """Connect an output port to an input port; a block means its only output or only input."""
         driver = self._resolve(source, output=True)
         driven = self._resolve(target, output=False)
         other = self._wires.get(driven)
@@ -211,7 +211,7 @@ class DiagramBuilder:
         flipped: bool = False,
         rotation: int = 0,
     ) -> None:
-        """Say where a block stands on the sheet, see :class:`~armblocks.diagram.Placement`."""
+        """Set the position of a block on the sheet, see :class:`~armblocks.diagram.Placement`."""
         name = block if isinstance(block, str) else block.name
         self._known(name)
         self._layout[name] = Placement(
@@ -219,18 +219,18 @@ class DiagramBuilder:
         )
 
     def bend(self, wire: Connection, bends: Sequence[float]) -> None:
-        """Say which way a wire goes: in turn the x and y of its straight pieces (pixels), from its source on.
+        """Set the route of a connection: alternating x and y of its segments (pixels), from its source on.
 
-        It is forgotten where there is no such wire.
+        It is ignored if there is no such connection.
         """
         self._bends[wire] = tuple(bends)
 
     def note(self, name: str, note: Note) -> None:
-        """Put words on the sheet; ``name`` tells them from others."""
+        """Add an annotation to the sheet under a unique ``name``."""
         self._notes[name] = note
 
     def log(self, source: Source) -> None:
-        """Have an output seen without a Scope: reports and the studio show its traces.
+        """Log an output without a Scope: reports and the studio show its traces.
 
         Raises ``UnknownNameError`` and ``DiagramError``.
         """
@@ -244,7 +244,7 @@ class DiagramBuilder:
         return diagram
 
     def draft(self) -> Diagram:
-        """The frozen diagram as it stands, unchecked: a drawing in progress."""
+        """The frozen diagram without checks: an unfinished drawing."""
         return Diagram(
             name=self.name,
             blocks=self._blocks,
@@ -270,13 +270,13 @@ class DiagramBuilder:
         return self._blocks[name]
 
     def _resolve(self, end: object, *, output: bool) -> PortRef:
-        """The port that is meant, checked to exist on the right side of its block."""
+        """The port, checked to be an input or output of its block as required."""
         side = "output" if output else "input"
         if not isinstance(end, PortRef | BlockHandle):
             raise InputError(
                 f"an {side} is a {type(end).__name__}",
                 where=f"diagram '{self.name}'",
-                allowed="what builder.add returns, or a port of it",
+                allowed="a return value of builder.add, or a port of it",
                 fix='give handle or handle["port"]; for a number, add a Constant block',
             )
         name = end.block if isinstance(end, PortRef) else end.name
@@ -288,7 +288,7 @@ class DiagramBuilder:
             return end
         if len(ports) != 1:
             raise DiagramError(
-                f"the block has {len(ports)} {side}s, so its name alone does not tell which",
+                f"the block has {len(ports)} {side}s, so its name alone is ambiguous",
                 where=_where(name, block),
                 allowed=", ".join(f'"{port}"' for port in ports) or "a block with one",
                 fix='name the port: handle["port"]',
@@ -299,10 +299,10 @@ class DiagramBuilder:
 def _check_block(block: object, where: str) -> None:
     if not isinstance(block, Block):
         raise InputError(
-            f"a {type(block).__name__} is added in the place of a block",
+            f"a {type(block).__name__} is added instead of a block",
             where=where,
             allowed="blocks, such as Gain(gain=2.0)",
-            fix="make a block first, with its parameters",
+            fix="create a block first, with its parameters",
         )
 
 

@@ -1,4 +1,4 @@
-"""Several named signals on one wire."""
+"""Buses: several named signals in one connection."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.diagram.port import PortRef
 
 @dataclass(frozen=True)
 class Bus:
-    """What a wire carries that has several named signals on it, in order; a bus may hold buses."""
+    """An ordered collection of named signals in one connection; a bus may contain buses."""
 
     elements: Mapping[str, Carried]
 
@@ -48,4 +48,4 @@ class Bus:
 
 
 Carried = PortRef | Bus
-"""What a wire carries: the signal of an output of the flat diagram, or a bus of such."""
+"""The content of a connection: an output signal of the flat diagram, or a bus of such signals."""

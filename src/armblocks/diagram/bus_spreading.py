@@ -1,9 +1,9 @@
-"""Buses through blocks that pass a signal on unchanged: such a block stands for one block for each signal.
+"""Buses at blocks that pass signals on unchanged: the block is copied for each signal of the bus.
 
-A Switch between two buses chooses between each pair of their signals; a Unit Delay delays each. In the flat
-diagram there is a copy of the block for every signal, ``switch.motor.speed`` for the signal of this path; all
-copies have the parameters of the one block (``Diagram.shares``). What is on a bus is found out from the
-wires, from Bus Creators on; a loop through a delay takes it from where a bus enters the loop.
+A Switch between two buses selects each pair of their signals; a Unit Delay delays each signal. The flat
+diagram has a copy of the block for every signal, such as ``switch.motor.speed``; all copies share the
+parameters of the original (``Diagram.shares``). The elements of a bus are propagated along the connections
+from Bus Creators; in a loop through a delay they come from the bus that enters the loop.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from armblocks.errors import DiagramError
 
 @dataclass(frozen=True, kw_only=True)
 class SpreadBlock:
-    """A block that is given buses, and the paths of the signals on them, in the order of its first input."""
+    """A block with bus inputs, and the paths of the signals, in the order of its first bus input."""
 
     path: str
     block: Block
     given: str
-    """The input that said what is on the buses."""
+    """The input that determines the elements."""
     structure: Bus
-    """Of this input."""
+    """The bus at this input."""
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -34,15 +34,15 @@ class SpreadBlock:
         return tuple(path for path, _ in self.structure.leaves())
 
     def copy(self, element: str) -> str:
-        """The path of the block that works on one signal."""
+        """The path of the copy for one signal."""
         return f"{self.path}.{element}"
 
     def carried(self, port: str) -> Bus:
-        """What an output carries: the outputs of the copies, in the structure of the input."""
+        """The bus at an output: the outputs of the copies, in the structure of the input bus."""
         return _renamed(self.structure, "", lambda element: PortRef(self.copy(element), port))
 
     def element(self, port: str, carried: Carried, element: str) -> Carried:
-        """The signal of an input that a copy takes. Raises ``DiagramError`` where the inputs differ."""
+        """The signal at an input of a copy. Raises ``DiagramError`` where the input buses differ."""
         if isinstance(carried, Bus):
             there = {path for path, _ in carried.leaves()}
             found = carried.element(element)
@@ -77,10 +77,10 @@ def spread_blocks(
     carried_at: Callable[[str, str], Carried],
     found: Callable[[SpreadBlock], None],
 ) -> None:
-    """Tell ``found`` of every block that is given a bus and works on each of its signals.
+    """Call ``found`` for every block with a bus input that is copied for each signal.
 
-    ``carried_at`` gives what an input port carries by what was found so far, or raises ``DiagramError`` where
-    that does not say it yet.
+    ``carried_at`` gives the content of an input port from the results so far, or raises ``DiagramError``
+    where it is not known yet.
     """
     waiting = {path: block for path, block in blocks.items() if block.bus_inputs()}
     progress = True
@@ -91,7 +91,7 @@ def spread_blocks(
                 try:
                     carried = carried_at(path, port)
                 except DiagramError:
-                    continue  # said later, if it is still so when all buses are known
+                    continue  # raised later, if still true when all buses are known
                 if isinstance(carried, Bus):
                     found(SpreadBlock(path=path, block=block, given=port, structure=carried))
                     del waiting[path]

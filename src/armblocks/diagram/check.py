@@ -1,4 +1,4 @@
-"""Everything that is asked of a diagram before it may be traced."""
+"""Checks of a diagram before tracing."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from armblocks.diagram.virtual_wiring import From, Goto
 def check_diagram(diagram: Diagram) -> None:
     """Raise ``DiagramError`` for a diagram that cannot be traced.
 
-    That is: unconnected inputs, widths or sample times that do not fit, loops that no order solves. What
-    enters a part of a larger diagram is not known before it is there, so that of a part only the connections
-    and the ends are looked at.
+    Reasons are unconnected inputs, shapes or sample times that do not fit, and unsolvable algebraic loops.
+    For a part of a larger diagram only connections and ends are checked, because its inputs are unknown.
     """
     if _is_part(diagram):
         ends(diagram, Inport)
@@ -25,7 +24,7 @@ def check_diagram(diagram: Diagram) -> None:
 
 
 def _is_part(diagram: Diagram) -> bool:
-    """Whether something enters from outside: by an In block, or by a tag that nothing inside sends."""
+    """Whether a signal enters from outside: by an In block, or by a From tag without a Goto inside."""
     if any(isinstance(block, Inport) for block in diagram.blocks.values()):
         return True
     if not any(block.virtual for block in diagram.blocks.values()):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 
 def strongly_connected(needs: Sequence[Sequence[int]]) -> list[list[int]]:
-    """The strongly connected components of who needs whom, those needed first (Tarjan, iterative)."""
+    """The strongly connected components of a dependency graph, dependencies first (Tarjan, iterative)."""
     count = len(needs)
     number: dict[int, int] = {}
     lowest: dict[int, int] = {}

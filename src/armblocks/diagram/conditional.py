@@ -1,11 +1,12 @@
-"""Subsystems that work only at times: enabled, triggered, reset, or chosen by an If or Switch Case block.
+"""Conditional subsystems: enabled, triggered, resettable, or activated by an If or Switch Case block.
 
-A flat diagram has, in the place of the subsystem, a *control* block that works out from the control signal
-whether the blocks inside work, start anew, or do their work just now; each output holds its value while they
-do not. The blocks inside find it on hidden inputs: see :mod:`armblocks.diagram.conditional_equations`.
+In a flat diagram a *control* block replaces the subsystem. It computes from the control signal whether the
+blocks inside are active, reset, or triggered; the outputs hold their values while the subsystem is inactive.
+The blocks inside read these values from hidden inputs: see :mod:`armblocks.diagram.conditional_equations`.
 
-A control signal that flows makes an event where it passes zero, located exactly. One that jumps at a tick
-acts within the same tick: first the control follows, then the blocks inside, in their order.
+A zero crossing of a continuous control signal is an event, located exactly. A control signal that jumps at a
+tick acts within the same tick: first the control block is updated, then the blocks inside, in evaluation
+order.
 """
 
 from __future__ import annotations
@@ -28,39 +29,38 @@ _PULSES = made("PulseGenerator", period=4.0, width=50.0)
 
 @dataclass(frozen=True, kw_only=True)
 class EnabledSubsystem(DiagramBlock):
-    """A subsystem that works while its input enable is positive, and stands still while it is not.
+    """An enabled subsystem: it is active while its input enable is positive.
 
-    While it is off, its continuous and sampled states keep their values, and its outputs are held, or go back
-    to what their Out blocks have as ``initial``. When it is switched on, its states go on from where they
-    were or start anew.
+    While it is disabled, its states keep their values, and its outputs are held or return to ``initial`` of
+    their Out blocks. When it is enabled, its states continue from their values or are reset.
     """
 
     title: ClassVar[str] = "Enabled Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="While the pulse is 0 the output keeps the value that the sine had last.",
+        shows="While the pulse is 0, the output holds the last value of the sine.",
         inputs={"enable": _PULSES},
         shown=("In1", "enable", "Out1"),
     )
 
     states_when_enabling: str = parameter(
-        "held", choices=_STATES, doc="whether states go on or start anew when it is switched on"
+        "held", choices=_STATES, doc="whether the states are held or reset when it is enabled"
     )
 
     def control_ports(self) -> tuple[Port, ...]:
-        return (Port("enable", "works while it is positive", "", ()),)
+        return (Port("enable", "active while positive", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TriggeredSubsystem(DiagramBlock):
-    """A subsystem that works once, at the instant, whenever its input trigger fires; outputs are held.
+    """A triggered subsystem: it executes once whenever its input trigger fires; outputs are held in between.
 
     The trigger fires where it becomes positive (rising), stops being positive (falling), or either. Sampled
-    blocks inside take one step at each firing, with the time since the last one as their period.
+    blocks inside take one step at each trigger event; their period is the time since the last one.
     """
 
     title: ClassVar[str] = "Triggered Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Each time the pulse rises the output takes the value of the sine, and holds it.",
+        shows="At each rising edge of the pulse the output samples the sine and holds the value.",
         inputs={"trigger": _PULSES},
         shown=("In1", "trigger", "Out1"),
     )
@@ -68,16 +68,16 @@ class TriggeredSubsystem(DiagramBlock):
     edge: str = parameter("rising", choices=_EDGES, doc="when the trigger fires")
 
     def control_ports(self) -> tuple[Port, ...]:
-        return (Port("trigger", "works when it fires", "", ()),)
+        return (Port("trigger", "executes the subsystem when it fires", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class EnabledTriggeredSubsystem(DiagramBlock):
-    """A subsystem that works once, at the instant, whenever its trigger fires while enable is positive."""
+    """An enabled and triggered subsystem: it executes when its trigger fires while enable is positive."""
 
     title: ClassVar[str] = "Enabled and Triggered Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The output takes the value of the sine where the pulse rises, but only while enable is 1.",
+        shows="The output samples the sine at rising edges of the pulse, but only while enable is 1.",
         inputs={"trigger": _PULSES, "enable": made("Step", time=3.0)},
         shown=("In1", "trigger", "Out1"),
     )
@@ -86,18 +86,18 @@ class EnabledTriggeredSubsystem(DiagramBlock):
 
     def control_ports(self) -> tuple[Port, ...]:
         return (
-            Port("enable", "the trigger counts while it is positive", "", ()),
-            Port("trigger", "works when it fires", "", ()),
+            Port("enable", "enables the trigger while positive", "", ()),
+            Port("trigger", "executes the subsystem when it fires", "", ()),
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResettableSubsystem(DiagramBlock):
-    """A subsystem that always works, and whose states all start anew whenever its input reset fires."""
+    """A resettable subsystem: always active; all its states are reset when its input reset fires."""
 
     title: ClassVar[str] = "Resettable Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A subsystem without states: the output is the input, whatever the reset does.",
+        shows="A subsystem without states: the output equals the input, and a reset has no effect.",
         inputs={"reset": _PULSES},
         shown=("In1", "reset", "Out1"),
     )
@@ -105,37 +105,37 @@ class ResettableSubsystem(DiagramBlock):
     edge: str = parameter("rising", choices=_EDGES, doc="when the reset fires")
 
     def control_ports(self) -> tuple[Port, ...]:
-        return (Port("reset", "starts all states anew when it fires", "", ()),)
+        return (Port("reset", "resets all states when it fires", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ActionSubsystem(DiagramBlock):
-    """A subsystem that works while an If or Switch Case block chooses it: while its input action is 1."""
+    """An action subsystem: active while an If or Switch Case block selects it (input action = 1)."""
 
     title: ClassVar[str] = "Action Subsystem"
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The If block chooses the subsystem while the sine is positive; its output is held otherwise.",
+        shows="The If block activates the subsystem while the sine is positive, else its output is held.",
         inputs={"action": made("If").by(u="In1").at("if1")},
         shown=("In1", "Out1"),
     )
 
     states_when_resuming: str = parameter(
-        "held", choices=_STATES, doc="whether states go on or start anew when it is chosen again"
+        "held", choices=_STATES, doc="whether the states are held or reset when it is activated again"
     )
 
     def control_ports(self) -> tuple[Port, ...]:
-        return (Port("action", "works while it is 1", "", ()),)
+        return (Port("action", "active while it is 1", "", ()),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Merge(Block):
-    """The outputs of several conditional subsystems on one wire: y = that of the one which worked last."""
+    """Merges outputs of conditional subsystems: y is the output of the subsystem that was active last."""
 
     title: ClassVar[str] = "Merge"
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="An If block chooses one of two subsystems by the sign of a sine; "
-        "the merged signal is what it gives.",
+        shows="An If block activates one of two subsystems by the sign of a sine; "
+        "Merge passes the output of the active one.",
         inputs={
             "u1": made("ActionSubsystem")
             .named("positive")
@@ -150,9 +150,9 @@ class Merge(Block):
         shown=("sine wave/y", "y"),
     )
 
-    inputs: int = parameter(2, minimum=1, doc="how many inputs")
+    inputs: int = parameter(2, minimum=1, doc="number of inputs")
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="the output before any of them has worked"
+        0.0, kind=ParameterKind.ARRAY, doc="the output before any of them has been active"
     )
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -162,7 +162,7 @@ class Merge(Block):
         )
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the output of the one that worked last"),)
+        return (Port("y", "the output of the subsystem that was active last"),)
 
 
 Conditional = (

@@ -1,12 +1,12 @@
-"""What a diagram's equations depend on, as a short text: equal keys, equal equations.
+"""A hash key of everything that a diagram's equations depend on: equal keys mean equal equations.
 
-By it the disk cache knows a diagram that an earlier process compiled, so that it is not even traced. In it
-are all blocks by class with all their parameters to the last bit (tables, robots, inner diagrams and the code
-of Python functions by content), the wires, and the versions of the libraries that take part; the cache adds
-the sources of this package. Layout, descriptions and settings of the run are not.
+With it the disk cache finds a diagram that an earlier process compiled, so that it is not traced again. The
+key covers all blocks by class with the exact values of all parameters (tables, robots, inner diagrams and the
+code of Python functions by content), the connections, and the versions of the libraries. The cache adds the
+sources of this package. Layout, descriptions and run settings are not part of the key.
 
-A diagram with something whose content cannot be known (a block class of somebody else's, a function that
-imports a module of its user's) has no key and is traced each time.
+A diagram with unknown content (an external block class, a function that imports a user's module) has no key
+and is traced each time.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _OWN = "armblocks."
 
 
 def content_key(diagram: Diagram) -> str | None:
-    """The key, hexadecimal; ``None`` where something about the equations cannot be known."""
+    """The key, hexadecimal; ``None`` where the content of the equations cannot be determined."""
     content = _Content()
     try:
-        # Those inside first: each then finds what it holds known, however deep they are inside each other.
+        # Inner diagrams first, so that the digests of nested diagrams are known, without recursion.
         for level in reversed(levels_of(diagram).values()):
             content.add(level)
     except UnknownContentError:
@@ -45,7 +45,7 @@ def content_key(diagram: Diagram) -> str | None:
 
 
 class _Content:
-    """Takes values and gives one digest of them all; no value runs into its neighbour."""
+    """Digests a sequence of values; lengths separate neighbouring values."""
 
     def __init__(self) -> None:
         self._texts: list[str] = []
@@ -58,7 +58,7 @@ class _Content:
     def add(self, value: object) -> None:
         """A value by its content. Raises ``UnknownContentError``."""
         if value is None or isinstance(value, bool | int | float | complex):
-            # repr of a float is exact, and tells -0.0 from 0.0.
+            # repr of a float is exact, and distinguishes -0.0 from 0.0.
             self._texts.append(f"{type(value).__name__} {value!r}")
         elif isinstance(value, str | bytes):
             self._texts.append(f"{type(value).__name__} {len(value)} {value!r}")
@@ -93,13 +93,16 @@ class _Content:
         self.add(("diagram", diagram.name, diagram.blocks, wires, gates))
 
     def _add_object(self, value: object) -> None:
-        """A block, a diagram, a robot and the like, once each: several blocks may share a robot."""
+        """Digest an object (block, diagram, robot) once: several blocks may share a robot."""
         known = self._known.get(id(value))
         if known is None:
             part = _Content()
             part._known = self._known
             part._add_fields(value)
-            known = self._known[id(value)] = (value, part.digest)  # the value stays, and so does its id
+            known = self._known[id(value)] = (
+                value,
+                part.digest,
+            )  # the reference keeps the value alive, so that its id stays unique
         self._texts.append(f"object {known[1]}")
 
     def _add_fields(self, value: object) -> None:

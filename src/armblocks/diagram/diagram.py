@@ -22,7 +22,7 @@ _Kept = TypeVar("_Kept")
 
 @dataclass(frozen=True, order=True)
 class Connection:
-    """A wire from an output port to an input port."""
+    """A connection from an output port to an input port."""
 
     source: PortRef
     target: PortRef
@@ -33,10 +33,10 @@ class Connection:
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """Where a block stands on the sheet: top left corner and size in pixels, y downwards.
+    """Position of a block on the sheet: top left corner and size in pixels, y downwards.
 
-    ``width`` and ``height`` ``None``: the drawing chooses. ``flipped``: inputs on the right. ``rotation``:
-    degrees clockwise, one of 0, 90, 180 and 270, after the flip.
+    ``width`` and ``height`` ``None``: chosen by the drawing code. ``flipped``: inputs on the right.
+    ``rotation``: degrees clockwise, one of 0, 90, 180 and 270, after the flip.
     """
 
     x: float
@@ -49,7 +49,7 @@ class Placement:
 
 @dataclass(frozen=True, kw_only=True)
 class Note:
-    """Words on the sheet, of one line or more: their top left corner in pixels."""
+    """An annotation on the sheet, of one line or more, with its top left corner in pixels."""
 
     x: float
     y: float
@@ -57,17 +57,17 @@ class Note:
 
 
 ROTATIONS = (0, 90, 180, 270)
-"""Degrees by which a block may be turned."""
+"""Allowed rotations of a block, degrees."""
 
 _READ_ONLY = ("blocks", "layout", "bends", "notes", "extras", "mask_values")
-"""The fields of a diagram that are mappings nobody can write to."""
+"""The fields of a diagram that are read-only mappings."""
 
 Gate = Mapping[str, PortRef]
-"""What feeds the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
+"""The drivers of the hidden inputs of a block inside a conditional subsystem, such as ``?on``."""
 
 
 def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
-    """A block of a diagram with the values of its formulas.
+    """A block of a diagram with its formulas evaluated.
 
     Raises ``DiagramError`` or ``UnknownNameError`` that name the block.
     """
@@ -83,16 +83,16 @@ def block_in_scope(name: str, block: Block, scope: Scope) -> Block:
 
 @dataclass(frozen=True, kw_only=True)
 class Diagram:
-    """Blocks and wires. Only ``DiagramBuilder.build`` makes one, and what it makes is checked.
+    """Blocks and connections. Only ``DiagramBuilder.build`` creates diagrams, and it checks them.
 
-    ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams look alike. ``layout``
-    may name only some blocks, ``bends`` only some wires: those whose way somebody has drawn, see
-    :func:`armblocks.drawing.wire_routing.bent`; ``notes`` are annotations by name. ``mask`` are the
-    parameters that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` what they are, the
-    defaults where nothing is given; blocks whose parameters are formulas have the values that follow from
-    these. ``link`` names the entry of a library file that the diagram is, ``servos.json#JointServo``; it is
-    empty for one of its own. ``extras`` are unknown keys of a file, preserved: it has the keys ``""`` (the
-    document), ``"blocks"`` (by block name), and whatever else a file format puts there.
+    ``blocks`` is sorted by name and ``connections`` by ends, so that equal diagrams compare equal. ``layout``
+    may name only some blocks, and ``bends`` only some connections: those with a user-drawn route, see
+    :func:`armblocks.drawing.wire_routing.bent`; ``notes`` are annotations by name. ``mask`` has the
+    parameters that it declares (see :mod:`armblocks.diagram.mask`) and ``mask_values`` their values (by
+    default the default values). Block parameters that are formulas have the values computed from these.
+    ``link`` names the entry of a library file from which the diagram comes, ``servos.json#JointServo``, or is
+    empty. ``extras`` preserves unknown keys of a file: it has the keys ``""`` (the document), ``"blocks"``
+    (by block name), and whatever else a file format puts there.
     """
 
     name: str
@@ -104,16 +104,16 @@ class Diagram:
     settings: SimulationOptions = field(default_factory=SimulationOptions)
     extras: Mapping[str, object] = field(default_factory=dict[str, object])
     description: str = ""
-    """One line for people: what the diagram shows."""
+    """A one-line description of the diagram."""
     logged: tuple[PortRef, ...] = ()
-    """Outputs of these blocks that are to be seen without a Scope: each gets a view of its own."""
+    """Outputs that are logged without a Scope: each gets a separate view."""
     gates: Mapping[str, Gate] = field(default_factory=dict[str, Gate])
-    """Of a flat diagram, by block: see :mod:`armblocks.diagram.conditional_equations`."""
+    """For a flat diagram, by block: see :mod:`armblocks.diagram.conditional_equations`."""
     mask: tuple[Parameter, ...] = ()
     mask_values: Mapping[str, Value] = field(default_factory=dict[str, Value])
     link: str = ""
     shares: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Of a flat diagram: blocks that have their parameters in common under another name, which is given."""
+    """For a flat diagram: blocks that share the parameters of the block of the given name."""
     _kept: dict[str, object] = field(init=False, repr=False, compare=False, default_factory=dict[str, object])
 
     def __post_init__(self) -> None:
@@ -126,7 +126,7 @@ class Diagram:
                 name: block_in_scope(name, block, self.mask_values) for name, block in self.blocks.items()
             }
             object.__setattr__(self, "blocks", blocks)
-        if self.bends:  # those of wires that are gone are gone with them
+        if self.bends:  # drop the bends of removed connections
             kept = {wire: self.bends[wire] for wire in self.connections if self.bends.get(wire)}
             object.__setattr__(self, "bends", kept)
         for name in _READ_ONLY:
@@ -136,7 +136,7 @@ class Diagram:
         object.__setattr__(self, "logged", tuple(sorted(self.logged)))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a pickle or a copy holds: the fields, and nothing that was worked out from them."""
+        """Return the state for pickling and copying: the fields without cached results."""
         state = {entry.name: getattr(self, entry.name) for entry in dataclasses.fields(self) if entry.init}
         return state | {name: dict(state[name]) for name in _READ_ONLY}
 
@@ -147,9 +147,10 @@ class Diagram:
         object.__setattr__(self, "_kept", {})
 
     def with_mask_values(self, values: Mapping[str, object]) -> Diagram:
-        """A copy in which some parameters of the mask have other values, and what follows from them.
+        """A copy with other values of some mask parameters, and of all parameters that depend on them.
 
-        Raises ``UnknownNameError`` for a name, ``InputError`` or ``DiagramError`` for a value.
+        Raises ``UnknownNameError`` for an unknown name, ``InputError`` or ``DiagramError`` for an invalid
+        value.
         """
         if all(name in self.mask_values and self.mask_values[name] == values[name] for name in values):
             return self
@@ -164,11 +165,11 @@ class Diagram:
         return f"diagram '{self.name}' of {len(self.blocks)} blocks"
 
     def clocked(self, name: str) -> bool:
-        """Whether a block works at the ticks of a clock: a sampled one, unless a trigger tells it when."""
+        """Whether a block has a clock: a sampled block that is not in a triggered subsystem."""
         return self.blocks[name].sampled and "?fire" not in self.gates.get(name, {})
 
     def owner(self, name: str) -> str:
-        """The name before the parameters of a block: its own, or the one that it shares."""
+        """The prefix of a block's parameter paths: its name, or that of the owner of shared parameters."""
         return self.shares.get(name, name)
 
     def source(self, name: str, port: str) -> PortRef:
@@ -189,7 +190,7 @@ class Diagram:
         return self.blocks[name]
 
     def keep(self, name: str, work_out: Callable[[], _Kept]) -> _Kept:
-        """What a pure function of this diagram gives, worked out once and kept with it under a name."""
+        """The result of a pure function of this diagram, cached with the diagram under a name."""
         if name not in self._kept:
             self._kept[name] = work_out()
         return cast("_Kept", self._kept[name])

@@ -1,4 +1,4 @@
-"""What is different between two diagrams, as far as it can change what they do: layout is no difference."""
+"""Differences between two diagrams that can change their behaviour; layout is not compared."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class PlacedBlock:
 
 @dataclass(frozen=True, kw_only=True)
 class Renaming:
-    """An identical block with the same wires under another name; both are paths."""
+    """A renamed block: identical, with the same connections; both names are paths."""
 
     before: str
     after: str
@@ -35,10 +35,10 @@ class Renaming:
 
 @dataclass(frozen=True, kw_only=True)
 class ValueChange:
-    """Another value under a name.
+    """A changed value.
 
-    ``path`` is that of the block, for settings, descriptions and notes that of the subsystem (``""``
-    outside), by the later diagram's names. ``None`` stands where one side has no such value.
+    ``path`` is the path of the block, or of the subsystem for settings, descriptions and notes (``""`` for
+    the top level), with the names of the later diagram. ``None``: one side has no such value.
     """
 
     path: str
@@ -49,9 +49,10 @@ class ValueChange:
 
 @dataclass(frozen=True, kw_only=True)
 class PlacedWire:
-    """A wire that only one of two diagrams has, within the subsystem at ``path`` (``""`` outside).
+    """A connection that only one of two diagrams has, in the subsystem at ``path`` (``""`` for the top
+    level).
 
-    Its ends have the names of the later diagram where the blocks are still there.
+    Its ends have the names of the later diagram where the blocks still exist.
     """
 
     path: str
@@ -60,7 +61,7 @@ class PlacedWire:
 
 @dataclass(frozen=True, kw_only=True)
 class PlacedPort:
-    """An output that only one of two diagrams logs, named as a :class:`PlacedWire` names its ends."""
+    """An output that only one of two diagrams logs, named like the ends of a :class:`PlacedWire`."""
 
     path: str
     port: PortRef
@@ -68,12 +69,12 @@ class PlacedPort:
 
 @dataclass(frozen=True, kw_only=True)
 class DiagramDifference:
-    """All that is different between two diagrams and inside their subsystems; false where there is nothing.
+    """All differences between two diagrams and their subsystems; false if there are none.
 
     ``types`` are blocks of another type under the same name; their parameters are listed too, with ``None``
-    where one type has no such parameter. A value that follows by a formula is the formula. ``masks`` are
-    parameters that the diagram at ``path`` declares otherwise. ``logged_*`` are outputs that are recorded
-    without a Scope; ``notes`` the words on a sheet, wherever they stand.
+    where one type has no such parameter. A formula is compared as text. ``masks`` are changed mask
+    declarations of the diagram at ``path``. ``logged_*`` are outputs that are recorded without a Scope;
+    ``notes`` are annotations, without their positions.
     """
 
     added: tuple[PlacedBlock, ...] = ()
@@ -92,7 +93,7 @@ class DiagramDifference:
 
     @property
     def count(self) -> int:
-        """How many single differences there are."""
+        """The number of differences."""
         return sum(len(getattr(self, entry.name)) for entry in dataclasses.fields(self))
 
     def __bool__(self) -> bool:
@@ -100,13 +101,13 @@ class DiagramDifference:
 
 
 def diagram_difference(before: Diagram, after: Diagram) -> DiagramDifference:
-    """What one has to change in ``before`` to get ``after``.
+    """The changes that lead from ``before`` to ``after``.
 
-    Compared are blocks with their types and parameters, wires, logged outputs, settings, descriptions and
-    what notes say, inside subsystems too. Not compared are the layout, the diagram's own name (a file without
-    one is called after the file) and unknown keys of a file. A block that is gone and a new one are the same
-    one renamed where type, parameters and all wires agree, also when blocks at the other ends are renamed
-    with it.
+    Compared are blocks with their types and parameters, connections, logged outputs, settings, descriptions
+    and the text of annotations, including subsystems. Not compared are the layout, the name of the diagram (a
+    file without one is named after the file) and unknown keys of a file. A removed and an added block count
+    as one renamed block if type, parameters and all connections agree, even if blocks at the other ends are
+    renamed too.
     """
     found = _Findings()
     _compare_levels(before, after, "", found)
@@ -165,7 +166,7 @@ def _compare_levels(before: Diagram, after: Diagram, path: str, found: _Findings
 
 
 def _compare_sheets(before: Diagram, after: Diagram, path: str, found: _Findings) -> None:
-    """What two levels say of themselves as a whole."""
+    """The differences of two diagrams of the hierarchy themselves, without their blocks."""
     for name in _SETTINGS:
         old_value, new_value = getattr(before.settings, name), getattr(after.settings, name)
         if old_value != new_value:
@@ -215,17 +216,18 @@ def _rules(block: Block) -> Mapping[str, Parameter]:
 
 
 _Colours = dict[str, int]
-"""By block name, a number that depends on what a block is and on its surroundings, not on its name."""
+"""A colour for each block name, which depends on the block and its neighbours, not on the name."""
 _Ends = list[tuple[str, str, PortRef]]
-"""The wires at a block: own port, which way the wire goes, port at the other end."""
+"""The connections of a block: own port, direction, port at the other end."""
 
 
 def _renamings(before: Diagram, after: Diagram) -> dict[str, str]:
-    """Later names of blocks by earlier ones.
+    """Later names of blocks by earlier names (colour refinement).
 
-    Blocks that only one side has are coloured by what they are and, round by round, by the colours that their
-    wires lead to; a block that both sides have is a colour of its own. Equal colours on both sides are the
-    same block. Where several cannot be told apart, one pair is taken and the rounds go on: any choice fits.
+    A block that only one side has starts with a colour of its content. Each round refines the colours by
+    those of its neighbours. A block that both sides have keeps a unique colour. Equal colours on both sides
+    are the same block. Where several blocks have equal colours, one pair is matched and refinement continues;
+    any choice is valid.
     """
     gone = {name: hash(_content(block)) for name, block in before.blocks.items() if name not in after.blocks}
     new = {name: hash(_content(block)) for name, block in after.blocks.items() if name not in before.blocks}
@@ -270,7 +272,7 @@ _Surroundings = tuple[dict[str, _Ends], _Colours]
 def _refined(
     olds: _Colours, laters: _Colours, around_olds: _Surroundings, around_laters: _Surroundings
 ) -> tuple[_Colours, _Colours]:
-    """Both sides' colours after as many rounds as tell more blocks apart, equally many on both sides."""
+    """The stable colours of both sides, after equally many rounds."""
     count = 0
     while (reached := len({*olds.values(), *laters.values()})) > count:
         count = reached
@@ -291,7 +293,7 @@ def _one_round(colours: _Colours, ends: Mapping[str, _Ends], paired: _Colours) -
 
 
 def _content(block: Block) -> tuple[object, ...]:
-    """What a block is without its name and layout, as a value that compares and hashes."""
+    """The content of a block without name and layout, as a hashable value."""
     values = ((rule.name, _value_content(block, rule)) for rule in block.own_parameters())
     return (block.type_name(), *values)
 

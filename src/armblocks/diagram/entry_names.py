@@ -1,4 +1,4 @@
-"""Names of the entries of vectors: stated by ports, kept by blocks that work entry by entry."""
+"""Names of vector entries: declared by ports, propagated through elementwise blocks."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from armblocks.equations import Shape
 
 
 def entry_names(diagram: Diagram, shapes: Mapping[str, Shape]) -> Mapping[str, tuple[str, ...]]:
-    """Names of the entries of signals, by path; a signal about which nothing is known is left out.
+    """Names of the entries of signals, by path; signals without known names are omitted.
 
-    A port states names where its block has a robot. They hold for the signal at the port, and for all
-    vectors of the same length that blocks work out of it entry by entry. A signal that is called by two rows
-    of names has none. ``shapes`` are those of all signals. For people only.
+    Ports of robot blocks declare names. They apply to the signal at the port, and to all vectors of the same
+    length that elementwise blocks compute from it. A signal with two different lists of names has none.
+    ``shapes`` are those of all signals. Names are for display only.
     """
     flat = flat_diagram(diagram)
     if not any(_may_state_names(block) for block in flat.blocks.values()):
@@ -51,20 +51,20 @@ def _alike(
     yield from ((by_name[one], by_name[other]) for one, other in block.output_rates.items())
     yield from ((by_name[one], by_name.get(other, "")) for one, other in block.time_derivatives.items())
     if type(block).output_shapes is Block.output_shapes and not block.virtual:
-        # A block without a rule of its own for shapes works entry by entry.
+        # A block without its own shape rule is elementwise.
         ends = [path for port, path in outputs.items() if port.shape is None]
         ends += [path for port, path in inputs.items() if port.shape is None]
         yield from ((ends[0], end) for end in ends[1:])
 
 
 class _Groups:
-    """Signals that belong together."""
+    """Disjoint sets of signals (union-find)."""
 
     def __init__(self) -> None:
         self._next: dict[str, str] = {}
 
     def of(self, path: str) -> str:
-        """The signal that stands for the group of another."""
+        """The representative of the set of a signal."""
         root = path
         while root in self._next:
             root = self._next[root]
@@ -73,7 +73,7 @@ class _Groups:
         return root
 
     def join(self, one: str, other: str) -> None:
-        """Put the groups of two signals together."""
+        """Merge the sets of two signals."""
         first, second = self.of(one), self.of(other)
         if first != second:
             self._next[second] = first

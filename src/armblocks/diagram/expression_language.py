@@ -29,13 +29,13 @@ from armblocks.equations import elementary
 from armblocks.errors import InputError, UnknownNameError
 
 LONGEST = 4000
-"""Characters of a formula; long ones are diagrams."""
+"""Maximum number of characters of a formula; longer ones should be diagrams."""
 DEEPEST = 60
-"""Levels of brackets and operators within each other."""
+"""Maximum nesting depth of brackets and operators."""
 
 
 def _quotient(left: SX, right: SX) -> SX:
-    """CasADi takes every constant over zero for plus infinity, -1/0 and 0/0 too."""
+    """CasADi evaluates every constant divided by zero as plus infinity, also -1/0 and 0/0."""
     if not (left.is_constant() and right.is_constant()):
         return left / right
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -65,13 +65,13 @@ _SIDES: Mapping[type[ast.cmpop], float] = {
     ast.GtE: 1e-300,
     ast.Lt: 1e-300,
 }
-"""Beside a border by less than any signal can tell: it gives the border itself a side."""
+"""An offset below any signal resolution: it assigns the border itself to one side."""
 
 
 class Formula:
-    """A parsed formula; the names in it are not known yet.
+    """A parsed formula with unresolved names.
 
-    Raises ``InputError`` where the text is no formula, saying the place and what is allowed.
+    Raises ``InputError`` with the position and the allowed syntax where the text is not a formula.
     """
 
     def __init__(self, text: str, where: str, *, longest: int = LONGEST) -> None:
@@ -80,34 +80,34 @@ class Formula:
             raise self._error(f"the formula has {len(text)} characters", f"at most {longest}")
         for mark in ("@", "//"):
             if mark in text:
-                raise self._error(f"'{_short(text)}' has no meaning in a formula", _ALLOWED)
+                raise self._error(f"'{_short(text)}' is not allowed in a formula", _ALLOWED)
         self._spelt = spelt = python_spelling(text, where)
         try:
             self._tree = powers_from_the_left(ast.parse(spelt, mode="eval").body, spelt)
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             reason = error.msg if isinstance(error, SyntaxError) else "it is nested too deeply"
-            raise self._error(f"'{_short(text)}' is no formula: {reason}", _ALLOWED) from None
+            raise self._error(f"'{_short(text)}' is not a formula: {reason}", _ALLOWED) from None
 
     @property
     def names(self) -> frozenset[str]:
-        """The names that have to be given: all but constants and functions."""
+        """The free names: all names except constants and functions."""
         found = {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
         return frozenset(
             found - {*CONSTANTS, *FUNCTIONS, *MATRIX_FUNCTIONS, *MAKERS, CALLED_IF, CALLED_RANGE}
         )
 
     def trace(self, names: Mapping[str, SX]) -> SX:
-        """The formula's value where its names have these; vectors are columns, scalars spread over arrays.
+        """The value of the formula for these names; vectors are columns, scalars are broadcast.
 
-        Raises ``UnknownNameError`` for a name or function that does not exist, ``InputError`` for the rest.
+        Raises ``UnknownNameError`` for an unknown name or function, ``InputError`` for other errors.
         """
         return self._value(self._tree, {**_constants(), **names}, 0)
 
     def borders(self, names: Mapping[str, SX]) -> list[SX]:
-        """Quantities at whose zeros a comparison in the formula changes: left less right of each.
+        """Quantities whose zeros are the changes of comparisons in the formula: left minus right of each.
 
-        Equality has the side on which the comparison is as it says. Of a formula that compares nothing, its
-        own value.
+        At equality the offset gives the value of the comparison. For a formula without comparisons the result
+        is its value.
         """
         known = {**_constants(), **names}
         found: list[SX] = []
@@ -147,14 +147,14 @@ class Formula:
             return self._element(node.value.id, node.slice, names)
         if isinstance(node, ast.List) and all(isinstance(row, ast.List) for row in node.elts):
             return self._array(cast("list[ast.List]", node.elts), names, depth)
-        if isinstance(node, ast.Attribute) and node.attr == "T":  # what ' is spelt as
+        if isinstance(node, ast.Attribute) and node.attr == "T":  # the spelling of '
             return _plain(self._value(node.value, names, depth + 1).T)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
             return self._call(node.func.id, node.args, names, depth)
-        raise self._error(f"'{_short(ast.unparse(node))}' has no meaning in a formula", _ALLOWED)
+        raise self._error(f"'{_short(ast.unparse(node))}' is not allowed in a formula", _ALLOWED)
 
     def _chain(self, node: ast.BinOp, names: Mapping[str, SX], depth: int) -> SX:
-        """a + b + c + …: deep in the tree, but not for a reader."""
+        """a + b + c + …: deep in the syntax tree but not nested in the text."""
         links: list[tuple[ast.operator, ast.expr]] = []
         first: ast.expr = node
         while isinstance(first, ast.BinOp):
@@ -164,14 +164,14 @@ class Formula:
         for operator, right in reversed(links):
             kind = type(operator)
             if kind not in _OPERATORS:
-                raise self._error(f"'{_short(ast.unparse(node))}' has no meaning in a formula", _ALLOWED)
+                raise self._error(f"'{_short(ast.unparse(node))}' is not allowed in a formula", _ALLOWED)
             operand = self._value(right, names, depth + 1)
             if kind is ast.Mult and _is_matrix(value, operand):
                 value = self._product(value, operand)
             elif kind is ast.Pow and _is_matrix(value, operand, spread=True):
-                raise self._error("a power of a matrix is asked for", "powers of numbers and vectors")
+                raise self._error("powers of matrices are not supported", "powers of numbers and vectors")
             elif kind is ast.Div and operand.numel() != 1 and _is_matrix(value, operand):
-                raise self._error("a matrix stands behind /", "inv(A) * b, or ./ to divide by element")
+                raise self._error("the divisor is a matrix", "inv(A) * b, or ./ for elementwise division")
             else:
                 value = self._together(_OPERATORS[kind], value, operand)
         return value
@@ -183,17 +183,17 @@ class Formula:
         if left.shape[1] != right.shape[0]:
             raise self._error(
                 f"a matrix of {_size(left)} is multiplied by one of {_size(right)}",
-                "as many columns on the left as rows on the right; .* goes by element",
+                "as many columns on the left as rows on the right; .* multiplies elementwise",
             )
         return _plain(mtimes(left, right))
 
     def _array(self, rows: list[ast.List], names: Mapping[str, SX], depth: int) -> SX:
-        """``[1 2; 3 4]``: every row is what its numbers and vectors give one after the other."""
+        """``[1 2; 3 4]``: every row concatenates its numbers and vectors."""
         values = [] if rows else [SX(0, 1)]
         for row in rows:
             entries = [self._value(entry, names, depth + 1) for entry in row.elts]
             if any(entry.shape[1] > 1 for entry in entries):
-                raise self._error("a matrix stands inside brackets", "numbers and vectors inside brackets")
+                raise self._error("a matrix is inside brackets", "numbers and vectors inside brackets")
             values.append(vertcat(*entries))
         if len(values) == 1 or all(value.numel() == 1 for value in values):
             return vertcat(*values)
@@ -211,7 +211,7 @@ class Formula:
             try:
                 return _plain(MATRIX_FUNCTIONS[name](argument))
             except ValueError as error:
-                raise self._error(str(error), f"another argument of {name}") from None
+                raise self._error(str(error), f"a different argument of {name}") from None
         if name in MAKERS or name == CALLED_RANGE:
             return self._made(name, [self._value(part, names, depth + 1) for part in arguments])
         if name not in FUNCTIONS:
@@ -223,9 +223,11 @@ class Formula:
         return self._together(function, *(self._value(part, names, depth + 1) for part in arguments))
 
     def _made(self, name: str, arguments: list[SX]) -> SX:
-        """An array whose size the arguments say, which have to be numbers that no input moves."""
+        """An array whose size is given by constant arguments."""
         if not all(argument.numel() == 1 and argument.is_constant() for argument in arguments):
-            raise self._error(f"the size of an array made by {_called(name)} moves", "numbers that are known")
+            raise self._error(
+                f"the size of an array made by {_called(name)} is not constant", "constant numbers"
+            )
         numbers = [float(argument) for argument in arguments]
         try:
             array = range_of(*numbers) if name == CALLED_RANGE else MAKERS[name](*numbers)
@@ -238,7 +240,7 @@ class Formula:
         value = self._look_up(name, names)
         if not (isinstance(index, ast.Constant) and type(index.value) is int):
             raise self._error(
-                f"'{name}[{_short(ast.unparse(index))}]' has no fixed index", f"{name}[1] and so on"
+                f"'{name}[{_short(ast.unparse(index))}]' has no constant index", f"{name}[1] and so on"
             )
         if value.shape[1] > 1:
             raise self._error(f"'{name}[{index.value}]' is an element of a matrix", "elements of vectors")
@@ -261,13 +263,13 @@ class Formula:
         sizes = {value.numel() for value in values} - {1}
         if len(shapes) > 1 and any(columns > 1 for _, columns in shapes):
             raise self._error(
-                f"arrays of {' and '.join(sorted(f'{m} x {n}' for m, n in shapes))} numbers meet",
-                "arrays of one size, and numbers with anything",
+                f"arrays of {' and '.join(sorted(f'{m} x {n}' for m, n in shapes))} numbers are combined",
+                "arrays of equal size, and scalars with any array",
             )
         if len(shapes) > 1:
             raise self._error(
-                f"vectors of {' and '.join(map(str, sorted(sizes)))} elements meet",
-                "vectors of one length, and scalars with anything",
+                f"vectors of {' and '.join(map(str, sorted(sizes)))} elements are combined",
+                "vectors of equal length, and scalars with any vector",
             )
         return function(*values)
 
@@ -290,12 +292,12 @@ def _constants() -> dict[str, SX]:
 
 
 def _plain(value: SX) -> SX:
-    """Vectors are columns, however they came about."""
+    """Vectors as columns, whatever their origin."""
     return value.T if value.shape[0] == 1 and value.shape[1] > 1 else value
 
 
 def _is_matrix(left: SX, right: SX, *, spread: bool = False) -> bool:
-    """Whether a matrix takes part in an operation, beside another array or, ``spread``, beside anything."""
+    """Whether a matrix is an operand together with another array or, with ``spread``, with any operand."""
     beside = spread or not (left.numel() == 1 or right.numel() == 1)
     return beside and (left.shape[1] > 1 or right.shape[1] > 1)
 

@@ -1,4 +1,4 @@
-"""The words of formulas: constants, and functions by name. A new one is one line here."""
+"""Constants and functions of formulas, by name. A new one is one line here."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from armblocks.equations import elementary
 
 MOST_ELEMENTS = 100_000
-"""Numbers of an array that a function makes."""
+"""Maximum number of elements of an array that a function creates."""
 
 
 def _elementary(name: str) -> Callable[..., SX]:
@@ -70,7 +70,7 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., SX]]] = {
     "rad2deg": (1, _degrees),
     "if": (3, _where),
 }
-"""Functions by name: how many arguments they take, and what they give; of vectors, element by element."""
+"""Elementwise functions by name: number of arguments, and implementation."""
 
 MATRIX_FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
     "transpose": casadi.transpose,
@@ -79,12 +79,12 @@ MATRIX_FUNCTIONS: Mapping[str, Callable[[SX], SX]] = {
     "sum": casadi.sum1,
     "norm": casadi.norm_fro,
 }
-"""Functions of one whole vector or matrix."""
+"""Functions of one vector or matrix as a whole."""
 
 
 def _count(number: float) -> int:
     if not (number >= 0 and number == int(number) and number <= MOST_ELEMENTS):
-        raise ValueError(f"{number:g} is no count of elements")
+        raise ValueError(f"{number:g} is not a number of elements")
     return int(number)
 
 
@@ -106,7 +106,7 @@ def range_of(first: float, step: float, last: float | None = None) -> NDArray[np
         step, last = 1.0, step
     if step == 0 or not math.isfinite(last - first):
         raise ValueError("the steps do not lead from the first to the last number")
-    # As many as fit, where rounding may be off by a hair.
+    # The number of steps that fit, with a tolerance for rounding.
     count = _count(max(0.0, math.floor((last - first) / step * (1 + 4e-16) + 1e-10) + 1.0))
     return first + step * np.arange(count, dtype=np.float64)
 
@@ -130,4 +130,4 @@ MAKERS: Mapping[str, Callable[..., NDArray[np.float64]]] = {
     "ones": _ones,
     "linspace": _linspace,
 }
-"""Functions whose arguments say the size of the array that they make."""
+"""Functions whose arguments give the size of the created array."""

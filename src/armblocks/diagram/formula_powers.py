@@ -1,8 +1,8 @@
 """Powers as MATLAB reads them: ``a^b^c`` is ``(a^b)^c`` and ``a^-b^c`` is ``(a^-b)^c``.
 
-Python reads both from the right, ``a ** (b ** c)`` and ``a ** -(b ** c)``. Its trees know no brackets, but
-say where in the text each part stands, and so whether a bracket was opened before it. Source: MathWorks,
-*Operator Precedence*: operators of one level go from left to right; a sign behind ``^`` belongs to its
+Python reads both from the right, ``a ** (b ** c)`` and ``a ** -(b ** c)``. Its syntax trees have no brackets,
+but they have the text position of each node, which shows whether a bracket precedes it. Source: MathWorks,
+*Operator Precedence*: operators of equal precedence are left-associative; a sign after ``^`` belongs to its
 operand.
 """
 
@@ -12,7 +12,7 @@ import ast
 
 
 def powers_from_the_left(tree: ast.expr, text: str) -> ast.expr:
-    """The tree of ``text``, in whose rows of powers the first is taken first. The tree itself is changed."""
+    """Make chains of powers in the tree of ``text`` left-associative. Changes the tree in place."""
     lines = [line.encode() for line in text.splitlines()]
     todo: list[ast.AST] = [tree]
     while todo:
@@ -30,7 +30,7 @@ def powers_from_the_left(tree: ast.expr, text: str) -> ast.expr:
 
 
 def _behind_signs(node: ast.BinOp, lines: list[bytes]) -> tuple[list[ast.UnaryOp], ast.BinOp | None]:
-    """The signs behind ``^``, and the power that follows them without a bracket, if one does."""
+    """The signs after ``^``, and the power that follows them without a bracket, if any."""
     signs: list[ast.UnaryOp] = []
     start = (node.left.end_lineno or 1, node.left.end_col_offset or 0)
     part = node.right
@@ -45,7 +45,7 @@ def _behind_signs(node: ast.BinOp, lines: list[bytes]) -> tuple[list[ast.UnaryOp
 
 
 def _with_signs(signs: list[ast.UnaryOp], operand: ast.expr) -> ast.expr:
-    """The operand behind the signs that stood before a power."""
+    """The operand after the signs that preceded a power."""
     if not signs:
         return operand
     signs[-1].operand = operand
@@ -55,7 +55,7 @@ def _with_signs(signs: list[ast.UnaryOp], operand: ast.expr) -> ast.expr:
 
 
 def _opens(lines: list[bytes], start: tuple[int, int], end: tuple[int, int]) -> bool:
-    """Whether a bracket is opened between two places, each a line from 1 and a byte in it."""
+    """Whether a bracket is opened between two positions (line from 1, byte offset)."""
     (row, begin), (last, stop) = start, end
     if row == last:
         return b"(" in lines[row - 1][begin:stop]

@@ -1,8 +1,7 @@
-"""The spelling of formulas: from what engineers type, ``[1 2; 3 4]' * k``, to what Python's grammar reads.
+"""Translation of MATLAB-like formulas, ``[1 2; 3 4]' * k``, into Python syntax.
 
-Only the spelling changes here; what a formula may say is for :mod:`armblocks.diagram.expression_language`.
-Inside brackets, spaces part elements as in MATLAB: ``[a -b]`` has two elements, ``[a - b]`` and ``[a-b]``
-one.
+:mod:`armblocks.diagram.expression_language` checks which constructs are allowed. Inside brackets, spaces
+separate elements as in MATLAB: ``[a -b]`` has two elements, ``[a - b]`` and ``[a-b]`` one.
 """
 
 from __future__ import annotations
@@ -13,11 +12,11 @@ from collections.abc import Iterator
 from armblocks.errors import InputError
 
 CALLED_IF = "if_"
-"""``if`` is a word that Python keeps for itself."""
+"""``if`` is a keyword of Python."""
 CALLED_RANGE = "range_"
 """``a:b`` and ``a:step:b`` inside brackets."""
 DEEPEST = 20
-"""Brackets within brackets."""
+"""Maximum nesting depth of brackets."""
 
 _OPERATORS = (
     (r"\.\*(?!\*)", "@"),
@@ -30,11 +29,11 @@ _OPERATORS = (
 )
 _OPERAND_END = re.compile(r"[\w.)\]']")
 _ONE_ELEMENT = "*/^<>=&|,;:"
-"""Beside one of these a space parts nothing."""
+"""Next to one of these characters a space does not separate elements."""
 
 
 def python_spelling(text: str, where: str) -> str:
-    """The formula in Python's spelling. Raises ``InputError`` for brackets that do not fit together."""
+    """The formula in Python syntax. Raises ``InputError`` for unbalanced brackets."""
     if "[" in text or "'" in text:
         text = "".join(_Brackets(text, where).rewritten())
     text = re.sub(r"\bif\s*\(", f"{CALLED_IF}(", text)
@@ -45,7 +44,7 @@ def python_spelling(text: str, where: str) -> str:
 
 
 class _Brackets:
-    """Reads a text once from left to right; arrays become lists of rows, ``'`` becomes ``.T``."""
+    """Reads a text once, from left to right; arrays become lists of rows, ``'`` becomes ``.T``."""
 
     def __init__(self, text: str, where: str) -> None:
         self._text = text
@@ -70,7 +69,7 @@ class _Brackets:
             self._place += 1
             return " .T"
         if mark == "'" and _OPERAND_END.fullmatch(before):
-            return " .T"  # the space keeps the point out of a number before it
+            return " .T"  # the space separates the point from a preceding number
         return mark
 
     def _index(self, depth: int) -> str:
@@ -101,12 +100,12 @@ class _Brackets:
             else:
                 rows[-1][-1] += self._piece(depth)
         self._place += 1
-        # A space before a comma or the end parts nothing from nothing.
+        # A space before a comma or the end separates no elements.
         shown = [[_ranged(entry) for entry in row if entry.strip()] for row in rows]
         return "[" + ", ".join("[" + ", ".join(row) + "]" for row in shown if row) + "]"
 
     def _parts(self, before: str) -> bool:
-        """Whether the spaces here stand between two elements; they are passed over."""
+        """Skip spaces; return whether they separate two elements."""
         while self._mark().isspace():
             self._place += 1
         after = self._text[self._place : self._place + 2]

@@ -1,4 +1,4 @@
-"""What a Python function of the user's depends on: its code, and everything outside of it that it names."""
+"""The content of a user's Python function for hashing: its code, and the global names that it uses."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ _PURE_BUILTINS = frozenset(
     )
 )
 _KNOWN_MODULES = ("math", "cmath", "numpy", "casadi", "armblocks")
-"""Modules whose content their versions tell."""
+"""Modules whose content is identified by their versions."""
 _READING = frozenset(
     ("fromfile", "fromregex", "genfromtxt", "load", "loadtxt", "memmap", "open_memmap", "random")
 )
-"""Names in those modules that give what a file holds, or something else each time."""
+"""Names in those modules whose results depend on files, or differ at each call."""
 
 
 class UnknownContentError(Exception):
-    """What something depends on cannot be known; only :func:`~armblocks.diagram.content_key` sees it."""
+    """The content cannot be determined; caught by :func:`~armblocks.diagram.content_key`."""
 
 
 def function_parts(function: Callable[..., object]) -> list[object]:
-    """Values that change whenever what the function works out might: plain ones, lists, arrays, texts.
+    """Values that identify the function: numbers, lists, arrays, texts.
 
-    Code, defaults, what it holds of the function around it, and the content of the global names that it uses,
-    functions among them included. Raises ``UnknownContentError`` where the content of a name cannot be known.
+    They cover code, default values, closure variables, and the content of the global names that it uses,
+    including functions. Raises ``UnknownContentError`` where the content of a name cannot be determined.
     """
     return _parts(function, [])
 
@@ -66,7 +66,7 @@ def _parts(function: object, above: list[object]) -> list[object]:
     try:
         cells = [cell.cell_contents for cell in function.__closure__ or ()]
     except ValueError:
-        raise UnknownContentError("a variable that has no value yet") from None
+        raise UnknownContentError("a closure variable without a value") from None
     outside = cast("dict[str, object]", function.__globals__)
     parts: list[object] = ["code", *_code_parts(function.__code__)]
     parts += [_value(value, above) for value in function.__defaults__ or ()]
@@ -81,7 +81,7 @@ def _parts(function: object, above: list[object]) -> list[object]:
 
 
 def _value(value: object, above: list[object]) -> object:
-    """What a name stands for."""
+    """The object of a global name."""
     if isinstance(value, ModuleType):
         if not _is_known_module(value.__name__):
             raise UnknownContentError(value.__name__)
@@ -99,7 +99,7 @@ def _value(value: object, above: list[object]) -> object:
 
 
 def _code_parts(code: CodeType) -> list[object]:
-    """The instructions with all that they are read with; names of files and numbers of lines are left out."""
+    """The bytecode with its constants and names, without file names and line numbers."""
     constants = [_constant(entry) for entry in code.co_consts]
     names = [list(part) for part in (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)]
     counts = [code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags]
@@ -116,11 +116,11 @@ def _constant(entry: object) -> object:
 
 
 def _global_names(code: CodeType) -> set[str]:
-    """Names that are looked up outside of the function.
+    """The global names that the function uses.
 
-    Raises ``UnknownContentError`` where it imports a module of its user's or reads files.
+    Raises ``UnknownContentError`` where it imports a user's module or reads files.
     """
-    import dis  # most diagrams have no function
+    import dis  # imported here: most diagrams have no function
 
     found: set[str] = set()
     for instruction in dis.get_instructions(code):

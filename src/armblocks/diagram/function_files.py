@@ -1,4 +1,4 @@
-"""Python functions of files, such as trusted diagrams name: the only place where a file's code is run."""
+"""Python functions in files of trusted diagrams: the only place that runs the code of a file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.errors import FormatError
 
 
 def load_function(reference: str, folder: Path | None) -> Callable[..., object]:
-    """The function that ``file.py:name`` means. **Runs the file.**
+    """The function ``file.py:name``. **Runs the file.**
 
     The path is relative to ``folder``. Raises ``FormatError`` where there is no such file or function, or the
     file's code fails.
@@ -19,7 +19,7 @@ def load_function(reference: str, folder: Path | None) -> Callable[..., object]:
     file = Path(path) if folder is None else folder / path
     if not path.endswith(".py") or not name.isidentifier() or not file.is_file():
         raise FormatError(
-            f"'{reference}' names no function of a file",
+            f"'{reference}' is not a function of a file",
             allowed="file.py:name, relative to the diagram",
             where=f"function '{reference[:80]}'",
             fix="write the file's path from the diagram's folder, a colon, and the function's name",
@@ -34,7 +34,7 @@ def load_function(reference: str, folder: Path | None) -> Callable[..., object]:
         raise FormatError(
             f"the code of {path} fails: {type(error).__name__}: {error}"[:300],
             where=str(file),
-            fix="run the file with Python, and correct what it says",
+            fix="run the file with Python, and correct the reported error",
         ) from error
     found = vars(module).get(name)
     if not callable(found):
@@ -42,6 +42,6 @@ def load_function(reference: str, folder: Path | None) -> Callable[..., object]:
             f"{path} has no function named '{name}'",
             fix="correct the name",
             where=str(file),
-            allowed="a function that the file defines at its top",
+            allowed="a function at the top level of the file",
         )
     return found

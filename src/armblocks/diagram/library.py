@@ -1,4 +1,4 @@
-"""The kinds of blocks that exist, by name and by family."""
+"""The library of block types, by name and by family."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from armblocks.errors import DiagramError, UnknownNameError
 
 
 class BlockLibrary(Mapping[str, type[Block]]):
-    """Kinds of blocks by type name, ``library["Gain"]``; an unknown name raises with the nearest ones.
+    """Block types by name, ``library["Gain"]``; an unknown name raises an error with the nearest names.
 
-    ``families``: the kinds of each family, in the order of lists.
+    ``families``: the types of each family, in display order.
     """
 
     def __init__(self, families: Mapping[str, Iterable[type[Block]]]) -> None:
@@ -36,9 +36,9 @@ class BlockLibrary(Mapping[str, type[Block]]):
         return len(self._kinds)
 
     def with_kinds(self, family: str, kinds: Iterable[type[Block]]) -> BlockLibrary:
-        """This library and further kinds of one family.
+        """This library with further types of one family.
 
-        Raises ``DiagramError`` for a type name that another kind has already.
+        Raises ``DiagramError`` for a type name that exists already.
         """
         added = tuple(kinds)
         for kind in added:
@@ -46,18 +46,18 @@ class BlockLibrary(Mapping[str, type[Block]]):
                 raise DiagramError(
                     f"there is a block type named '{kind.type_name()}' already",
                     where=f"{kind.__module__}.{kind.__qualname__}",
-                    allowed="names of classes that no block of the library has",
+                    allowed="class names that are not in the library",
                     fix="rename the class",
                 )
         return BlockLibrary({**self._families, family: (*self._families.get(family, ()), *added)})
 
     @property
     def families(self) -> Mapping[str, tuple[type[Block], ...]]:
-        """The kinds of each family, both in the order of lists."""
+        """The types of each family, both in display order."""
         return self._families
 
     def family_of(self, kind: type[Block]) -> str:
-        """The family of a kind; a kind that is not in the library has none and raises."""
+        """The family of a type; raises an error for a type that is not in the library."""
         try:
             return self._family_of[kind]
         except KeyError:

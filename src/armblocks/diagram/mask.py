@@ -1,14 +1,13 @@
-"""Parameters of a whole diagram, its *mask*, and formulas over them in the places of its blocks' values.
+"""Parameters of a diagram, its *mask*, and formulas of them as parameter values of its blocks.
 
 A diagram declares parameters as a block does: name, default, unit, meaning, bounds. Inside it, a block's
-parameter may be a formula over these names, ``2*pi*f`` or ``[1 2; 3 4]*gain``. Nothing else is in scope: not
-the parameters of diagrams further out, and no signal. Of a subsystem the mask is what one sees from outside:
-its parameters are the block's own, ``servo.stiffness``, and may themselves be formulas over the names of the
-diagram around it.
+parameter may be a formula over these names, ``2*pi*f`` or ``[1 2; 3 4]*gain``. Nothing else is in scope:
+neither the parameters of outer diagrams nor signals. Outside, the mask parameters are parameters of the
+subsystem block, ``servo.stiffness``, and may be formulas of the parameters of the enclosing diagram.
 
-The blocks of a diagram always have the values that their formulas give: the text is kept beside the value. So
-all that looks at blocks finds numbers, and a diagram with masks is the same, to the last bit, as one in which
-somebody has put in the numbers.
+The blocks of a diagram always have evaluated formulas: the text is kept beside the value. All other code
+finds numbers in blocks, and a diagram with masks gives exactly the same results as one with the numbers typed
+in.
 """
 
 from __future__ import annotations
@@ -29,18 +28,18 @@ from armblocks.diagram.parameter import Parameter, ParameterKind, Value, kind_of
 from armblocks.errors import InputError, UnknownNameError
 
 Scope = Mapping[str, Value]
-"""What the names in a formula are: the values of a mask."""
+"""The scope of a formula: the values of a mask by name."""
 
 _NUMBERS = (ParameterKind.NUMBER, ParameterKind.ARRAY, ParameterKind.INTEGER, ParameterKind.BOOLEAN)
 _KINDS = (*_NUMBERS, ParameterKind.CHOICE, ParameterKind.STRING, ParameterKind.ROBOT)
 _RESERVED = frozenset((*CONSTANTS, *FUNCTIONS, *MATRIX_FUNCTIONS, *MAKERS))
 LONGEST = 100_000
-"""Characters of a formula that stands for a value: it may be a table."""
+"""Maximum number of characters of a formula as a parameter value, which may be a table."""
 
 
 @dataclass(frozen=True)
 class ParameterFormula:
-    """A formula in the place of a parameter's value; :func:`formula` makes one."""
+    """A formula as a parameter value; :func:`formula` creates one."""
 
     text: str
 
@@ -49,11 +48,11 @@ class ParameterFormula:
 
 
 def formula(text: str) -> Any:
-    """A formula over the mask's parameters in the place of a block's value: ``Gain(gain=formula("2*k"))``.
+    """A formula of mask parameters as the value of a block parameter: ``Gain(gain=formula("2*k"))``.
 
-    It may use the names of the parameters that the diagram around the block declares, ``pi``, ``e``,
-    ``deg``, arrays ``[1 2; 3 4]``, and the functions of :mod:`armblocks.diagram.formula_functions`. Raises
-    ``InputError`` where the text is no formula.
+    It may use the parameters that the enclosing diagram declares, ``pi``, ``e``, ``deg``, arrays ``[1 2; 3
+    4]``, and the functions of :mod:`armblocks.diagram.formula_functions`. Raises ``InputError`` where the
+    text is not a formula.
     """
     _parsed(text, "")
     return ParameterFormula(text)
@@ -62,10 +61,10 @@ def formula(text: str) -> Any:
 def mask_parameter(name: str, default: Any, *, doc: str = "", unit: str = "", **rules: Any) -> Parameter:
     """A parameter that a diagram declares, with the rules of :func:`armblocks.diagram.parameter`.
 
-    ``kind`` is told by the default; for a robot it is ``"robot"``.
+    ``kind`` follows from the default; for a robot it is ``"robot"``.
 
-    Raises ``InputError`` for a name that is no name in formulas, for a kind that no mask has, and for a
-    default that breaks its own rules.
+    Raises ``InputError`` for a name that is not valid in formulas, for an unsupported kind, and for a default
+    that violates the rules.
     """
     given = rules.pop("kind", None)
     kind = kind_of(default, rules) if given is None else ParameterKind(given)
@@ -82,14 +81,14 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
             raise InputError(
                 f"'{name}' cannot be the name of a mask parameter",
                 where=where,
-                allowed="names made of letters, digits and _ that mean nothing else in formulas",
+                allowed="names of letters, digits and _ that have no other meaning in formulas",
                 fix="choose another name",
             )
         if any(name == other.name for other in found):
             raise InputError(
                 f"the mask parameter '{name}' is declared twice",
                 where=where,
-                allowed="every name once",
+                allowed="unique names",
                 fix="remove one of the two",
             )
         if rule.kind not in _KINDS or rule.required:
@@ -101,7 +100,7 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
                 fix="give it a default of another kind",
             )
         place = f"{where}, mask parameter '{name}'"
-        # Whether a value may change during a run follows from what depends on it: see the module mask_tuning.
+        # Whether a value is tunable follows from the parameters that depend on it: see mask_tuning.
         lists = {"choices": tuple(rule.choices), "dimensions": tuple(rule.dimensions)}
         default = rule.check(rule.default, place)
         found.append(dataclasses.replace(rule, tunable=False, default=default, **lists))
@@ -109,14 +108,15 @@ def checked_mask(mask: Sequence[Parameter], where: str) -> tuple[Parameter, ...]
 
 
 def formula_names(text: str, where: str = "") -> frozenset[str]:
-    """The parameters that a formula reads. Raises ``InputError`` where the text is no formula."""
+    """The parameters that a formula reads. Raises ``InputError`` where the text is not a formula."""
     return _parsed(text, where).names
 
 
 def formula_number(text: str, where: str) -> float | list[Any]:
     """The number, vector or matrix that a formula without parameters gives; a row or a column is a vector.
 
-    Raises ``UnknownNameError`` for a name that is no constant, ``InputError`` where the text is no formula.
+    Raises ``UnknownNameError`` for a name that is not a constant, ``InputError`` where the text is not a
+    formula.
     """
     return _evaluated(text, (), where)
 
@@ -124,8 +124,8 @@ def formula_number(text: str, where: str) -> float | list[Any]:
 def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value:
     """The checked value of a parameter whose formula is ``text``.
 
-    A formula that is the name of a parameter gives its value, of whatever kind; others give numbers. Raises
-    ``UnknownNameError`` for a name that is not in scope and ``InputError`` for the rest.
+    A formula that consists of a parameter name gives its value of any kind; other formulas give numbers.
+    Raises ``UnknownNameError`` for a name that is not in scope and ``InputError`` for other errors.
     """
     place = f"{where}, parameter '{rule.name}'"
     found = _parsed(text, place)
@@ -140,19 +140,19 @@ def formula_value(rule: Parameter, text: str, scope: Scope, where: str) -> Value
             f"the formula '{text[:60]}' gives numbers",
             where=place,
             allowed="the name of a mask parameter, as the value is " + rule.describe(),
-            fix="name a mask parameter that has such a value",
+            fix="use the name of a mask parameter with such a value",
         )
     used = tuple((name, scope[name]) for name in sorted(found.names))
     return rule.check(_of_kind(rule.kind, _evaluated(text, used, place)), place)
 
 
 def formula_symbols(text: str, names: Mapping[str, SX]) -> SX:
-    """What a formula is for symbols: numbers, vectors as columns, matrices."""
+    """A formula evaluated for symbols: numbers, vectors as columns, matrices."""
     return _parsed(text, "").trace(names)
 
 
 def as_symbols(value: Value) -> SX | None:
-    """A value as constant symbols; ``None`` for one that is no number."""
+    """A value as a constant expression; ``None`` if it is not a number."""
     if isinstance(value, int | float | tuple):
         array = np.asarray(value, dtype=np.float64)
         return SX(array.reshape(-1, 1) if array.ndim < 2 else array)
@@ -171,9 +171,9 @@ def _evaluated(text: str, used: tuple[tuple[str, Value], ...], where: str) -> fl
         symbols = as_symbols(value)
         if symbols is None:
             raise InputError(
-                f"the mask parameter '{name}' is {type(value).__name__}, which is no number",
+                f"the mask parameter '{name}' is {type(value).__name__}, which is not a number",
                 where=where,
-                allowed="numbers in formulas; such a value alone, as the whole formula",
+                allowed="numbers in formulas; for other values the name alone as the whole formula",
                 fix=f"write {name} alone",
             )
         names[name] = symbols
@@ -184,7 +184,7 @@ def _evaluated(text: str, used: tuple[tuple[str, Value], ...], where: str) -> fl
 
 
 def _of_kind(kind: ParameterKind, value: float | list[Any]) -> float | list[Any]:
-    """Whole numbers and truth values are numbers in formulas."""
+    """Integers and booleans are numbers in formulas."""
     if not isinstance(value, float):
         return value
     if kind is ParameterKind.INTEGER and value.is_integer():
@@ -195,9 +195,9 @@ def _of_kind(kind: ParameterKind, value: float | list[Any]) -> float | list[Any]
 
 
 def values_of(mask: Sequence[Parameter], given: Mapping[str, object], where: str) -> dict[str, Value]:
-    """The checked value of every parameter of a mask: what is given, else its default.
+    """The checked value of every parameter of a mask: the given value, else the default.
 
-    Raises ``UnknownNameError`` for a name that the mask has not, ``InputError`` for a value.
+    Raises ``UnknownNameError`` for a name that is not in the mask, ``InputError`` for an invalid value.
     """
     known = [rule.name for rule in mask]
     for name in given:

@@ -1,4 +1,4 @@
-"""What follows from a parameter of a mask: which parameters of blocks, and whether it may change in a run."""
+"""The block parameters that depend on a mask parameter, and whether it may change during a run."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from armblocks.errors import InputError, UnknownNameError
 
 @dataclass
 class Followers:
-    """What follows by formulas from one mask parameter, by path, at any depth.
+    """The parameters that depend on one mask parameter through formulas, by path, at any depth.
 
     ``tunable``: parameters that stay inputs of the compiled system, as formulas of the mask parameter's
-    symbol. ``structural``: those that belong to the structure.
+    symbol. ``structural``: those that are constants of the equations.
     """
 
     tunable: dict[str, SX] = field(default_factory=dict[str, SX])
@@ -41,9 +41,9 @@ def mask_parameters(diagram: Diagram) -> Mapping[str, tuple[Diagram, Parameter]]
 
 
 def followers(diagram: Diagram, path: str, symbol: SX | None = None) -> Followers:
-    """What follows from the mask parameter of this path, whose value is ``symbol``.
+    """The parameters that depend on the mask parameter of this path, whose value is ``symbol``.
 
-    Raises ``UnknownNameError`` for a path that is no mask parameter's.
+    Raises ``UnknownNameError`` for a path that is not a mask parameter.
     """
     known = mask_parameters(diagram)
     if path not in known:
@@ -57,10 +57,10 @@ def followers(diagram: Diagram, path: str, symbol: SX | None = None) -> Follower
 
 
 def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
-    """A mask parameter as one of the equations: its change, and what that changes.
+    """A mask parameter as a parameter of the equations: its change, and the changes of dependent parameters.
 
-    Raises ``UnknownNameError`` for a path that is no mask parameter's, ``InputError`` for one that is no
-    number or from which something structural follows.
+    Raises ``UnknownNameError`` for a path that is not a mask parameter, ``InputError`` for one that is not a
+    number or on which a structural parameter depends.
     """
     known = mask_parameters(diagram)
     if path not in known:
@@ -70,7 +70,7 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
     now = as_symbols(value)
     if now is None or isinstance(value, bool):
         raise InputError(
-            f"the mask parameter '{path}' is {type(value).__name__}, which has no slope",
+            f"the mask parameter '{path}' is {type(value).__name__}, which has no derivative",
             where=f"diagram '{diagram.name}'",
             allowed="numbers and arrays",
             fix="choose another parameter",
@@ -80,10 +80,10 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
     found = followers(diagram, path, now + unflatten(change, slot.shape))
     if found.structural:
         raise InputError(
-            f"'{found.structural[0]}', which belongs to the structure, follows from '{path}'",
+            f"'{found.structural[0]}', which is not tunable, depends on '{path}'",
             where=f"diagram '{diagram.name}'",
-            allowed="parameters from which only tunable ones follow",
-            fix="take the difference of two runs for this one",
+            allowed="parameters on which only tunable parameters depend",
+            fix="use the difference of two runs for this parameter",
         )
     still = SX.zeros(slot.size)
     changes = {
@@ -94,7 +94,7 @@ def added_parameter(diagram: Diagram, path: str) -> AddedParameter:
 
 
 def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable[str]) -> HybridSystem:
-    """The equations of a diagram with those of ``names`` as parameters that are its masks'.
+    """The equations of a diagram with the mask parameters among ``names`` as parameters.
 
     Raises as :func:`added_parameter`.
     """
@@ -106,7 +106,7 @@ def with_mask_parameters(system: HybridSystem, diagram: Diagram, names: Iterable
 
 
 def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers) -> None:
-    """Look for formulas over the moved parameters of one diagram, and go on inside its subsystems."""
+    """Find formulas of the perturbed parameters in one diagram and, recursively, in its subsystems."""
     still = {
         name: symbols
         for name, value in level.mask_values.items()
@@ -119,7 +119,7 @@ def _follow(path: str, level: Diagram, moved: Mapping[str, SX], found: Followers
                 continue
             if isinstance(block, DiagramBlock) and parameter in block.diagram.mask_values:
                 if as_symbols(block.diagram.mask_values[parameter]) is None:
-                    inner[parameter] = SX.sym(parameter)  # a choice or a robot: no formula but its name
+                    inner[parameter] = SX.sym(parameter)  # a choice or a robot: the only formula is its name
                 else:
                     inner[parameter] = formula_symbols(text, {**still, **moved})
             elif _stays_input(block, parameter):
@@ -137,8 +137,7 @@ def _stays_input(block: Block, parameter: str) -> bool:
 def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
     """Path, rule and value of every parameter that may be changed while the diagram runs.
 
-    Those of masks first, then those of blocks that nothing else decides: no formula, and no library that the
-    block is part of.
+    Mask parameters come first, then parameters of blocks without a formula and outside library blocks.
     """
     levels = levels_of(diagram)
     linked = [f"{path}/" for path, level in levels.items() if level.link]
@@ -154,7 +153,7 @@ def tunable_parameters(diagram: Diagram) -> list[tuple[str, Parameter, Value]]:
         if as_symbols(level.mask_values[rule.name]) is not None and not followers(diagram, path).structural
     ]
     flat = flat_diagram(diagram)
-    # Blocks that share their parameters say the same under one name.
+    # Blocks that share parameters have the same paths.
     owners = {flat.owner(name): block for name, block in flat.blocks.items()}
     found += [
         (f"{name}.{rule.name}", rule, block.parameter_value(rule.name))

@@ -1,4 +1,4 @@
-"""Names of blocks: what is legal, and which two names are the same name to a reader."""
+"""Block names: which names are legal, and which names count as equal."""
 
 from __future__ import annotations
 
@@ -35,5 +35,5 @@ def check_block_name(name: str, where: str) -> None:
 
 
 def folded(name: str) -> str:
-    """The form in which two names are compared: case and Unicode composition make no difference."""
+    """The form in which names are compared: ignores case and Unicode composition."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFKD", name).casefold())

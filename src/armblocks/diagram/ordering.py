@@ -1,4 +1,4 @@
-"""In which order the groups of a diagram's blocks can be worked out, and which loops forbid one."""
+"""The evaluation order of the groups of a diagram's blocks, and the algebraic loops."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.diagram.port import PortRef
 from armblocks.errors import AlgebraicLoopError
 
 HELD = -1
-"""The group of what a sampled block holds between its ticks: it is there without being worked out."""
+"""The group of held outputs of a sampled block: these values are known between ticks without evaluation."""
 
 
 class Node(NamedTuple):
@@ -24,7 +24,7 @@ class Node(NamedTuple):
 
 
 class Value(NamedTuple):
-    """Where the value of a signal is found: a slot of a node."""
+    """The location of a signal's value: a slot of a node."""
 
     node: Node
     kind: SlotKind
@@ -33,9 +33,9 @@ class Value(NamedTuple):
 
 @dataclass(frozen=True)
 class Network:
-    """A diagram with the equations of its blocks: who needs whom.
+    """The dependency graph of a diagram with the equations of its blocks.
 
-    While the time flows, sampled blocks hold their outputs; at a tick (``ticking``) they work them out.
+    Between ticks sampled blocks hold their outputs; at a tick (``ticking``) they compute them.
     """
 
     diagram: Diagram
@@ -43,7 +43,7 @@ class Network:
     ticking: bool = False
 
     def route(self, ref: PortRef) -> tuple[PortRef, ...]:
-        """From a port back through derivative ports to the port whose equations are differentiated."""
+        """Follow derivative ports back to the port whose equations are differentiated."""
         route = {ref: None}
         while ref.port in self.diagram.blocks[ref.block].time_derivatives:
             source = self.diagram.blocks[ref.block].time_derivatives[ref.port]
@@ -55,7 +55,7 @@ class Network:
         return tuple(route)
 
     def output(self, ref: PortRef, order: int = 0) -> Value:
-        """Where an output port's value is found. A derivative port is one order more of what feeds it."""
+        """The location of an output port's value. A derivative port adds one derivative order."""
         route = self.route(ref)
         ref, order = route[-1], order + len(route) - 1
         rates = self.diagram.blocks[ref.block].output_rates
@@ -67,17 +67,17 @@ class Network:
         return self._slot(ref.block, SlotKind.OUTPUT, port, order)
 
     def input(self, block: str, port: str, order: int = 0) -> Value:
-        """Where the value that feeds an input port is found; ``u'`` is the derivative of what feeds ``u``."""
+        """The location of an input port's value; ``u'`` is the derivative of the input ``u``."""
         if port.endswith("'"):
             return self.input(block, port[:-1], order + 1)
         return self.output(self.diagram.source(block, port), order)
 
     def state_rate(self, block: str, state: str, order: int) -> Value:
-        """Where the ``order``-th (at least first) derivative of a state is found."""
+        """The location of the ``order``-th (at least first) derivative of a state."""
         return self._slot(block, SlotKind.DERIVATIVE, state, order - 1)
 
     def needs(self, node: Node) -> Iterator[tuple[Node, tuple[str, ...]]]:
-        """The nodes that must be worked out before, each with the paths of the signals on the way to it."""
+        """The nodes on which a node depends, each with the paths of the signals to it."""
         if node.group == HELD:
             return
         group = self.equations[node.block].groups[node.group]
@@ -90,13 +90,13 @@ class Network:
                     yield self.state_rate(node.block, state, order).node, (f"{node.block}/{state}'",)
 
     def roots(self) -> Iterator[Node]:
-        """Everything that is asked for: all groups, and what the derivative ports need; at a tick, what the
-        sampled blocks work out."""
+        """All required nodes: all groups and those of derivative ports; at a tick, those of sampled
+        blocks."""
         for name, block in self.diagram.blocks.items():
             clocked = self.diagram.clocked(name)
             if clocked and not self.ticking:
                 yield Node(name, HELD, 0)
-                # What an event does to the block's states, though it works at ticks.
+                # Resets by events of a block that is active at ticks.
                 for (kind, _), index in self.equations[name].group_of.items():
                     if kind is SlotKind.RESET:
                         yield Node(name, index, 0)
@@ -113,29 +113,29 @@ class Network:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """All nodes, each after those it needs, and the loops among them.
+    """All nodes in dependency order, and the loops among them.
 
-    A loop is a node that is needed for itself, with the signals from it back to it, in the direction in which
-    they flow. Whoever needs that node before it is worked out gets an unknown in its place.
+    A loop is a node that depends on itself, with the signals around the loop in signal-flow order. Nodes that
+    are evaluated before it read an unknown instead of its value.
     """
 
     order: tuple[Node, ...]
     loops: Mapping[Node, tuple[str, ...]]
     sums: frozenset[Node] = frozenset()
-    """Nodes of loops whose outputs are unknowns for all who read them."""
+    """Loop nodes whose outputs are unknowns for all readers."""
 
 
 def evaluation_order(network: Network, sums: Mapping[Node, tuple[str, ...]] | None = None) -> Evaluation:
-    """In which order the nodes are worked out; the same for the same diagram, however it was built.
+    """The evaluation order of the nodes; equal diagrams have equal orders, however they were built.
 
-    ``sums`` are nodes on loops at which these are cut first, each with a loop; loops that remain are cut
-    where they close.
+    ``sums`` are nodes at which loops are cut first, each with its loop; remaining loops are cut where they
+    close.
 
-    Depth-first and without recursion, so that a chain may be as long as it likes.
+    The search is depth-first and iterative, so that chains may be long.
 
-    Raises ``AlgebraicLoopError`` with the signals of a loop in which orders of differentiation would rise for
-    ever (a group needs itself in a higher order), and at a tick of one that leads through a sampled block:
-    nothing says what such a block should hold.
+    Raises ``AlgebraicLoopError`` for a loop with unbounded orders of differentiation (a group depends on
+    itself in a higher order), and at a tick for a loop through a sampled block without delay, whose output is
+    not defined.
     """
     order: list[Node] = []
     loops: dict[Node, tuple[str, ...]] = {}
@@ -171,7 +171,7 @@ def evaluation_order(network: Network, sums: Mapping[Node, tuple[str, ...]] | No
                     raise AlgebraicLoopError(
                         loop,
                         where=where,
-                        allowed="every loop through sampled blocks passes through one that delays",
+                        allowed="each loop through sampled blocks contains a delay",
                         fix="put a Unit Delay into the loop",
                     )
                 loops.setdefault(node, tuple(loop))
@@ -183,7 +183,7 @@ def evaluation_order(network: Network, sums: Mapping[Node, tuple[str, ...]] | No
 
 
 def _loop(path: list[tuple[Node, tuple[str, ...]]], closing: tuple[Node, tuple[str, ...]]) -> list[str]:
-    """The signals from the last visit of the closing node's group to the closing one, as they flow."""
+    """The signals of the loop, from the last visit of the closing node's group, in signal-flow order."""
     node = closing[0]
     start = max(
         place

@@ -1,4 +1,4 @@
-"""Parameters of blocks: declared once as dataclass fields, checked at construction, shown everywhere."""
+"""Parameters of blocks: declared as dataclass fields, checked at construction."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ Value = float | int | bool | str | tuple[Any, ...] | object
 """A checked value: numbers as float, arrays as nested tuples of float, so that blocks compare by content."""
 
 REQUIRED: Any = dataclasses.MISSING
-"""The default of a parameter that has none."""
+"""Marks a parameter without default."""
 
 
 class ParameterKind(Enum):
-    """What a parameter may hold."""
+    """The kinds of parameter values."""
 
     NUMBER = "number"
     ARRAY = "array"
@@ -41,7 +41,7 @@ class ParameterKind(Enum):
 
 @runtime_checkable
 class RobotHolder(Protocol):
-    """What a parameter takes in the place of a robot: something that has one, such as an Arm."""
+    """An object with a robot, such as an Arm, which a robot parameter accepts."""
 
     @property
     def robot(self) -> object: ...
@@ -51,9 +51,9 @@ class RobotHolder(Protocol):
 class Parameter:
     """One parameter of a block type.
 
-    ``tunable``: its value stays an input of the compiled system (numbers and arrays only; an array's shape
-    is part of the structure). ``dimensions``: how many axes an array may have (0 is a plain number).
-    ``minimum``, ``above``, ``maximum`` bound every entry; ``finite`` refuses infinities (NaN always is).
+    ``tunable``: its value stays an input of the compiled system (numbers and arrays only; an array's shape is
+    constant). ``dimensions``: the allowed numbers of axes of an array (0 is a scalar). ``minimum``,
+    ``above``, ``maximum`` bound every entry; ``finite`` rejects infinities (NaN is always rejected).
     ``roots``: an array of zeros or poles, which may be empty; complex ones become rows (real, imaginary).
     ``of_type``: the class that an object of kind ``ROBOT``, ``DIAGRAM``, ``TABLE`` or ``FUNCTION`` must have.
     """
@@ -79,11 +79,11 @@ class Parameter:
         return self.default is REQUIRED
 
     def check(self, value: object, where: str) -> Value:
-        """The value in its canonical form; raises ``InputError`` naming ``where``, value and the rule."""
+        """The value in canonical form; raises ``InputError`` with ``where``, value and rule."""
         return _CHECKS[self.kind](self, value, where)
 
     def describe(self) -> str:
-        """The rule in words, as errors print it."""
+        """The rule in words, for error messages."""
         if self.kind is ParameterKind.CHOICE:
             return "one of " + ", ".join(self.choices)
         words = {
@@ -94,7 +94,7 @@ class Parameter:
             ParameterKind.BOOLEAN: "true or false",
             ParameterKind.ROBOT: "a Robot, or an Arm",
             ParameterKind.DIAGRAM: "a Diagram",
-            ParameterKind.TABLE: "a table of instants and values",
+            ParameterKind.TABLE: "a table of times and values",
             ParameterKind.FUNCTION: "a Python function",
         }[self.kind]
         bounds = [
@@ -117,8 +117,9 @@ def parameter(
 ) -> Any:
     """Declare a parameter as a field of a block: ``gain: ArrayLike = parameter(1.0, doc="K")``.
 
-    Without ``kind`` the default tells it: a float is a number, an int an integer, a tuple an array, text a
-    choice where ``choices`` are given. Numbers and arrays are tunable unless ``tunable=False``.
+    Without ``kind``, the type of the default determines it: a float is a number, an int an integer, a tuple
+    an array, text a choice where ``choices`` are given. Numbers and arrays are tunable unless
+    ``tunable=False``.
     """
     kind = kind or kind_of(default, rules)
     if tunable is None:
@@ -135,7 +136,7 @@ def shape_of(value: object) -> Shape:
 
 
 def kind_of(default: object, rules: dict[str, Any]) -> ParameterKind:
-    """The kind that a default tells."""
+    """The kind of a default."""
     if isinstance(default, bool):
         return ParameterKind.BOOLEAN
     if isinstance(default, int):

@@ -1,4 +1,4 @@
-"""Which shapes fit together."""
+"""Shape compatibility rules."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from armblocks.errors import InputError
 
 
 def broadcast(shapes: Mapping[str, Shape]) -> Shape:
-    """The shape of an elementwise result: scalars (and single elements) spread over the others, as in
-    Simulink; all others must agree.
+    """The shape of an elementwise result: scalars and single elements are broadcast, as in Simulink.
+
+    All other shapes must be equal.
 
     Raises ``InputError`` that names two ports that do not agree.
     """
@@ -26,7 +27,7 @@ def broadcast(shapes: Mapping[str, Shape]) -> Shape:
         elif shape != result:
             raise InputError(
                 f"'{first}' has shape {result} and '{name}' has shape {shape}",
-                allowed="equal shapes, or a scalar with anything",
+                allowed="equal shapes, or a scalar with any shape",
                 fix="change the width of one of the signals",
             )
     return result

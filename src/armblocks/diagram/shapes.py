@@ -1,4 +1,4 @@
-"""Shapes of all signals of a diagram, from what the ports state and what the blocks conclude."""
+"""Shape inference: shapes of all signals, from declared port shapes and the rules of the blocks."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ class DiagramShapes:
 
 
 def check_stated(form: FlatForm, shapes: DiagramShapes) -> None:
-    """Raise ``DiagramError`` where what passes the end of a subsystem is not what the end states."""
+    """Raise ``DiagramError`` where a signal at the end of a subsystem differs from the declared shape."""
     for target, (source, stated) in form.stated.items():
         given = shapes.outputs[source.block][source.port]
         if not shapes_agree(given, stated):
             raise DiagramError(
                 f"'{source}' gives shape {given} but '{target}' takes shape {stated}",
                 where=f"diagram '{form.diagram.name}'",
-                allowed="what the dimensions of the subsystem's In and Out blocks say",
-                fix="change the dimensions of the one or the width of the other",
+                allowed="the dimensions of the subsystem's In and Out blocks",
+                fix="change the dimensions of the block or the width of the signal",
             )
 
 
 def infer_shapes(diagram: Diagram) -> DiagramShapes:
     """Find the shape of every signal of a flat diagram; every input must be connected.
 
-    Shapes spread from the ports that state theirs. A loop in which nobody does starts from what its
-    integrators assume (a scalar start value), which is widened where the loop turns out to be wider.
-    A loop without any starts from a scalar.
+    Shapes propagate from the ports that declare one. A loop without declared shapes starts from the shapes of
+    its integrators' initial values, which are widened if the loop requires it. A loop without integrators
+    starts from a scalar.
 
     Raises ``DiagramError`` where the two ends of a connection, or the inputs of a block, do not agree.
     """
@@ -57,14 +57,14 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
     def learn(ref: PortRef, shape: Shape) -> None:
         if known.get(ref) == shape:
             return
-        # Widening ends after as many changes as there are assumptions to widen; more would go on for ever.
+        # Each assumption can be widened once; more changes would not terminate.
         changes[ref] = changes.get(ref, -1) + 1
         if changes[ref] > len(diagram.blocks):
             raise DiagramError(
-                f"the shape of '{ref}' does not settle: it was {known[ref]} and becomes {shape}",
+                f"the shape of '{ref}' is inconsistent: it was {known[ref]} and becomes {shape}",
                 where=f"diagram '{diagram.name}'",
-                allowed="loops whose width is the same all around",
-                fix="give the integrators of the loop start values of the intended size",
+                allowed="loops with the same width at all signals",
+                fix="give the integrators of the loop initial values of the intended size",
             )
         known[ref] = shape
         for consumer in consumers[ref.block]:
@@ -83,7 +83,7 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
             try:
                 shapes = block.output_shapes(inputs)
             except InputError:
-                continue  # said at the end, if it is still so when all shapes are known
+                continue  # raised at the end, if still true when all shapes are known
             for port, shape in shapes.items():
                 learn(PortRef(name, port), shape)
 
@@ -97,8 +97,8 @@ def infer_shapes(diagram: Diagram) -> DiagramShapes:
             if PortRef(name, port) not in known:
                 learn(PortRef(name, port), shape)
     spread()
-    # What is left lies in loops that hold no state, or behind them: one scalar after the other is assumed.
-    # But where a block complains, it is heard first.
+    # The remaining signals are in loops without state, or depend on them: scalars are assumed one by one. #
+    # Errors of blocks are raised first.
     open_outputs = [
         (name, PortRef(name, port.name))
         for name, block in diagram.blocks.items()
@@ -127,7 +127,7 @@ def _input_shapes(
 
 
 def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
-    """All shapes by block, after the complaints that had to wait until they were known."""
+    """All shapes by block; raises the errors that were deferred until all shapes were known."""
     drivers = diagram.drivers
     stated = {
         PortRef(name, port.name): port.shape
@@ -146,7 +146,7 @@ def _checked(diagram: Diagram, known: Mapping[PortRef, Shape]) -> DiagramShapes:
     inputs: dict[str, Shapes] = {}
     outputs: dict[str, Shapes] = {}
     for name, block in diagram.blocks.items():
-        # Still unknown: behind a block that complains below; any shape does until then.
+        # Still unknown: depends on a block whose error is raised below; any shape is valid until then.
         taken: dict[str, Shape] = {}
         complete = True
         for port in block.input_ports():

@@ -1,8 +1,7 @@
-"""The face of a block: its outline, and a sign: a curve, a fraction, or a few characters as the field writes
-them.
+"""The face of a block: its outline and its sign (a curve, a fraction, or a few characters).
 
-A block whose sign is always the same declares it as ``sign``; one whose sign follows from its parameters
-overrides ``face_sign``. :mod:`armblocks.drawing` draws signs; a block without one shows its title.
+A block with a constant sign declares it as ``sign``; a block whose sign depends on parameters overrides
+``face_sign``. :mod:`armblocks.drawing` draws signs; a block without one shows its title.
 """
 
 from __future__ import annotations
@@ -40,21 +39,21 @@ class Words:
 
 @dataclass(frozen=True)
 class Lines:
-    """Several lines, each as it is."""
+    """Several lines, without further line breaks."""
 
     texts: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Title:
-    """The name of a block, broken where words end."""
+    """The name of a block, broken at spaces."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Fraction:
-    """One expression above another; ``limited`` between two stops."""
+    """A fraction; ``limited`` draws it between two stops."""
 
     above: str
     below: str
@@ -63,7 +62,7 @@ class Fraction:
 
 @dataclass(frozen=True)
 class Graph:
-    """A curve over small axes: points from (0, 0), lower left, to (1, 1)."""
+    """A curve in a small coordinate system: points from (0, 0), lower left, to (1, 1)."""
 
     points: tuple[tuple[float, float], ...]
 
@@ -80,19 +79,19 @@ def graph(*points: tuple[float, float]) -> Graph:
 
 
 def swing(cycles: float, growth: float = 0.0) -> Graph:
-    """A sine around the middle, whose frequency grows along the way."""
+    """A sine around the middle with growing frequency."""
     points = [k / 64 for k in range(65)]
     return graph(*((u, 0.5 + 0.5 * math.sin(2 * math.pi * cycles * u * (1 + growth * u))) for u in points))
 
 
 def stairs(levels: Sequence[float]) -> Graph:
-    """A value that is held between jumps at equal distances."""
+    """A staircase with equidistant jumps."""
     share = 1 / len(levels)
     return graph(*((u, level) for k, level in enumerate(levels) for u in (k * share, (k + 1) * share)))
 
 
 def pulses(widths: Sequence[float]) -> Graph:
-    """Pulses at equal distances, each as wide as it says."""
+    """Equidistant pulses with the given widths."""
     share = 1 / len(widths)
     corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]
     return graph(
@@ -116,11 +115,11 @@ TABLE = graph((0, 0), (0.25, 0.75), (0.5, 0.6), (0.75, 0.95), (1, 1))
 """Curves that several blocks show."""
 
 
-# -- what parameters say -------------------------------------------------------------------------------------
+# -- text of parameters -------------------------------------------------------------------------------------
 
 
 def value_text(value: object) -> str:
-    """A scalar as it is, small vectors in brackets, larger things as their size."""
+    """The text of a scalar, a small vector in brackets, or the size of a larger array."""
     array = np.asarray(value, dtype=np.float64)
     if array.size == 1:
         return axis_number(float(f"{float(array.reshape(-1)[0]):.4g}"))
@@ -130,7 +129,7 @@ def value_text(value: object) -> str:
 
 
 def polynomial(name: str, coefficients: object, letter: str = "s", *, delays: bool = False) -> str:
-    """``s² + 2s + 1``; the powers rise with ``delays``, to negative ones; ``b(s)`` where that is too long."""
+    """``s² + 2s + 1``; with ``delays`` in ascending negative powers; ``b(s)`` if that is too long."""
     values = np.asarray(coefficients, dtype=np.float64).reshape(-1).tolist()
     highest = 0 if delays else len(values) - 1
     terms: list[str] = []
@@ -148,12 +147,12 @@ def polynomial(name: str, coefficients: object, letter: str = "s", *, delays: bo
 
 
 def raised(number: int) -> str:
-    """A whole number in raised digits."""
+    """An integer in superscript digits."""
     return "".join("⁰¹²³⁴⁵⁶⁷⁸⁹⁻"["0123456789-".index(digit)] for digit in str(number))
 
 
 def _roots(roots: object, letter: str) -> str:
-    """``s (s + 1)``; ``1`` without any, ``Π(s − …)`` where there are more than two."""
+    """``s (s + 1)``; ``1`` without roots, ``Π(s − …)`` for more than two."""
     values = np.asarray(roots, dtype=np.complex128).reshape(-1).tolist()
     if len(values) > 2 or any(abs(value.imag) > 0 for value in values):
         return f"{len(values)} roots"
@@ -164,7 +163,7 @@ def _roots(roots: object, letter: str) -> str:
 
 
 def times(gain: object, text: str) -> str:
-    """A gain before an expression; a gain of 1 is left out."""
+    """A gain before an expression; a gain of 1 is omitted."""
     shown = value_text(gain)
     if shown == "1":
         return text

@@ -1,7 +1,7 @@
-"""Blocks that give a diagram its structure: a diagram inside a block, and its ends.
+"""Subsystems: a diagram inside a block, and its In and Out blocks.
 
-A virtual block stands for wires only. It has no equations, and :mod:`armblocks.diagram.hierarchy` replaces it
-by the wires that it means before a diagram is traced.
+A virtual block represents connections only. It has no equations, and :mod:`armblocks.diagram.hierarchy`
+replaces it by direct connections before a diagram is traced.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from armblocks.equations import Shape
 from armblocks.errors import DiagramError, InputError
 
 MOST_BLOCKS = 100_000
-"""Blocks of a diagram, those inside subsystems included: more than is drawn, less than fills a memory."""
+"""Maximum number of blocks of a diagram, including subsystems; limits the memory use."""
 
 
 ANY = -1.0
-"""The dimensions of a port that takes whatever is connected."""
+"""The dimensions of a port that accepts any shape."""
 
 
 def stated_shape(block: Inport | Outport) -> Shape | None:
-    """The shape that an end of a diagram asks for; ``None`` where it takes any."""
+    """The declared shape of an end of a diagram; ``None`` for any shape."""
     given = np.atleast_1d(np.asarray(block.dimensions, dtype=np.float64)).tolist()
     if given == [ANY]:
         return None
@@ -49,30 +49,32 @@ def _check_dimensions(block: Inport | Outport) -> None:
             f"the dimensions are {given.tolist()}",
             where=f"{block.type_name()}.dimensions",
             allowed="-1 (any), 1 (a scalar), n (a vector), or (m, n) (a matrix)",
-            fix="give whole numbers from 1",
+            fix="give integers, at least 1",
         )
 
 
-_DIMENSIONS = "what passes: 1 a scalar, n a vector, (m, n) a matrix; -1 takes what is connected"
+_DIMENSIONS = "shape of the signal: 1 a scalar, n a vector, (m, n) a matrix; -1 any shape"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Inport(Block):
-    """What enters a subsystem: y = the signal at the subsystem's input of this name.
+    """An input of a subsystem: y = the signal at the subsystem's input port of this name.
 
-    At the top of the hierarchy nothing is connected from outside, and it gives ``value``.
+    At the top level of the hierarchy, where nothing is connected, y = ``value``.
     """
 
     title: ClassVar[str] = "In"
     outline: ClassVar[Outline] = Outline.OVAL
 
-    port: int = parameter(0, minimum=0, doc="its place among the inputs, from 1; 0 takes the next free one")
+    port: int = parameter(
+        0, minimum=0, doc="port number among the inputs, from 1; 0 takes the next free number"
+    )
     dimensions: ArrayLike = parameter(
         ANY, kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc=_DIMENSIONS
     )
-    unit: str = parameter("", doc="SI unit of the signal, for people")
+    unit: str = parameter("", doc="SI unit of the signal, for display")
     value: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="what it gives where nothing is around the diagram"
+        0.0, kind=ParameterKind.ARRAY, doc="output at the top level of the hierarchy"
     )
 
     def check(self) -> None:
@@ -91,7 +93,7 @@ class Inport(Block):
             raise InputError(
                 f"the value has {value.numel()} entries",
                 where="Inport.value",
-                allowed=f"one, or the dimensions {stated}",
+                allowed=f"a scalar, or the dimensions {stated}",
                 fix="change value or dimensions",
             )
         return {"y": value}
@@ -99,26 +101,28 @@ class Inport(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Outport(Block):
-    """What leaves a subsystem: the subsystem's output of this name = u.
+    """An output of a subsystem: the output port of this name = u.
 
-    Of a subsystem that works only at times, it says what the output is while it does not: held as it was, or
-    ``initial``, which it also is before the subsystem has worked.
+    In a conditional subsystem, parameters determine the output while the subsystem is inactive: held, or
+    ``initial``. Before the subsystem has been active, the output is ``initial``.
     """
 
     title: ClassVar[str] = "Out"
     outline: ClassVar[Outline] = Outline.OVAL
 
-    port: int = parameter(0, minimum=0, doc="its place among the outputs, from 1; 0 takes the next free one")
+    port: int = parameter(
+        0, minimum=0, doc="port number among the outputs, from 1; 0 takes the next free number"
+    )
     dimensions: ArrayLike = parameter(
         ANY, kind=ParameterKind.ARRAY, dimensions=(0, 1), tunable=False, doc=_DIMENSIONS
     )
-    unit: str = parameter("", doc="SI unit of the signal, for people")
+    unit: str = parameter("", doc="SI unit of the signal, for display")
 
     when_off: str = parameter(
-        "held", choices=("held", "reset"), doc="what a conditional subsystem gives while it does not work"
+        "held", choices=("held", "reset"), doc="output of a conditional subsystem while it is inactive"
     )
     initial: ArrayLike = parameter(
-        0.0, kind=ParameterKind.ARRAY, doc="the output of a conditional subsystem before it works"
+        0.0, kind=ParameterKind.ARRAY, doc="output of a conditional subsystem before it has been active"
     )
 
     def check(self) -> None:
@@ -133,25 +137,25 @@ PASS_THROUGH = Diagram(
     blocks={"In1": Inport(port=1), "Out1": Outport(port=1)},
     connections=(Connection(PortRef("In1", "y"), PortRef("Out1", "u")),),
 )
-"""What a new subsystem holds: its input is its output."""
+"""The content of a new subsystem: the output equals the input."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiagramBlock(Block):
-    """What all blocks with a diagram inside have in common: its ends are ports, its mask is their parameters.
+    """Base class of blocks with an inner diagram: its ends are the ports, its mask gives the parameters.
 
-    Subclasses say which inputs they have besides, to control when the diagram works.
+    Subclasses define the additional control inputs.
     """
 
     virtual: ClassVar[bool] = True
     card_size: ClassVar[tuple[float, float]] = (104.0, 64.0)
 
     diagram: Diagram = parameter(
-        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the diagram inside"
+        PASS_THROUGH, kind=ParameterKind.DIAGRAM, of_type=Diagram, doc="the inner diagram"
     )
 
     def control_ports(self) -> tuple[Port, ...]:
-        """Inputs besides those of the diagram inside."""
+        """Inputs in addition to those of the inner diagram."""
         return ()
 
     def check(self) -> None:
@@ -160,7 +164,7 @@ class DiagramBlock(Block):
         for port in self.control_ports():
             if port.name in self.diagram.blocks:
                 raise DiagramError(
-                    f"a block inside is named '{port.name}', as an input of the subsystem is",
+                    f"an inner block is named '{port.name}', like an input of the subsystem",
                     where=f"diagram '{self.diagram.name}'",
                     allowed="other names",
                     fix="rename the block",
@@ -169,7 +173,7 @@ class DiagramBlock(Block):
         twice = next((rule.name for rule in self.diagram.mask if rule.name in taken), None)
         if twice is not None:
             raise InputError(
-                f"the mask has a parameter '{twice}', and so has every {self.title}",
+                f"the mask parameter '{twice}' is also a parameter of every {self.title}",
                 where=f"diagram '{self.diagram.name}'",
                 allowed=f"other names than {', '.join(sorted(taken))}",
                 fix="choose another name",
@@ -199,7 +203,7 @@ class DiagramBlock(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Subsystem(DiagramBlock):
-    """A diagram inside a block, whose In and Out blocks are the ports; signals are name/block/port."""
+    """A subsystem: a diagram inside a block. In and Out blocks are its ports; signals are name/block/port."""
 
     title: ClassVar[str] = "Subsystem"
 
@@ -207,7 +211,7 @@ class Subsystem(DiagramBlock):
 def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[str, Inport | Outport], ...]:
     """The In or Out blocks of a diagram with their names, in the order of their numbers.
 
-    Raises ``DiagramError`` for a number given twice.
+    Raises ``DiagramError`` for duplicate numbers.
     """
     found = [(name, block) for name, block in diagram.blocks.items() if isinstance(block, kind)]
     found.sort(key=lambda entry: (entry[1].port or math.inf, entry[0]))
@@ -216,14 +220,14 @@ def ends(diagram: Diagram, kind: type[Inport] | type[Outport]) -> tuple[tuple[st
             raise DiagramError(
                 f"'{one}' and '{two}' are both {kind.title} number {first.port}",
                 where=f"diagram '{diagram.name}'",
-                allowed="every number once",
+                allowed="unique port numbers",
                 fix="give one of them another port number",
             )
     return tuple(found)
 
 
 def block_count(diagram: Diagram) -> int:
-    """How many blocks a diagram has, those inside its subsystems included."""
+    """The number of blocks of a diagram, including its subsystems."""
     return diagram.keep(
         "block count",
         lambda: sum(
@@ -234,18 +238,18 @@ def block_count(diagram: Diagram) -> int:
 
 
 def check_block_count(count: int, where: str) -> None:
-    """Raise ``DiagramError`` for more blocks, those inside subsystems included, than a diagram may have."""
+    """Raise ``DiagramError`` for too many blocks, including subsystems."""
     if count > MOST_BLOCKS:
         raise DiagramError(
-            f"the diagram has {count} blocks, those inside subsystems included",
+            f"the diagram has {count} blocks, including subsystems",
             where=where,
             allowed=f"at most {MOST_BLOCKS}",
-            fix="give blocks vectors: one Gain of 1000 elements does what 1000 blocks do",
+            fix="use vectors: one Gain of 1000 elements replaces 1000 blocks",
         )
 
 
 def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
-    """The ports that the In blocks of a diagram are from outside."""
+    """The input ports of a subsystem, from its In blocks."""
     return diagram.keep(
         "inner inputs",
         lambda: tuple(
@@ -256,7 +260,7 @@ def inner_inputs(diagram: Diagram) -> tuple[Port, ...]:
 
 
 def inner_outputs(diagram: Diagram) -> tuple[Port, ...]:
-    """The ports that the Out blocks of a diagram are from outside."""
+    """The output ports of a subsystem, from its Out blocks."""
     return diagram.keep(
         "inner outputs",
         lambda: tuple(

@@ -1,9 +1,9 @@
-"""The sums on loops that are linear: the signals of such a loop that are solved for.
+"""Sums in linear algebraic loops: these signals are the unknowns that the solver computes.
 
-A loop can be cut at any of its signals. The others follow from the cut, and a sum among them may lose all of
-its digits: in a follower with the gain 1e9 the error ``r - y`` is 1e-9 of r. Products keep the relative
-accuracy of their factors. Solved for all sums, every signal of the loop is as accurate as its own condition
-allows.
+A loop can be cut at any signal. The other signals are computed from it, and a sum among them may lose all
+significant digits: in a follower with the gain 1e9 the error ``r - y`` is 1e-9 of r. Products keep the
+relative accuracy of their factors. With all sums as unknowns, the accuracy of every signal is limited only by
+its own condition number.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from armblocks.diagram.components import strongly_connected
 from armblocks.diagram.ordering import HELD, Evaluation, Network, Node
 
 MOST_UNKNOWNS = 16
-"""Of one tangle of loops: beyond, only as many as cuts are needed, because the work grows with their cube."""
+"""Maximum number of sums per strongly connected component; beyond it, only the necessary cuts are made,
+because the work grows with the cube."""
 _SUMS = {casadi.OP_ADD, casadi.OP_SUB}
 
 
 def sums_on_loops(network: Network, evaluation: Evaluation) -> dict[Node, tuple[str, ...]]:
-    """The nodes that add, on loops whose equations are linear in what is fed back; each with such a loop."""
+    """Nodes that add, in loops whose equations are linear in the fed-back signals; each with such a loop."""
     if not evaluation.loops:
         return {}
     place_of = {node: place for place, node in enumerate(evaluation.order)}
@@ -49,14 +50,14 @@ def _group(network: Network, node: Node) -> Group:
 
 
 def _unknowns(network: Network, nodes: list[Node]) -> int:
-    """How many numbers the outputs of nodes are."""
+    """The number of scalars in the outputs of nodes."""
     return sum(
         slot.size for node in nodes for slot in _group(network, node).slots if slot.kind is SlotKind.OUTPUT
     )
 
 
 def _is_linear(network: Network, node: Node, tangle: set[Node]) -> bool:
-    """Whether a node is a value, neither held nor implicit, and linear in what comes out of the tangle."""
+    """Whether a node is an explicit value that is linear in the outputs of its component."""
     if node.group == HELD or node.order or network.diagram.blocks[node.block].implicit_outputs:
         return False
     if network.diagram.clocked(node.block):
@@ -67,10 +68,10 @@ def _is_linear(network: Network, node: Node, tangle: set[Node]) -> bool:
 
 
 def _adds(network: Network, node: Node) -> bool:
-    """Whether terms of several sources are added in a node, or the elements of one to fewer.
+    """Whether a node adds terms of several sources, or reduces the elements of one source.
 
-    The rows of a square matrix's product with one vector count as products: their rounding is that of the
-    matrix's own entries, and as unknowns they would double the size of loops of vectors.
+    The product of a square matrix with one vector counts as a product, not as a sum: its rounding errors are
+    like those of the matrix entries, and as unknowns the rows would double the size of loops of vectors.
     """
     group = _group(network, node)
     function = Function("f", [group.t, group.p, group.z], [group.expression])

@@ -1,4 +1,4 @@
-"""Values at instants, as a file of measurements holds them: what some blocks play back."""
+"""Tables of sampled values, such as measurements, that source blocks play back."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class TimeTable:
-    """``rows (n, 1 + m)``: an instant (s) and the values there, at least two rows, instants rising.
+    """``rows (n, 1 + m)``: a time (s) and the values at that time; at least two rows, times ascending.
 
     Compared and hashed by content; ``source`` (the file that it comes from) and ``names`` (of the m columns)
-    are not compared. Raises ``InputError`` for rows that are no such table.
+    are not compared. Raises ``InputError`` for invalid rows.
     """
 
     rows: ArrayLike
@@ -30,8 +30,8 @@ class TimeTable:
             raise InputError(
                 f"the table has shape {rows.shape}",
                 where=self.source,
-                allowed="(n, 1 + m): n >= 2 rows of an instant and m >= 1 values",
-                fix="put the instants (s) into the first column",
+                allowed="(n, 1 + m): n >= 2 rows of a time and m >= 1 values",
+                fix="put the times (s) into the first column",
             )
         wrong = np.flatnonzero(~(np.diff(rows[:, 0]) > 0.0) | ~np.isfinite(rows[1:]).all(axis=1))
         if wrong.size or not np.isfinite(rows[0]).all():
@@ -39,8 +39,8 @@ class TimeTable:
             raise InputError(
                 f"row {row + 1} of the table is {rows[row].tolist()}",
                 where=self.source,
-                allowed="finite numbers, each instant later than the one before",
-                fix="sort the rows by their instants and drop repeated ones",
+                allowed="finite numbers, strictly ascending times",
+                fix="sort the rows by time and drop repeated times",
             )
         rows.setflags(write=False)
         object.__setattr__(self, "rows", rows)

@@ -1,4 +1,4 @@
-"""The symbols of a diagram, the values worked out of them group by group, and the unknowns of its loops."""
+"""The symbols of a diagram, the values computed from them group by group, and the unknowns of its loops."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Symbols:
 
 
 class Tracing:
-    """The values of one network worked out so far; lives only while it is traced."""
+    """The values of one network computed so far; used during tracing only."""
 
     def __init__(
         self,
@@ -95,11 +95,11 @@ class Tracing:
         self.products: list[SX] = []
         """The signals that are products of two numbers."""
         self.unknowns: dict[Value, SX] = {}
-        """What stands for values that were needed before they were worked out, the cuts of the loops, and for
-        outputs that are implicit."""
+        """Symbols of the unknowns: loop cuts (values that are read before they are computed), implicit
+        outputs."""
 
     def work_out(self, node: Node) -> None:
-        """Put the equations of one node over the values of the nodes that it needs."""
+        """Evaluate the equations of one node with the values of the nodes on which it depends."""
         if node.group == HELD:
             return
         group = self.network.equations[node.block].groups[node.group]
@@ -112,7 +112,7 @@ class Tracing:
                 else symbols.states[f"{node.block}/{state}"]
                 for state in group.states
             ]
-            # Discrete variables and events stand still while the time flows.
+            # Discrete variables and events are constant between events.
             still = [symbols.discrete[f"{node.block}/{name}"] for name in group.discrete]
             events = [symbols.events[f"{node.block}/{name}"] for name in group.events]
             if order:
@@ -133,7 +133,7 @@ class Tracing:
             if (SlotKind.OUTPUT, name) in self._values[node]:
                 unknown = Value(node, SlotKind.OUTPUT, name)
                 self._left_over[unknown] = self._values[node].pop((SlotKind.OUTPUT, name))
-                self.value(unknown)  # also where nothing reads it
+                self.value(unknown)  # also if nothing reads it
         if node in self._sums:
             for slot in group.slots:
                 if slot.kind is SlotKind.OUTPUT:
@@ -152,19 +152,20 @@ class Tracing:
                     self._values[node][slot.kind, slot.name] = if_else(ticks, fresh, held)
 
     def _slope(self, block: str, name: str, order: int) -> SX:
-        """The time derivative of a delayed value. Raises ``DiagramError`` where it is not kept."""
+        """The time derivative of a delayed value. Raises ``DiagramError`` where it is not available."""
         if order > 1 or name not in self.network.equations[block].fixed_delays:
             what = "the second derivative" if order > 1 else "the derivative"
             raise DiagramError(
-                f"{what} of a delayed signal is asked for" + ("" if order > 1 else ", whose delay changes"),
+                f"{what} of a delayed signal is not available"
+                + ("" if order > 1 else ", whose delay changes"),
                 where=f"block '{block}' ({self.network.diagram.blocks[block].title})",
-                allowed="the first derivative behind a constant delay",
+                allowed="the first derivative after a constant delay",
                 fix="differentiate before the delay, or filter instead of differentiating",
             )
         return self.symbols.discrete[f"{block}/{name}'"]
 
     def value(self, value: Value) -> SX:
-        """The flat column of a value: worked out, held, or unknown until its loop is closed."""
+        """The flat column of a value: computed, held, or an unknown of a loop."""
         if value.node.group == HELD:
             held = self.symbols.discrete[f"{value.node.block}/{value.name}"]
             return SX.zeros(held.numel()) if value.node.order else held
@@ -178,7 +179,7 @@ class Tracing:
         return self.unknowns[value]
 
     def residuals(self) -> SX:
-        """What has to be 0, for each unknown in turn."""
+        """The residual of each unknown."""
         return vertcat(
             *[
                 self._left_over[value] if value in self._left_over else self.value(value) - unknown
@@ -196,7 +197,7 @@ class Implicit:
         self.residual = SX(0, 1)
         self.guesses = SX(0, 1)
         self.linear: list[tuple[tuple[str, ...], SX]] = []
-        """Names of the unknowns of each loop that is solved, and the matrix of its equations."""
+        """The names of the unknowns of each solved loop, and the matrix of its equations."""
         self._cuts, self._solution = SX(0, 1), SX(0, 1)
         if not tracing.unknowns:
             return
@@ -230,13 +231,13 @@ class Implicit:
         self._cuts, self._solution = cuts, solution
 
     def solved(self, parts: Sequence[SX]) -> SX:
-        """One column with the solutions in place of the cuts."""
+        """One column with the solutions substituted for the unknowns."""
         column = vertcat(*parts, SX(0, 1))
         return substituted(column, self._cuts, self._solution) if self._cuts.numel() else column
 
 
 def _guess(network: Network, symbols: Symbols, value: Value, unknown: SX) -> SX:
-    """Where the search for an unknown begins: where its block says, else at 0."""
+    """The start value of an unknown: given by its block, else 0."""
     block = network.diagram.blocks[value.node.block]
     if value.node.order or value.kind is not SlotKind.OUTPUT or value.name not in block.implicit_outputs:
         return SX.zeros(unknown.numel())
@@ -262,7 +263,7 @@ def _split(column: SX, sizes: Sequence[int]) -> list[SX]:
 
 
 def _products(column: SX) -> list[SX]:
-    """The elements that are products, or what an element is the negative of."""
+    """The elements that are products, or negated products."""
     entries = [entry for entry in column.nonzeros() if not entry.is_leaf()]
     plain = [entry.dep(0) if entry.op() == casadi.OP_NEG else entry for entry in entries]
     return [entry for entry in plain if not entry.is_leaf() and entry.op() in (casadi.OP_MUL, casadi.OP_SQ)]

@@ -1,4 +1,4 @@
-"""SI units of all signals, as far as ports state them and blocks can tell."""
+"""Unit inference: SI units of all signals, from ports and blocks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.diagram.port import PortRef
 
 
 def infer_units(diagram: Diagram) -> Mapping[PortRef, str]:
-    """The unit of every output port of a flat diagram; ``""`` where nobody can tell. For people only."""
+    """The unit of every output port of a flat diagram; ``""`` where it is unknown. For display only."""
     drivers = diagram.drivers
     consumers: dict[str, list[str]] = {name: [] for name in diagram.blocks}
     for wire in diagram.connections:
@@ -29,7 +29,7 @@ def infer_units(diagram: Diagram) -> Mapping[PortRef, str]:
         found = [(PortRef(name, port), unit) for port, unit in block.output_units(given).items()]
         found += [(sources[port], unit) for port, unit in block.input_units(given).items()]
         for port, unit in found:
-            # A unit once known stays, so this ends.
+            # A known unit does not change, so the iteration terminates.
             if unit and not units[port]:
                 units[port] = unit
                 queue.extend(consumers[port.block])

@@ -1,4 +1,4 @@
-"""A function of the user's own, in Python, as the value of a block's parameter."""
+"""A user-written Python function as a parameter value."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class UserFunction:
-    """A Python function; two are equal where they are the same, or the same code without surroundings.
+    """A Python function. Two are equal if they are identical, or have the same code without closures.
 
     Raises ``InputError`` where its arguments cannot be listed.
     """
@@ -37,18 +37,18 @@ class UserFunction:
 
     @property
     def name(self) -> str:
-        """What the function is called."""
+        """The name of the function."""
         return str(getattr(self.function, "__name__", "the function"))
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """The arguments that have to be given, in order."""
+        """The arguments without default, in order."""
         listed = inspect.signature(self.function).parameters.values()
         return tuple(entry.name for entry in listed if entry.default is inspect.Parameter.empty)
 
     @property
     def source(self) -> str:
-        """``file.py:name`` of a function that stands at the top of a file, else ``""``."""
+        """``file.py:name`` of a function at the top level of a file, else ``""``."""
         function = self.function
         if not isinstance(function, FunctionType) or "<" in function.__qualname__:
             return ""
@@ -64,9 +64,9 @@ class UserFunction:
         return hash(self._code or self.function)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle the function by its name in a module, or in a file; code itself does not travel.
+        """Pickle the function by its name in a module or file; the code itself is not pickled.
 
-        Raises ``InputError`` for a function that has neither.
+        Raises ``InputError`` for other functions.
         """
         function = self.function
         if not isinstance(function, FunctionType) or _is_importable(function):
@@ -74,9 +74,9 @@ class UserFunction:
         if self.source and function.__qualname__.isidentifier():
             return _from_file, (self.source,)
         raise InputError(
-            f"the function {self.name} cannot be pickled: no other process would find it by its name",
-            allowed="functions at the top of a module or of a .py file; no lambdas or inner functions",
-            fix="write it with def at the top of a .py file, and import it from there",
+            f"the function {self.name} cannot be pickled: other processes cannot find it by name",
+            allowed="functions at the top level of a module or .py file; no lambdas or inner functions",
+            fix="define it with def at the top level of a .py file, and import it from there",
             where=f"function {self.name}",
         )
 
@@ -95,7 +95,7 @@ class UserFunction:
 
 
 def _is_importable(function: FunctionType) -> bool:
-    """Whether the function is what its module has under its name."""
+    """Whether the function is the attribute of that name of its module."""
     found: object = sys.modules.get(function.__module__)
     for name in function.__qualname__.split("."):
         found = getattr(found, name, None)

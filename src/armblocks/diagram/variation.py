@@ -1,4 +1,4 @@
-"""The same diagram with other parameter values."""
+"""Copies of a diagram with other parameter values."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _Changed = TypeVar("_Changed")
 
 
 def with_parameters(diagram: Diagram, values: Mapping[str, object]) -> Diagram:
-    """A copy with other parameter values, ``{"jtraj.tmax": 5.0}``, checked like the first ones.
+    """A copy with other parameter values, ``{"jtraj.tmax": 5.0}``, which are checked.
 
     A block inside subsystems is named by its path, ``"controller/pid.kp"``; parameters of a subsystem's mask
-    by the subsystem, ``"controller.kp"``; those of the diagram's own mask have no block, ``"kp"``. What
-    follows by formulas changes with them, and cannot be given itself; nor can anything inside a subsystem
-    that is linked to a library. Raises ``UnknownNameError`` for an unknown block or parameter,
-    ``DiagramError`` for a value that the block refuses or with which the diagram no longer fits together.
+    by the subsystem, ``"controller.kp"``; those of the diagram's own mask have no block, ``"kp"``. Parameters
+    with formulas are computed from them and cannot be set, nor can parameters inside a subsystem that is
+    linked to a library. Raises ``UnknownNameError`` for an unknown block or parameter, ``DiagramError`` for a
+    value that is invalid for the block or makes the diagram inconsistent.
     """
     for path, value in values.items():
         name, _, parameter = path.rpartition(".")
@@ -66,7 +66,7 @@ def _with_value(diagram: Diagram, path: str, parameter: str, value: object) -> D
 def _check_free(
     outside: Sequence[tuple[Diagram, str, DiagramBlock]], path: str, block: Block, parameter: str
 ) -> None:
-    """Raise ``DiagramError`` for a parameter that something else decides."""
+    """Raise ``DiagramError`` for a parameter that is set by a formula or a library."""
     linked = next((place for place, (_, _, inside) in enumerate(outside) if inside.diagram.link), None)
     if linked is not None:
         subsystem = "/".join(name for _, name, _ in outside[: linked + 1])
@@ -83,15 +83,15 @@ def _check_free(
         outer = "/".join(name for _, name, _ in outside)
         names = [f"{outer}.{name}" if outer else name for name in sorted(formula_names(text))]
         raise DiagramError(
-            f"'{path}.{parameter}' follows by the formula '{text}'",
+            f"'{path}.{parameter}' is set by the formula '{text}'",
             where=f"block '{path}'",
             allowed=", ".join(names),
-            fix="change what it follows from, or replace the formula in the diagram",
+            fix="change the parameters of the formula, or replace the formula in the diagram",
         )
 
 
 def _located(path: str, change: Callable[[], _Changed]) -> _Changed:
-    """What a change gives, errors with the block's path."""
+    """The result of a change; errors get the block's path."""
     block = f"block '{path}'" if path else ""
     try:
         return change()

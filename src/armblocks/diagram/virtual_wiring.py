@@ -1,4 +1,4 @@
-"""Virtual blocks that lead wires: tags, and buses that carry several named signals on one wire."""
+"""Virtual blocks of connections: Goto and From tags, and buses of several named signals."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from armblocks.diagram.signs import Outline
 from armblocks.diagram.worked_example import WorkedExample, made
 from armblocks.errors import InputError
 
-_NAMES = "names of letters, digits and _, separated by commas, each once"
-_PATHS = "paths of elements, such as speed or motor.speed, separated by commas, each once"
+_NAMES = "unique names of letters, digits and _, separated by commas"
+_PATHS = "unique paths of elements, such as speed or motor.speed, separated by commas"
 
 
 def listed(text: str) -> tuple[str, ...]:
@@ -22,7 +22,7 @@ def listed(text: str) -> tuple[str, ...]:
 
 
 def port_names(paths: tuple[str, ...]) -> tuple[str, ...]:
-    """A port name for each path of a bus element: its last part, or all of them where that is not enough."""
+    """A port name for each path of a bus element: its last part, or the whole path if that is not unique."""
     last = [path.rpartition(".")[2] for path in paths]
     return tuple(
         short if last.count(short) == 1 else path.replace(".", "_") for short, path in zip(last, paths)
@@ -35,66 +35,67 @@ def _check_list(text: str, where: str, *, nested: bool) -> None:
     wrong = [part for part in parts if not part.isidentifier()]
     twice = [entry for entry in entries if entries.count(entry) > 1]
     if wrong or twice or not entries:
-        offender = f"'{(wrong or twice)[0]}' stands in '{text}'" if wrong or twice else "the list is empty"
+        offender = (
+            f"'{(wrong or twice)[0]}' in '{text}' is not allowed" if wrong or twice else "the list is empty"
+        )
         raise InputError(offender, where=where, allowed=_PATHS if nested else _NAMES, fix="correct the list")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Goto(Block):
-    """Sends a signal, without a wire, to the From blocks with the same tag.
+    """Sends a signal to the From blocks with the same tag, without a connection.
 
-    A local tag is known in this diagram only, a scoped one also in the subsystems below, a global one
-    everywhere.
+    A local tag is visible in this diagram only, a scoped tag also in its subsystems, a global tag everywhere.
     """
 
     title: ClassVar[str] = "Goto"
     outline: ClassVar[Outline] = Outline.TAG
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="What a Goto sends, a From with the same tag receives, without a wire.",
+        shows="A From block receives the signal of the Goto block with the same tag.",
         shown=("u", made("From")),
     )
 
-    tag: str = parameter("A", doc="the name under which the signal is known")
-    visibility: str = parameter("local", choices=("local", "scoped", "global"), doc="where the tag is known")
+    tag: str = parameter("A", doc="tag of the signal")
+    visibility: str = parameter("local", choices=("local", "scoped", "global"), doc="visibility of the tag")
 
     def check(self) -> None:
         _check_tag(self.tag, "Goto.tag")
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what is sent"),)
+        return (Port("u", "signal to send"),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class From(Block):
-    """Receives the signal that the Goto with the same tag sends."""
+    """Receives the signal of the Goto block with the same tag."""
 
     title: ClassVar[str] = "From"
     outline: ClassVar[Outline] = Outline.TAG
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="What a Goto sends, a From with the same tag receives, without a wire.",
+        shows="A From block receives the signal of the Goto block with the same tag.",
         besides=(made("Goto").by(u=made("SineWave")),),
     )
 
-    tag: str = parameter("A", doc="the name under which the signal is known")
+    tag: str = parameter("A", doc="tag of the signal")
 
     def check(self) -> None:
         _check_tag(self.tag, "From.tag")
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "what is received"),)
+        return (Port("y", "received signal"),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BusCreator(Block):
-    """Puts several signals on one wire, each under its name; a bus may be an element of a bus."""
+    """Combines several named signals in a bus; a bus may be an element of a bus."""
 
     title: ClassVar[str] = "Bus Creator"
     outline: ClassVar[Outline] = Outline.BUS
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="Two signals on one wire: the scope shows both under their names.",
+        shows="A bus of two signals: the scope shows both under their names.",
         parameters={"names": "position, speed"},
         shown=("bus",),
     )
@@ -108,18 +109,18 @@ class BusCreator(Block):
         return tuple(Port(name, f"element {name}") for name in listed(self.names))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("bus", "all elements on one wire"),)
+        return (Port("bus", "the bus of all elements"),)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BusSelector(Block):
-    """Takes elements out of a bus by their paths: speed, or motor.speed of a bus within a bus."""
+    """Selects elements of a bus by their paths: speed, or motor.speed of a nested bus."""
 
     title: ClassVar[str] = "Bus Selector"
     outline: ClassVar[Outline] = Outline.BUS
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The speed is taken out of a bus that holds position and speed.",
+        shows="The speed is selected from a bus of position and speed.",
         parameters={"elements": "speed"},
         inputs={"bus": made("BusCreator", names="position, speed")},
         shown=("bus", "speed"),
@@ -140,13 +141,13 @@ class BusSelector(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class BusAssignment(Block):
-    """The same bus with other signals for some of its elements."""
+    """Replaces some elements of a bus by other signals."""
 
     title: ClassVar[str] = "Bus Assignment"
     outline: ClassVar[Outline] = Outline.BUS
     virtual: ClassVar[bool] = True
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="The speed in the bus is replaced by another signal; the position stays.",
+        shows="The speed in the bus is replaced by another signal; the position is unchanged.",
         parameters={"elements": "speed"},
         inputs={
             "bus": made("BusCreator", names="position, speed"),
@@ -161,10 +162,10 @@ class BusAssignment(Block):
         _check_list(self.elements, "BusAssignment.elements", nested=True)
         if "bus" in port_names(listed(self.elements)):
             raise InputError(
-                "an element is named 'bus', as the port of the bus itself is",
+                "an element is named 'bus', like the port of the bus itself",
                 where="BusAssignment.elements",
                 allowed="other names",
-                fix="rename the element where the bus is made",
+                fix="rename the element in the Bus Creator",
             )
 
     def input_ports(self) -> tuple[Port, ...]:

@@ -1,7 +1,7 @@
-"""How a block says what shows it at work: what feeds it, with which parameters, and what one sees then.
+"""Worked examples of blocks: inputs, parameters and shown signals.
 
-A worked example is a description only, by the names of block types, so that a block needs to import no other
-to have one. :func:`armblocks.block_example` makes the diagram of it.
+A worked example is a description by names of block types, so that a block need not import other blocks.
+:func:`armblocks.block_example` builds its diagram.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from typing import Any
 
 @dataclass(frozen=True, kw_only=True)
 class Fed:
-    """A block of the example, by its type's name, with what feeds it.
+    """A block of the example, by type name, with its inputs.
 
-    ``inputs`` by port; ``port`` the output that is meant where there are several; ``name`` what the block is
-    called in the diagram (its title in small letters where nothing is said).
+    ``inputs`` by port; ``port`` selects one of several outputs; ``name`` is the block's name in the diagram
+    (by default its title in lower case).
     """
 
     type_name: str
@@ -31,33 +31,32 @@ class Fed:
         return dataclasses.replace(self, inputs={**self.inputs, **inputs})
 
     def at(self, port: str) -> Fed:
-        """The same block, of whose outputs ``port`` is meant."""
+        """The same block with the selected output ``port``."""
         return dataclasses.replace(self, port=port)
 
     def named(self, name: str) -> Fed:
-        """The same block under a name of its own; two mentions of one name are one block."""
+        """The same block with an explicit name; equal names mean the same block."""
         return dataclasses.replace(self, name=name)
 
 
 Feed = Fed | str
-"""What feeds an input: a further block, or text: ``"y"``, an output of the block that is shown; ``"u"``, what
-feeds its own input u; ``"plant/y"``, an output of a named block."""
+"""The driver of an input: another block, or text: ``"y"``, an output of the example's block; ``"u"``, the
+driver of its input u; ``"plant/y"``, an output of a named block."""
 
 
 def made(type_name: str, **parameters: Any) -> Fed:
-    """A block of the example by its type's name and parameters: ``made("SineWave", amplitude=2.0)``."""
+    """A block of the example by type name and parameters: ``made("SineWave", amplitude=2.0)``."""
     return Fed(type_name=type_name, parameters=parameters)
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkedExample:
-    """A small diagram around one block that shows what it does.
+    """A small diagram that demonstrates one block.
 
-    ``shows`` one or two sentences on what is to be seen. ``parameters`` of the block where the defaults show
-    less (robots by name). ``inputs`` by port; a port that is left out gets a signal that fits it. ``shown``:
-    the signals of the scope; left out, what feeds the block and what it gives. ``across`` and ``up``: one
-    signal over another instead. ``besides``: blocks that no wire leads to. ``stop_time`` and ``sample_time``
-    s, of the run and of the record.
+    ``shows``: a caption of one or two sentences. ``parameters`` of the block (robots by name). ``inputs`` by
+    port; an omitted port gets a suitable signal. ``shown``: the signals of the scope; by default the inputs
+    and outputs of the block. ``across`` and ``up``: the signals of an x-y plot instead. ``besides``:
+    additional, unconnected blocks. ``stop_time`` (s) of the run and ``sample_time`` (s) of the record.
     """
 
     shows: str = ""

@@ -70,7 +70,7 @@ class EvaluatedSystem:
     def __init__(
         self, system: HybridSystem, parameters: Sequence[int] = (), signals: Sequence[int] | None = None
     ) -> None:
-        refuse_called(system, "slopes")
+        refuse_called(system, "derivatives")
         self.system = system
         self._parameters = list(parameters)
         self._signals = None if signals is None else list(signals)
