@@ -10,7 +10,10 @@ sys.path.insert(0, str(HERE))
 os.environ.setdefault("ARMBLOCKS_EFFORT", "little")
 
 from generated_pages import write_generated_pages  # noqa: E402
+from name_links import link_names  # noqa: E402
 from reference_signatures import ALIASES, readable_signature, shorten_annotations  # noqa: E402
+
+from armblocks.pictures.style import PALETTE, Tone  # noqa: E402
 
 project = "armblocks"
 author = "The armblocks developers"
@@ -22,6 +25,14 @@ exclude_patterns = ["_build"]
 
 html_theme = "furo"
 html_title = "armblocks"
+pygments_dark_style = "github-dark"
+html_theme_options = {
+    f"{theme}_css_variables": {
+        name: PALETTE[Tone.ACCENT].of(theme)
+        for name in ("color-brand-primary", "color-brand-content", "color-brand-visited")
+    }
+    for theme in ("light", "dark")
+}
 html_show_sourcelink = False
 html_copy_source = False
 html_show_search_summary = False  # it would be fetched, which browsers refuse to pages of the disk
@@ -45,6 +56,7 @@ def setup(app):
     """Called by Sphinx."""
     shorten_annotations()
     app.connect("autodoc-process-signature", readable_signature)
+    app.connect("source-read", link_names)
 
 
 # Before Sphinx looks for sources and static files.

@@ -1,0 +1,99 @@
+"""Every armblocks name in the tables for those who come from Simulink or the Robotics Toolbox exists."""
+
+import ast
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.main import get_command
+
+import armblocks as ab
+from armblocks.blocks import BLOCKS
+from armblocks.cli.main import app
+from armblocks.simulation.tableaux import TABLEAUX
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = ("from-simulink", "from-robotics-toolbox")
+OBJECTS: dict[str, object] = {
+    "ab": ab,
+    "np": np,
+    "print": print,
+    "arm": ab.Arm,
+    "builder": ab.DiagramBuilder,
+    "result": ab.SimulationResult,
+    "robot": ab.Robot,
+    "run": ab.DiagramRun,
+}
+"""What the code of the tables calls things that are no modules."""
+
+
+def names_here(page: str) -> Iterator[str]:
+    """The pieces of code in the last column of every table of a page."""
+    for line in (DOCS / f"{page}.md").read_text(encoding="utf-8").splitlines():
+        if line.startswith("| ") and not line.endswith("| armblocks |"):
+            cell = re.sub(r"\{\w+\}`[^`]*`", "", line.split("|")[-2])  # without links to pages
+            yield from re.findall(r"`([^`]+)`", cell)
+
+
+def check(node: ast.expr) -> object:
+    """What an expression names; raises where a name, an attribute or an argument does not exist."""
+    match node:
+        case ast.Name(id=name):
+            return OBJECTS[name] if name in OBJECTS else BLOCKS[name]
+        case ast.Attribute(value=value, attr=name):
+            return getattr(check(value), name)
+        case ast.Subscript(value=value):
+            return check(value)
+        case ast.Call(func=function, keywords=keywords, args=arguments):
+            called = check(function)
+            for argument in [*arguments, *(keyword.value for keyword in keywords)]:
+                if isinstance(argument, ast.Call):
+                    check(argument)
+            if inspect.isclass(called) and hasattr(called, "__dataclass_fields__"):
+                known = set(called.__dataclass_fields__)
+            elif inspect.isfunction(called):
+                known = set(inspect.signature(called).parameters)
+            else:
+                return called
+            assert {keyword.arg for keyword in keywords} <= known, ast.unparse(node)
+            return called
+        case _:
+            raise AssertionError(ast.unparse(node))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_name_of_the_tables_exists(page: str) -> None:
+    commands = set(get_command(app).commands)  # pyright: ignore[reportAttributeAccessIssue]
+    found = list(names_here(page))
+    assert len(found) > 50
+    for code in found:
+        if code.startswith("armblocks "):
+            assert code.split()[1] in commands, code
+        else:
+            check(ast.parse(code, mode="eval").body)
+
+
+def test_a_name_that_does_not_exist_is_found() -> None:
+    for code in ("ab.simulatte(x)", "Gian", "Gain(gian=2)", "arm.fkin(q)", "ab.Robot(grav=1)"):
+        with pytest.raises((AttributeError, ab.errors.UnknownNameError, AssertionError)):
+            check(ast.parse(code, mode="eval").body)
+
+
+def test_the_solvers_of_simulink_are_known_by_their_names() -> None:
+    text = (DOCS / "from-simulink.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`(ode\w+)`", text)) | {"ode2", "ode3", "ode4"}
+    assert named == {alias for tableau in TABLEAUX for alias in tableau.aliases if alias.startswith("ode")}
+
+
+def test_every_block_of_the_families_that_simulink_has_is_in_its_table() -> None:
+    page = (DOCS / "from-simulink.md").read_text(encoding="utf-8")
+    own = {"CumulativeSum", "DegreesToRadians", "RadiansToDegrees", "CartesianToPolar", "PolarToCartesian"}
+    own |= {"AngleDifference", "Norm", "FirstOrderLag", "SecondOrderLag", "LeadLag", "Pulse", "Counter"}
+    families = ("sources", "maths", "continuous", "discrete", "discontinuities", "routing", "structure")
+    families += ("sinks", "logic", "lookup", "functions")
+    for family in families:
+        for kind in BLOCKS.families[family]:
+            assert kind.type_name() in own or f"`{kind.type_name()}" in page, kind.type_name()
