@@ -10,7 +10,13 @@ import pytest
 from hybrid_systems import bouncing_ball, loop_of_cosine, relay_oscillator, sampled_loop, stick_slip
 from small_systems import oscillator, van_der_pol_pid
 
-from armblocks.blocks import Constant, EnabledSubsystem, Outport, SecondOrderIntegrator
+from armblocks.blocks import (
+    Constant,
+    EnabledSubsystem,
+    Outport,
+    SecondOrderIntegrator,
+    ZeroOrderHold,
+)
 from armblocks.diagram import Diagram, DiagramBuilder, trace_diagram
 from armblocks.equations import SimulationOptions
 from armblocks.errors import FormatError, InputError
@@ -69,6 +75,23 @@ def test_an_interrupted_run_gives_the_bits_of_an_uninterrupted_one(
         assert rest.signals[:, same].tobytes() == whole.signals[:, later].tobytes()
         assert rest.final_state is not None and whole.final_state is not None
         assert rest.final_state.states.tobytes() == whole.final_state.states.tobytes()
+
+
+def test_a_run_goes_on_from_the_end_of_a_step_that_rounding_puts_beside_the_stop_time() -> None:
+    """Steps of 0.1 s end at 0.9999999999999999 s and the like: each is one instant with a record."""
+    builder = DiagramBuilder("falling")
+    push = builder.add("push", Constant())
+    builder.add("mass", SecondOrderIntegrator(), push)
+    builder.add("seen", ZeroOrderHold(sample_time=0.3), push)  # ticks at 0.8999999999999999 s
+    system = compile_system(trace_diagram(builder.build()))
+
+    def options(stop: float) -> SimulationOptions:
+        return SimulationOptions(stop_time=stop, sample_time=0.05, max_step=0.1, rtol=1e-9, atol=1e-12)
+
+    whole = simulate(system, options(2.0))
+    for stop in whole.time[8:40:2]:
+        rest = simulate(system, options(2.0), initial_state=simulate(system, options(stop)).final_state)
+        assert rest.signals.tobytes() == whole.signals[:, -rest.time.size :].tobytes(), stop
 
 
 def first_second(system: CompiledSystem = SYSTEMS["sampled"], **more: object) -> RunState:

@@ -69,7 +69,9 @@ class Records:
     def checkpoint(self, condition: Boolean) -> None:
         """Save the state, once, before the end of the run first bounds a step: a longer run goes on here.
 
-        The first step after a start is saved as the start, because the end bounds the choice of its length.
+        The first step after a start is saved as the start, because the end bounds the choice of its length. A
+        step that ends at the instant of the run's end counts as bounded: a longer run records that instant
+        with this step.
         """
         f, r, arrays = self.frame, self.frame.r, self.frame.arrays
         unsaved = f.count[Count.SAVED].value == 0

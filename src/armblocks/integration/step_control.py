@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from armblocks.integration.butcher_tableau import Row
 from armblocks.integration.course import Course
-from armblocks.integration.frame import Frame
+from armblocks.integration.frame import SAME_ABOVE, Frame
 from armblocks.integration.method import Method
 from armblocks.integration.records import Records
 from armblocks.integration.workspace import Count, Scalar, Status
@@ -66,7 +66,7 @@ class Steps:
         shortest = 10.0 * (following - time)
         length.value = minimum(maximum(length.value, shortest), f.max_step)
         new_time = minimum(time + length.value, f.end.value)
-        self.records.checkpoint(new_time >= f.last_end)
+        self.records.checkpoint(new_time * SAME_ABOVE >= f.last_end)
         method.prepare(time)
         growth = r.real(GROW)
         with r.part() as accepted:
@@ -133,6 +133,6 @@ class Steps:
         # An instant a rounding error before the end is the end: no step of 1e-16 s.
         last = fma(spacing, 1e-9, instant) >= end
         new_time = course.bounded(time, select(last, end, instant))
-        self.records.checkpoint(new_time >= f.last_end)
+        self.records.checkpoint(new_time * SAME_ABOVE >= f.last_end)
         self.method.prepare(time)
         course.try_finite(self.trial, time, new_time)
