@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
+import math
 import pickle
 import runpy
 from collections.abc import Iterator
@@ -10,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from casadi import SX, Function
+from casadi import SX, Function, vertcat, vertsplit
 
 from armblocks import blocks
 from armblocks.blocks import BLOCKS, Constant, Derivative
@@ -23,7 +25,15 @@ from armblocks.diagram import (
     shape_of,
     trace_diagram,
 )
-from armblocks.diagram.block_equations import SlotKind, natural, spread, tunable_slots
+from armblocks.diagram.block_equations import (
+    BlockEquations,
+    Group,
+    SlotKind,
+    natural,
+    spread,
+    tunable_slots,
+)
+from armblocks.diagram.implicit import steps_with
 from armblocks.equations import Slot
 from armblocks.errors import InputError
 from armblocks.face.model import compile_diagram
@@ -244,6 +254,51 @@ def test_every_choice_has_equations(kind: type[Block]) -> None:
                 equations = all_equations(block, shapes)
                 tried = (numbers(equations, block, least) for least in (0.1, 1.1))
                 assert any(all(np.isfinite(value).all() for value in values) for values in tried)
+
+
+WITHOUT_JUMPS = {
+    "MathFunction": "the cube root has the sign of its argument",
+    "Sqrt": "the signed root has the sign of its argument",
+    "T2AngleAxis": "the same angle and axis from the largest of the diagonal",
+    "T2Quaternion": "the same quaternion from the largest of its entries",
+    "T2eul": "of the two sets of angles, where the middle one is 0",
+    "T2rpy": "of the two sets of angles, where the middle one is 90 degrees",
+    "JacobianInverse": "the greatest pivot",
+    "InterpolationUsingPrelookup": "its indices change at events of Prelookup",
+}
+"""Blocks without events whose equations compare, and what they compare for."""
+
+
+@each_kind
+def test_what_its_outputs_compare_changes_at_events_or_breakpoints(kind: type[Block]) -> None:
+    """A jump that no event locates is leapt over by steps, without a word."""
+    if (
+        kind.breakpoints is not Block.breakpoints
+        or kind.sampled
+        or kind.virtual
+        or kind.__name__ in WITHOUT_JUMPS
+    ):
+        return
+    choices = [{rule.name: choice} for rule in kind.parameters() for choice in rule.choices]
+    for block in (make(kind, **chosen) for chosen in choices or [{}]):
+        for shapes in itertools.islice(fitting_shapes(block), 1):
+            equations = block_equations(block, shapes)
+            if not equations.guards:
+                assert not any(compares_what_moves(group, equations, shapes) for group in equations.groups), (
+                    block
+                )
+
+
+def compares_what_moves(group: Group, equations: BlockEquations, shapes: Shapes) -> bool:
+    """Whether outputs or derivatives go through a comparison of the time, of states or of inputs."""
+    if not {slot.kind for slot in group.slots} & {SlotKind.OUTPUT, SlotKind.DERIVATIVE}:
+        return False
+    sizes = {state.name: math.prod(state.shape) for state in (*equations.states, *equations.discrete)}
+    sizes |= {f"{name}{prime}": math.prod(shape) for name, shape in shapes.items() for prime in ("", "'")}
+    names = (*group.states, *group.discrete, *group.inputs, *group.events)
+    ends = [0, *itertools.accumulate(sizes[name] for name in names)]
+    parts = dict(zip(names, vertsplit(group.z, ends))) if names else {}
+    return steps_with(group.expression, vertcat(group.t, *map(parts.get, (*group.states, *group.inputs))))
 
 
 def test_its_views_show_signals_that_exist() -> None:

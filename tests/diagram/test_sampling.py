@@ -6,13 +6,18 @@ import pytest
 
 from armblocks.blocks import (
     Clock,
+    CompareToConstant,
+    CompareToZero,
     Constant,
     CounterLimited,
     Gain,
     Integrator,
+    LogicalOperator,
     Mux,
     RateTransition,
+    SineWave,
     Step,
+    Sum,
     UnitDelay,
     ZeroOrderHold,
 )
@@ -36,6 +41,18 @@ def test_a_stated_sample_time_is_taken_and_inherited_through_blocks_that_calcula
     clocks = clocks_of(builder.build())
     assert set(clocks.values()) == {SampleClock(0.2, 0.05)}
     assert set(clocks) == {"hold", "delay", "again"}
+
+
+def test_answers_of_comparisons_change_at_instants_and_cause_no_further_events() -> None:
+    """A block that only they feed asks its conditions directly; on a loop, it has modes."""
+    builder = DiagramBuilder("d")
+    moving = builder.add("moving", CompareToZero(), builder.add("sine", SineWave()))
+    gate = builder.add("gate", LogicalOperator(), moving, builder.add("one", Constant()))
+    builder.add("above", CompareToConstant(constant=0.5), gate)
+    around = builder.add("around", CompareToConstant(constant=2.5))
+    builder.connect(builder.add("sum", Sum(), gate, around), around["u"])
+    guards = trace_diagram(builder.build()).guard_names
+    assert sorted(set(guards)) == ["around", "moving"]
 
 
 @pytest.mark.parametrize(("fastest", "other"), [(0.1, 0.3), (1.0 / 6.0, 1.0 / 3.0), (0.1 / 3.0, 0.7)])

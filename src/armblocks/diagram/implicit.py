@@ -29,7 +29,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
     needs = _needs(residual, w)
     for circle in strongly_connected(needs):
         unknowns, slope = w[circle], slopes[circle, circle]
-        if depends_on(slope, unknowns) or _steps_with(residual[circle], unknowns):
+        if depends_on(slope, unknowns) or steps_with(residual[circle], unknowns):
             remaining.extend(circle)
             continue
         circles.append((circle, densify(slope)))
@@ -64,7 +64,7 @@ _STEPS = frozenset(
 """Operations that jump: where an unknown goes through one, no derivative tells that an equation has it."""
 
 
-def _steps_with(expression: SX, unknowns: SX) -> bool:
+def steps_with(expression: SX, unknowns: SX) -> bool:
     """Whether some operation that jumps depends on the unknowns, as in ``if(u > 0, -1, 1)``."""
     function = _function_of(expression, unknowns)
     depends = [False] * function.sz_w()

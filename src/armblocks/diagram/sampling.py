@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from armblocks.diagram.block import Block
-from armblocks.diagram.block_equations import BlockEquations
+from armblocks.diagram.block_equations import BlockEquations, SlotKind
+from armblocks.diagram.components import strongly_connected
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.parameter import ParameterKind, parameter
+from armblocks.diagram.port import PortRef
 from armblocks.equations import SampleClock
 from armblocks.equations.clock_ratios import exact_clocks
 from armblocks.errors import DiagramError, InputError
@@ -84,7 +86,7 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
                 error.what, where=f"block '{name}', {error.where}", allowed=error.allowed, fix=error.fix
             ) from None
     begins: dict[str, Source] = {name: clock for name, clock in stated.items() if clock is not None}
-    begins.update({name: None for name, found in equations.items() if _flows(diagram.blocks[name], found)})
+    begins.update({name: None for name, found in equations.items() if _flows(found)})
     forward = {name: list[str]() for name in diagram.blocks}
     backward = {name: list[str]() for name in diagram.blocks}
     for wire in diagram.connections:
@@ -109,21 +111,28 @@ def resolve_sampling(diagram: Diagram, equations: Mapping[str, BlockEquations]) 
 
 
 def moving_blocks(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> frozenset[str]:
-    """The blocks whose inputs may change between instants: fed by the time, a state or an event.
+    """The blocks that may change between instants: with the time, a state, or an input that does.
 
-    What only sampled blocks and constants feed changes at instants alone.
+    What follows from sampled blocks, constants and modes alone changes at instants. Blocks on a loop count as
+    moving, so that a loop through comparisons is solved for each of their answers. ``equations`` are those of
+    all blocks that are not sampled.
     """
-    forward = {name: list[str]() for name in diagram.blocks}
+    wires = {name: list[tuple[str, PortRef]]() for name in equations}
     for wire in diagram.connections:
-        forward[wire.source.block].append(wire.target.block)
-    found: set[str] = set()
-    queue = deque(name for name, own in equations.items() if _flows(diagram.blocks[name], own))
+        if wire.source.block in wires and wire.target.block in wires:
+            wires[wire.source.block].append((wire.source.port, wire.target))
+    around = _on_loops({name: [target.block for _, target in entries] for name, entries in wires.items()})
+    inputs: dict[str, set[str]] = {name: set() for name in equations}
+    queue = deque(equations)
     while queue:
-        for entry in forward[queue.popleft()]:
-            if entry not in found and not diagram.clocked(entry):
-                found.add(entry)
-                queue.append(entry)
-    return frozenset(found)
+        name = queue.popleft()
+        outputs = _moving_outputs(diagram.blocks[name], equations[name], inputs[name])
+        for port, target in wires[name]:
+            if (port in outputs or name in around) and target.port not in inputs[target.block]:
+                inputs[target.block].add(target.port)
+                queue.append(target.block)
+    flowing = {name for name, own in equations.items() if _flows(own)}
+    return frozenset(flowing | around | {name for name, ports in inputs.items() if ports})
 
 
 def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -> None:
@@ -146,9 +155,35 @@ def check_triggered(diagram: Diagram, equations: Mapping[str, BlockEquations]) -
             )
 
 
-def _flows(block: Block, equations: BlockEquations) -> bool:
+def _flows(block: BlockEquations) -> bool:
     """Whether the outputs of a block move by themselves: with the time or with a continuous state."""
-    return bool(equations.states or equations.delays) or any(group.timed for group in equations.groups)
+    return bool(block.states or block.delays) or any(group.timed for group in block.groups)
+
+
+def _moving_outputs(block: Block, equations: BlockEquations, moving: Collection[str]) -> set[str]:
+    """The outputs of a block that may change between instants, where these inputs do."""
+    delayed = {line.name for line in equations.delays}
+    outputs: set[str] = set()
+    for port in block.output_ports():
+        place = equations.group_of.get((SlotKind.OUTPUT, port.name))
+        if place is None or port.name in block.implicit_outputs:
+            outputs.add(port.name)
+            continue
+        group = equations.groups[place]
+        inputs = {name.removesuffix("'") for name in group.inputs}
+        if group.timed or group.states or delayed & set(group.discrete) or inputs & set(moving):
+            outputs.add(port.name)
+    return outputs
+
+
+def _on_loops(following: Mapping[str, Iterable[str]]) -> set[str]:
+    """The blocks that feed themselves through others."""
+    places = {name: place for place, name in enumerate(following)}
+    names = list(following)
+    needs = [[places[entry] for entry in entries] for entries in following.values()]
+    circles = (circle for circle in strongly_connected(needs) if len(circle) > 1)
+    around = {names[place] for circle in circles for place in circle}
+    return around | {name for name, entries in following.items() if name in entries}
 
 
 def _reach(

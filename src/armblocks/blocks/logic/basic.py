@@ -1,7 +1,7 @@
 """Logic: signals that are 1 where something holds and 0 where it does not.
 
-Every input that is not zero counts as true. Where a comparison of continuous signals changes its answer is an
-event, located exactly. A gate has none of its own: its inputs change at the events of others.
+An input that is not zero counts as true. The instants at which the answer of a comparison, or the truth of
+an input, changes between two events of other blocks are events and are located exactly.
 """
 
 from __future__ import annotations
@@ -86,8 +86,7 @@ class LogicalOperator(Block):
     """A gate, element by element: y = u1 AND u2 AND … and the like; NOT has one input.
 
     XOR is true where an odd count of inputs is; NAND, NOR and NXOR are the opposites. An input is true where
-    it is not 0. A gate has no events: where a continuous signal leaves 0, compare it first (CompareToZero),
-    so that its change is located.
+    it is not 0.
     """
 
     title: ClassVar[str] = "Logical Operator"
@@ -101,6 +100,7 @@ class LogicalOperator(Block):
 
     operator: str = parameter("AND", choices=(*_GATES, "NOT"), doc="the gate")
     inputs: int = parameter(2, minimum=1, doc="how many inputs; NOT always has one")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
         return Words(self.operator)
@@ -111,8 +111,14 @@ class LogicalOperator(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "1 or 0"),)
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_truth_conditions(inputs))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _truth_values(u)
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        conditions = [value != 0.0 for value in u.values()]
+        conditions = [_truth(x, name) for name in u]
         if self.operator == "NOT":
             return {"y": logic_not(conditions[0])}
         gate, opposite = _GATES[self.operator]
@@ -287,6 +293,7 @@ class CombinatorialLogic(Block):
     table: ArrayLike = parameter(
         ((0.0,), (0.0,), (0.0,), (1.0,)), dimensions=(2,), doc="one row for each combination of conditions"
     )
+    zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
         rows = shape_of(self.table)[0]
@@ -305,10 +312,17 @@ class CombinatorialLogic(Block):
         columns = shape_of(self.table)[1]
         return (Port("y", "the row of the table", shape=(columns,) if columns > 1 else ()),)
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_truth_conditions(inputs))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _truth_values(u)
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         row = SX(0.0)
-        for k in range(u["u"].numel()):
-            row = 2.0 * row + (u["u"][k] != 0.0)
+        true = _truth(x, "u")
+        for k in range(true.numel()):
+            row = 2.0 * row + true[k]
         return {"y": choose(row, [p["table"][k, :].T for k in range(p["table"].shape[0])])}
 
 
@@ -345,6 +359,7 @@ class TruthTable(Block):
         doc="one row for each decision: 1 true, 0 false, -1 either",
     )
     actions: ArrayLike = parameter(((1.0,), (0.0,)), dimensions=(2,), doc="what comes out, one row for each")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def check(self) -> None:
         rows = np.asarray(self.decisions, dtype=np.float64)
@@ -380,13 +395,38 @@ class TruthTable(Block):
         columns = shape_of(self.actions)[1]
         return (Port("y", "the action", shape=(columns,) if columns > 1 else ()),)
 
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        return located(self, *_truth_conditions(inputs))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return _truth_values(u)
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         rows: list[list[float]] = np.asarray(self.decisions, dtype=np.float64).tolist()
-        action = p["actions"][len(rows) - 1, :].T
+        action, true = p["actions"][len(rows) - 1, :].T, _truth(x, "u")
         for k in reversed(range(len(rows) - 1)):
-            asked = [(u["u"][i] != 0.0) == want for i, want in enumerate(rows[k]) if want >= 0.0]
+            asked = [true[i] == want for i, want in enumerate(rows[k]) if want >= 0.0]
             action = if_else(reduce(logic_and, asked, SX(1.0)), p["actions"][k, :].T, action)
         return {"y": action}
+
+
+def _truth_conditions(inputs: Shapes) -> tuple[Condition, ...]:
+    """On which side of 0 each input is: it is true on both, and false at 0."""
+    return tuple(
+        Condition(f"{name} {side}", shape, f"1 where {name} is {side} 0", closed=False)
+        for name, shape in inputs.items()
+        for side in ("above", "below")
+    )
+
+
+def _truth_values(u: Signals) -> Signals:
+    above = {f"{name} above": value for name, value in u.items()}
+    return above | {f"{name} below": -value for name, value in u.items()}
+
+
+def _truth(x: Signals, name: str) -> SX:
+    """1 where an input is true, else 0, by its conditions."""
+    return logic_or(x[f"{name} above"], x[f"{name} below"])
 
 
 def _sides(relation: str, shape: Shape) -> tuple[Condition, ...]:

@@ -10,6 +10,7 @@ from casadi import SX, floor, fmax, fmin, if_else
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import numbered_ports
+from armblocks.blocks.integer_steps import BlockWithSteps, IntegerSteps
 from armblocks.blocks.interpolation import EXTRAPOLATIONS, cells, contract
 from armblocks.blocks.long_tables import is_long
 from armblocks.blocks.switching import zero_crossing_parameter
@@ -168,10 +169,10 @@ def _weights(k: SX, f: SX, n: int) -> list[SX]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class DirectLookup(Block):
+class DirectLookup(BlockWithSteps):
     """The entry of a table at given indices, which count from 0: y = table[u1, u2, …].
 
-    An index is cut down to an integer and held inside the table.
+    An index is rounded down to an integer and held inside the table.
     """
 
     title: ClassVar[str] = "Direct Lookup Table"
@@ -182,12 +183,21 @@ class DirectLookup(Block):
     )
 
     table: ArrayLike = parameter((0.0, 1.0), dimensions=(1, 2, 3, 4), doc="the entries")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
         return numbered_ports("u", len(shape_of(self.table)), "index along axis")
 
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the entry"),)
+
+    def _steps(self) -> tuple[IntegerSteps, ...]:
+        ports, counts = self.input_ports(), shape_of(self.table)
+        return tuple(
+            IntegerSteps(port.name, mode=f"index {port.name}", count=count, mark=f"{port.name} ")
+            for port, count in zip(ports, counts)
+            if self.zero_crossing
+        )
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         shape = shape_of(self.table)
@@ -200,4 +210,4 @@ class DirectLookup(Block):
             axes = [cells(u, [float(k) for k in range(1, n)]) for u, n in zip(indices, shape)]
             return contract(p["table"], shape, axes)
 
-        return {"y": by_element([*u.values()], entry)}
+        return {"y": by_element([x[f"index {name}"] if self.zero_crossing else u[name] for name in u], entry)}

@@ -14,6 +14,7 @@ from casadi import SX, atan2, if_else, mtimes
 from numpy.typing import ArrayLike
 
 from armblocks.blocks.elementwise import common_unit, numbered_ports, unit_of_terms
+from armblocks.blocks.integer_steps import BlockWithSteps, IntegerSteps
 from armblocks.blocks.switching import located, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
@@ -243,8 +244,11 @@ _TRIGONOMETRY: Mapping[str, Callable[[SX], SX]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class MathFunction(Block):
-    """An elementary function of every element: y = f(u), with f one of abs, exp, log, sqrt, square, …"""
+class MathFunction(BlockWithSteps):
+    """An elementary function of every element: y = f(u), with f one of abs, exp, log, sqrt, square, …
+
+    Where ``floor``, ``ceil``, ``sign`` or ``abs`` switches is an event.
+    """
 
     title: ClassVar[str] = "Math Function"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -252,6 +256,7 @@ class MathFunction(Block):
     )
 
     function: str = parameter("exp", choices=tuple(_FUNCTIONS), doc="the function f")
+    zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
         return function_sign(self.function)
@@ -262,7 +267,26 @@ class MathFunction(Block):
     def output_ports(self) -> tuple[Port, ...]:
         return (Port("y", "the value of the function"),)
 
+    def _steps(self) -> tuple[IntegerSteps, ...]:
+        rounds = self.zero_crossing and self.function in ("floor", "ceil")
+        return (IntegerSteps("u", self.function),) if rounds else ()
+
+    def conditions(self, inputs: Shapes) -> tuple[Condition, ...]:
+        above = Condition("positive", inputs["u"], "1 where u > 0", closed=False)
+        below = Condition("negative", inputs["u"], "1 where u < 0", closed=False)
+        asked = {"sign": (above, below), "abs": (below,)}
+        return located(self, *asked.get(self.function, ()))
+
+    def condition_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        return {"positive": u["u"], "negative": -u["u"]}
+
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        if self._steps():
+            return {"y": x["integer"]}
+        if self.function == "sign":
+            return {"y": x["positive"] - x["negative"]}
+        if self.function == "abs":
+            return {"y": if_else(x["negative"], -u["u"], u["u"])}
         return {"y": _FUNCTIONS[self.function](u["u"])}
 
 

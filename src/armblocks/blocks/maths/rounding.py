@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, ceil, fabs, floor, fmax, fmin, fmod, if_else, logic_and, sign
+from casadi import SX, fmod, if_else, logic_and, sign
 
 from armblocks.blocks.elementwise import common_unit
+from armblocks.blocks.integer_steps import (
+    ROUNDINGS,
+    BlockWithSteps,
+    IntegerSteps,
+    nearest,
+    rounding_edges,
+    step_after,
+)
 from armblocks.blocks.switching import JUST, beyond, cell_of, zero_crossing_parameter
 from armblocks.diagram import (
     Block,
@@ -26,52 +34,17 @@ from armblocks.diagram.signs import FaceSign, Words, function_sign
 from armblocks.equations import Shape
 
 
-def _round(u: SX) -> SX:
-    """To the nearest integer, halves away from zero, exact for every double."""
-    whole = floor(fabs(u))
-    return sign(u) * (whole + (fabs(u) - whole >= 0.5))
-
-
-_ROUNDINGS: Mapping[str, Callable[[SX], SX]] = {
-    "floor": floor,
-    "ceil": ceil,
-    "round": _round,
-    "fix": lambda u: sign(u) * floor(fabs(u)),
-}
-
-
-def _rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX]:
-    """Above which u the result exceeds n, and whether that border itself does; ``mirrored``: of -f(-u)."""
-    if function == "round":
-        return n + 0.5, n >= 0.0
-    if function == "fix":
-        return if_else(n >= 0.0, n + 1.0, n), n >= 0.0
-    if (function == "floor") is not mirrored:
-        return n + 1.0, SX(1.0)
-    return n, SX(0.0)
-
-
-def step_after(now: SX, before: SX, e: Signals) -> SX:
-    """An integer after the events ``up`` and ``down``; ``now``: by the values of the moment.
-
-    A jump may pass several integers at once; at a border, rounding must not undo the step.
-    """
-    down = if_else(e["down"] < 0.0, fmin(now, before - 1.0), before)
-    return if_else(e["up"] > 0.0, fmax(now, before + 1.0), down)
-
-
 @dataclass(frozen=True, kw_only=True)
-class Rounding(Block):
+class Rounding(BlockWithSteps):
     """Every element to an integer: down, up, to the nearest (halves away from zero) or towards zero."""
 
-    memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Rounding Function"
     example: ClassVar[WorkedExample] = WorkedExample(
         shows="The greatest integer that is not above the signal.",
         inputs={"u": made("SineWave", amplitude=3.0)},
     )
 
-    function: str = parameter("floor", choices=tuple(_ROUNDINGS), doc="which way")
+    function: str = parameter("floor", choices=tuple(ROUNDINGS), doc="which way")
     zero_crossing: bool = zero_crossing_parameter()
 
     def face_sign(self) -> FaceSign:
@@ -86,42 +59,11 @@ class Rounding(Block):
     def output_units(self, inputs: Mapping[str, str]) -> Mapping[str, str]:
         return {"y": inputs["u"]}
 
-    def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("integer", inputs["u"], "the output"),) if self.zero_crossing else ()
-
-    def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
-        if not self.zero_crossing:
-            return ()
-        up = Guard("up", inputs["u"], "u reaches where the output is greater", 1)
-        return (up, Guard("down", inputs["u"], "u reaches where the output is less", -1))
+    def _steps(self) -> tuple[IntegerSteps, ...]:
+        return (IntegerSteps("u", self.function),) if self.zero_crossing else ()
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"y": x["integer"] if self.zero_crossing else _ROUNDINGS[self.function](u["u"])}
-
-    def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        if not self.zero_crossing:
-            return {}
-        # Where the next integers begin, and whether their border belongs to them.
-        edge, owned = _rounding_edges(self.function, x["integer"])
-        below, below_owned = _rounding_edges(self.function, -x["integer"], mirrored=True)
-        return {
-            "up": u["u"] - edge + if_else(owned, JUST, -JUST),
-            "down": u["u"] + below - if_else(below_owned, JUST, -JUST),
-        }
-
-    def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        if not self.zero_crossing:
-            return {}
-        now = _ROUNDINGS[self.function](u["u"])
-        return {"integer": cell_of(now, x["integer"], self.guard_values(t, x, u, p))}
-
-    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"integer": beyond(self.guard_values(t, x, u, p))} if self.zero_crossing else {}
-
-    def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
-        if not self.zero_crossing:
-            return {}
-        return {"integer": step_after(_ROUNDINGS[self.function](u["u"]), x["integer"], e)}
+        return {"y": x["integer"] if self.zero_crossing else ROUNDINGS[self.function](u["u"])}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +139,7 @@ def remainder(function: str, u: SX, v: SX) -> SX:
 
 def turns_of(function: str, u: SX, v: SX) -> SX:
     """How often v is taken from u, in agreement with :func:`remainder`."""
-    return if_else(v == 0.0, 0.0, _round((u - remainder(function, u, v)) / v))
+    return if_else(v == 0.0, 0.0, nearest((u - remainder(function, u, v)) / v))
 
 
 def remainder_of_turn(function: str, u: SX, v: SX, turns: SX) -> SX:
@@ -219,8 +161,8 @@ def turn_guards(shape: Shape) -> tuple[Guard, ...]:
 def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
     """How far u is beyond both ends, in the direction of v."""
     rule = _QUOTIENTS[function]
-    edge, owned = _rounding_edges(rule, turns)
-    below, below_owned = _rounding_edges(rule, -turns, mirrored=True)
+    edge, owned = rounding_edges(rule, turns)
+    below, below_owned = rounding_edges(rule, -turns, mirrored=True)
     found = {
         "up": (u - edge * v) * sign(v) + if_else(owned, JUST, -JUST),
         "down": (u + below * v) * sign(v) - if_else(below_owned, JUST, -JUST),
