@@ -25,6 +25,7 @@ from reference_simulator import EndlessEventsError, UnsupportedError, run_refere
 
 import armblocks as ab
 from armblocks.blocks import BLOCKS, DirectLookup
+from armblocks.blocks.external_resets import LEVELS
 from armblocks.diagram import Diagram, flat_diagram, infer_shapes
 from armblocks.diagram.controls import EnableControl, TriggerControl
 from armblocks.errors import ArmblocksError, SimulationError
@@ -63,6 +64,10 @@ class Case:
                 index = self.result[f"{name}/{port.name}"]
                 if (np.abs(index - np.rint(index)) < 1e-9)[index != np.rint(index)].any():
                     raise InconclusiveError(f"rounding decides the entry that '{name}' reads")
+            if getattr(block, "external_reset", "none") in LEVELS and not block.sampled:
+                level = np.ravel(self.result[f"{name}/reset"])
+                if level[0] == 0.0 != level[1]:
+                    raise InconclusiveError(f"the state of '{name}' may have moved before it is held")
 
     def signals(self, diagram: Diagram, **settings: Any) -> dict[str, np.ndarray]:
         """All signals that are compared, by path: not those inside conditional subsystems."""

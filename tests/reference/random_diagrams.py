@@ -133,7 +133,7 @@ class Maker:
             for _ in range(int(self.random.integers(1, 4))):
                 self.add(self_nodes, signals, *self.source())
         for _ in range(size):
-            if depth < 2 and self.random.random() < 0.08 and len(signals) > 1:
+            if depth < 2 and self.random.random() < 0.1 and len(signals) > 1:
                 self.subsystem(self_nodes, signals, depth)
             elif not calm and self.random.random() < 0.02:
                 self.ball(self_nodes, signals)
@@ -397,7 +397,15 @@ class Maker:
         for port in names.get(kind, []):
             ports[port] = control
             control = scalars[int(r.integers(len(scalars)))]
-        self.add(nodes, signals, kind, parameters, ports, inside)
+        if self.add(nodes, signals, kind, parameters, ports, inside):
+            self.watch(nodes, signals)
+
+    def watch(self, nodes: list[Node], signals: list[Signal]) -> None:
+        """An event behind the latest signal, which must not see what it is on the way to its value."""
+        r, watched = self.random, signals[-1]
+        if watched.shape == () and r.random() < 0.7:
+            kind, limit = (("HitCrossing", "offset"), ("Relay", "on_point"))[int(r.integers(2))]
+            self.add(nodes, signals, kind, {limit: float(r.uniform(-1.0, 1.5))}, {"u": watched})
 
     def inside(self, fed: Sequence[Signal], depth: int, calm: bool) -> tuple[Node, ...] | None:
         """In blocks, some others, and one or two Out blocks."""
@@ -448,7 +456,8 @@ class Maker:
             ):
                 return
             merged[f"u{number}"] = signals.pop()
-        self.add(nodes, signals, "Merge", {"initial": limit}, merged)
+        if self.add(nodes, signals, "Merge", {"initial": limit}, merged):
+            self.watch(nodes, signals)
 
     def ball(self, nodes: list[Node], signals: list[Signal]) -> None:
         """A ball that falls from a height, later or at once, and bounces until it rests."""

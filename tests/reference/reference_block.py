@@ -214,9 +214,16 @@ class BlockNumbers:
     def restart(self) -> None:
         for name in self.names("start"):
             self.arrays[f"x:{name}"][:] = self.value("start", name)
+        for mode in self.remembered:
+            self.arrays[f"x:{mode.before}"][:] = 0.0
 
     def remember(self) -> None:
-        """What a mode is now is what it was before, for what comes next."""
+        """What a mode is now is what it was before, for what comes next; so is what goes with it."""
+        if not self.on:
+            return
+        for state in self.discrete:
+            if state.remembers:
+                self.arrays[f"x:{state.name}"][:] = self.value("capture", state.name)
         for mode in self.remembered:
             self.arrays[f"x:{mode.before}"][:] = self.arrays[f"x:{mode.name}"]
 

@@ -46,6 +46,8 @@ class _Law:
         self.begin()
 
     on, restarts, fires = True, False, False
+    ticking = False
+    """Whether the present values are those of a tick."""
 
     def begin(self) -> None: ...
     def restart(self) -> None: ...
@@ -83,7 +85,10 @@ class _Named:
 
 
 class Enable(_Law):
-    """On while u is positive and the subsystem around is on; states start anew when it comes on, if asked."""
+    """On while u is positive and the subsystem around is on; states start anew when it comes on, if asked.
+
+    At events its outputs wait until that has happened.
+    """
 
     memory = ("seen",)
     sides = ("side",)
@@ -93,8 +98,13 @@ class Enable(_Law):
 
     def value(self, kind: str, port: str) -> np.ndarray:
         on = self.arrays["x:side"][0] * self.u("outer")
-        begins = self.block.restarts and on and self.arrays["x:seen"][0] == 0.0
-        return np.array([on if port == "on" else float(bool(begins or self.u("anew", 0.0)))])
+        begins = bool(on and self.arrays["x:seen"][0] == 0.0)
+        found = {
+            "on": on,
+            "works": on if self.ticking else on * (not begins),
+            "restart": float((begins and self.block.restarts) or bool(self.u("anew", 0.0))),
+        }
+        return np.array([found[port]])
 
     def act(self, t: float) -> bool:
         on, seen = self.value("out", "on")[0], self.arrays["x:seen"][0]

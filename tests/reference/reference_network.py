@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from reference_block import BlockNumbers, UnsupportedError
-from reference_controls import CONTROLS
+from reference_controls import CONTROLS, Enable
 from reference_order import EvaluationOrder, Node, assign_clocks
 
 from armblocks.diagram import Diagram, PortRef, flat_diagram, infer_shapes
@@ -350,7 +350,7 @@ class Network:
 
     def tick(self, t: float, clocks: list[int]) -> None:
         """Outputs of all blocks that tick, then their discrete states."""
-        self.ticking = set(clocks)
+        self._mark(set(clocks))
         for _ in range(2):  # a restart at this tick changes what is read
             self.evaluate(t)
             again = [b for b in self.blocks.values() if b.clock in (None, *self.ticking) and b.restarts]
@@ -364,7 +364,14 @@ class Network:
             if block.clock in self.ticking and block.on:
                 new += self._updated(block)
         self._act(t, new)
-        self.ticking = set()
+        self._mark(set())
+
+    def _mark(self, clocks: set[int]) -> None:
+        """These clocks tick now."""
+        self.ticking = clocks
+        for block in self.blocks.values():
+            if isinstance(block, Enable):
+                block.ticking = bool(clocks)
 
     def turn(self, t: float, first: bool = False) -> bool:
         """One turn of an instant; whether it has changed a state or a mode.
@@ -437,6 +444,7 @@ class Network:
     def _remember(self) -> None:
         """Modes with a hysteresis go on from what they are, and not from what they were on the way to it."""
         for block in self.blocks.values():
+            self._feed_all(block)
             block.remember()
 
     def _begin_signs(self, block: Any) -> None:

@@ -16,18 +16,27 @@ from armblocks import DiagramBuilder
 from armblocks.blocks import (
     Abs,
     Backlash,
+    Bias,
     Clock,
+    CombinatorialLogic,
     CompareToZero,
     Constant,
     CoulombFriction,
     DeadZone,
+    DirectLookup,
+    EnabledSubsystem,
     Expression,
     Gain,
     HitCrossing,
+    Inport,
     Integrator,
     IntegratorLimited,
     IntervalTest,
+    LogicalOperator,
+    MathFunction,
     Modulo,
+    Mux,
+    Outport,
     Product,
     PulseGenerator,
     Quantizer,
@@ -50,6 +59,7 @@ from armblocks.blocks import (
     Switch,
     TransportDelay,
     TriggeredSubsystem,
+    TruthTable,
     ZeroOrderHold,
 )
 from armblocks.diagram import Block, Diagram
@@ -207,6 +217,48 @@ def test_a_backlash_that_starts_beyond_its_play_is_pushed_before_the_input_turns
     result = ab.simulate(builder.build(), stop_time=2.0)
     pushed = np.clip(initial, 0.0, 1.0)
     np.testing.assert_allclose(result["play/y"], np.minimum(pushed, 1.0 - result.time), atol=1e-12)
+
+
+@pytest.mark.parametrize("states", ["held", "reset"])
+def test_a_backlash_that_is_switched_on_beyond_its_play_is_pushed_once(states: str) -> None:
+    """An event that its output causes at the same instant finds it where it was pushed to."""
+    inside = DiagramBuilder("inside")
+    inside.add("out", Outport(), inside.add("play", Backlash(), inside.add("in", Inport())))
+    builder = DiagramBuilder("play")
+    fall = builder.add("input", Ramp(initial=2.0, slope=-1.0))
+    switch = builder.add("switch", PulseGenerator(period=8.0, delay=0.5))
+    gear = EnabledSubsystem(diagram=inside.build(), states_when_enabling=states)
+    builder.add("hit", HitCrossing(offset=0.5), builder.add("gear", gear, fall, switch))
+    result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.25)
+    pushed = np.where(result.time < 0.5, 0.0, np.minimum(1.0, 2.5 - result.time))
+    np.testing.assert_allclose(result["gear/out/y"], pushed, atol=1e-12)
+    assert result["hit/count"][-1] == 2.0
+
+
+@pytest.mark.parametrize(
+    "gate",
+    [
+        LogicalOperator(operator="OR"),
+        LogicalOperator(operator="AND"),
+        CombinatorialLogic(),
+        TruthTable(),
+        DirectLookup(table=(0.0, 1.0)),
+        MathFunction(function="sign"),
+        MathFunction(function="ceil"),
+    ],
+    ids=lambda gate: f"{gate.title} {getattr(gate, 'operator', getattr(gate, 'function', ''))}",
+)
+def test_an_analog_signal_is_true_from_the_very_instant_at_which_it_leaves_0(gate: Block) -> None:
+    """A rate limiter goes on from the output just before that instant, which the step does not leap over."""
+    builder = DiagramBuilder("gate")
+    rise = builder.add("rise", Integrator(), builder.add("rate", Constant(value=0.75)))
+    if isinstance(gate, DirectLookup):
+        rise = builder.add("index", Bias(bias=1.0 - 1e-12), rise)
+    ports = gate.input_ports()
+    wide = [builder.add("both", Mux(inputs=2), rise, rise)] if ports[0].shape == (2,) else [rise] * len(ports)
+    builder.add("limited", RateLimiterContinuous(), builder.add("gate", gate, *wide))
+    result = ab.simulate(builder.build(), stop_time=1.25, sample_time=0.25)
+    np.testing.assert_allclose(result["limited/y"], np.minimum(result.time, 1.0), atol=1e-9)
 
 
 def test_a_quantizer_that_steps_up_and_down_within_its_hysteresis_is_named() -> None:

@@ -126,6 +126,35 @@ def test_a_limited_integrator_that_starts_anew_leaves_its_limit(settings: dict[s
     np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.2), atol=1e-9)
 
 
+def test_no_event_sees_the_old_states_of_a_subsystem_that_is_switched_on() -> None:
+    """It is -1 while off and climbs from 0 to 0.2 while on: it passes 0.1 upwards and back once each time."""
+    inner = ab.DiagramBuilder("inside")
+    climb = inner.add("climb", bl.IntegratorLimited(upper=0.2), inner.input("u"))
+    inner.add("o", bl.Outport(when_off="reset", initial=-1.0), climb["y"])
+    builder = ab.DiagramBuilder("climbing")
+    subsystem = bl.EnabledSubsystem(diagram=inner.build(), states_when_enabling="reset")
+    control = builder.add("control", bl.PulseGenerator(period=1.0, width=50.0, delay=0.25))
+    climbing = builder.add("sub", subsystem, builder.add("one", bl.Constant()), control)
+    builder.add("hits", bl.HitCrossing(offset=0.1), climbing)
+    found = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.05)
+    since = found.time - np.floor(found.time + 0.75 + 1e-9) + 0.75
+    on = (since < 0.5 - 1e-9) & (found.time > 0.24)
+    np.testing.assert_allclose(found["sub/o"], np.where(on, np.minimum(since, 0.2), -1.0), atol=1e-9)
+    assert found["hits/count"][-1] == 2.0 * 4
+
+
+@pytest.mark.parametrize("settings", RUNS, ids=lambda run: run["solver"])
+def test_a_rate_limiter_that_starts_anew_climbs_again(settings: dict[str, Any]) -> None:
+    """Also where its input does not move at that time: a restart is like the start of a run."""
+    builder = ab.DiagramBuilder("climbing")
+    reset = builder.add("reset", bl.PulseGenerator(period=1.0, width=50.0, delay=0.25))
+    limited = bl.ResettableSubsystem(diagram=inside(bl.RateLimiterContinuous()), edge="rising")
+    builder.add("sub", limited, builder.add("level", bl.Constant(value=0.3)), reset)
+    found = ab.simulate(builder.build(), stop_time=3.0, sample_time=0.05, **settings)
+    since = np.where(found.time < 0.249, found.time, found.time - np.floor(found.time + 0.75 + 1e-9) + 0.75)
+    np.testing.assert_allclose(found["sub/o"], np.minimum(since, 0.3), atol=1e-9)
+
+
 def test_what_is_asked_while_a_subsystem_is_off_changes_nothing() -> None:
     """Comparisons are located also while nobody looks: events, and the same numbers as without them."""
     wave, control = bl.SineWave(frequency=50.0), bl.Step(time=0.7)

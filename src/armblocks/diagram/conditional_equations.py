@@ -16,7 +16,7 @@ from typing import ClassVar
 from casadi import SX, if_else, logic_and
 
 from armblocks.diagram.block import Block, Shapes, Signals
-from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State
+from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, name_before
 
 ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
 """Hidden inputs: whether the block works; whether its states start anew now; whether the trigger fires now;
@@ -65,11 +65,22 @@ class ConditionalBlock(Block):
         if self._restarted and self.ticking:
             own |= {
                 name: if_else(u[RESTART] != 0.0, start, own[name])
-                for name, start in self.block.initial_states(p).items()
+                for name, start in self._starts(x, p).items()
             }
         if ELAPSED in self.hidden:
             p = {**p, "T": u[ELAPSED]}
         return t, own, self._plain(u), p
+
+    def _starts(self, x: Signals, p: Signals) -> Signals:
+        """What a restart makes of the states; modes have no past then."""
+        before = {name_before(name) for name in x} & set(x)
+        return {**self.block.initial_states(p), **{name: SX(0.0) for name in sorted(before)}}
+
+    def _first_modes(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        """The modes at a restart, from the states that start: as at the start of a run, where modes are 0."""
+        found = self.block.mode_values(*self._arguments(t, x, u, p))
+        zero = {name: SX(x[name]) * 0.0 for name in found}
+        return self.block.mode_values(*self._arguments(t, {**x, **zero}, u, p))
 
     def input_ports(self) -> tuple[Port, ...]:
         return (*self.block.input_ports(), *(Port(name, "", "", ()) for name in self.hidden))
@@ -132,7 +143,7 @@ class ConditionalBlock(Block):
         return {**settled, _TURNED: u[ON] - 0.5}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        found = self.block.mode_values(*self._arguments(t, x, u, p))
+        found = self._while_on(u, self.block.mode_values(*self._arguments(t, x, u, p)), x)
         return {**found, _WORKS: u[ON] != 0.0} if _WORKS in x else found
 
     def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
@@ -165,11 +176,14 @@ class ConditionalBlock(Block):
             if self._notes_restarts:
                 after[_DONE] = if_else(again, 0.0, x[_DONE])
                 again = logic_and(again, x[_DONE] == 0.0)
-            for name, start in self.block.initial_states(p).items():
-                after[name] = if_else(again, start, after.get(name, x[name]))
+            starts = self._starts(x, p)
+            for name, value in {**starts, **self._first_modes(t, {**x, **starts}, u, p)}.items():
+                after[name] = if_else(again, value, after.get(name, x[name]))
         if _WORKS in x:
             begins = logic_and(u[ON] != 0.0, x[_WORKS] == 0.0)
-            for name, value in self.mode_values(t, {**x, **after}, u, p).items():
+            now = {**x, **after}
+            earlier = {name: now[name_before(name)] for name in now if name_before(name) in now}
+            for name, value in self.mode_values(t, {**now, **earlier}, u, p).items():
                 after[name] = if_else(begins, value, after.get(name, x[name]))
             after[_WORKS] = u[ON] != 0.0
         return after

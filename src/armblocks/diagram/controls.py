@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from casadi import SX, fabs, if_else, logic_and, logic_or
+from casadi import SX, fabs, if_else, logic_and, logic_not, logic_or
 from numpy.typing import ArrayLike
 
 from armblocks.diagram.block import Block, Shapes, Signals
@@ -41,9 +41,18 @@ def _side(u: SX) -> SX:
     return if_else(u > 0.0, 1.0, 0.0)
 
 
+def _begins(on: SX, x: Signals) -> SX:
+    """Whether a control is on since this instant, and the blocks inside have not started yet."""
+    return logic_and(on, x["seen"] == 0.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class EnableControl(Block):
-    """Whether an enabled subsystem is on, and whether its states start anew just now: on = u > 0."""
+    """Whether an enabled subsystem is on, and whether its states start anew just now: on = u > 0.
+
+    ``works`` follows ``on`` once the blocks inside have found their modes and started their states anew, so
+    that no event outside of the subsystem acts on the outputs of old modes and states.
+    """
 
     title: ClassVar[str] = "Enable"
 
@@ -55,13 +64,18 @@ class EnableControl(Block):
         return (Port("u", "the control signal", "", ()), *_inside(self))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("on", "1 while it works", "", ()), Port("restart", "1 where states start anew", "", ()))
+        return (
+            Port("on", "1 while it is on", "", ()),
+            Port("works", "1 while it is on and the blocks inside have started", "", ()),
+            Port("restart", "1 where states start anew", "", ()),
+        )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (State("seen", (), "what on was when it was last acted on; -1 before that"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("side", (), "1 where u is positive, else 0", follows=True),)
+        works = State("works", (), "1 while it is on and the blocks inside have started", follows=True)
+        return (State("side", (), "1 where u is positive, else 0", follows=True), works)
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (Guard("side", (), "u passes zero", locates=True), Guard("acts", (), "on has changed", 1))
@@ -70,22 +84,32 @@ class EnableControl(Block):
         return {"seen": SX(-1.0)}
 
     def outputs(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        on = x["side"] * _outer(u)
-        begins = logic_and(on, x["seen"] == 0.0) if self.restarts else SX(0.0)
-        return {"on": on, "restart": logic_or(begins, u.get("anew", SX(0.0)))}
+        on, anew = x["side"] * _outer(u), u.get("anew", SX(0.0))
+        begins = _begins(on, x) if self.restarts else SX(0.0)
+        return {"on": on, "works": x["works"], "restart": logic_or(begins, anew)}
 
     def guard_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         changed = fabs(x["side"] * _outer(u) - x["seen"])
         return {"side": u["u"] - JUST, "acts": if_else(x["seen"] < 0.0, 0.0, changed) - 0.5}
 
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
-        return {"side": _side(u["u"])}
+        side = _side(u["u"])
+        return {"side": side, "works": side * _outer(u)}
+
+    def contradictions(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
+        on = x["side"] * _outer(u)
+        late = logic_and(x["works"] != on, logic_not(_begins(on, x)))
+        return {"side": x["side"] != _side(u["u"]), "works": late}
 
     def resets(self, t: SX, x: Signals, u: Signals, p: Signals, e: Signals) -> Signals:
         side = if_else(e["side"] == 0.0, x["side"], if_else(e["side"] > 0.0, 1.0, 0.0))
         start = _side(u["u"]) * _outer(u)
         seen = if_else(e["acts"] == 0.0, x["seen"], x["side"] * _outer(u))
-        return {"side": side, "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), start, seen)}
+        return {
+            "side": side,
+            "seen": if_else(logic_or(x["seen"] < 0.0, t <= 0.0), start, seen),
+            "works": if_else(e["acts"] == 0.0, x["works"], x["side"] * _outer(u)),
+        }
 
 
 @dataclass(frozen=True, kw_only=True)

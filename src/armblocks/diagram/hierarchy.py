@@ -274,17 +274,18 @@ class _Flattening:
                 enabled = isinstance(block, EnabledSubsystem)
                 when = block.states_when_enabling if enabled else block.states_when_resuming
                 control = self._enable(level, port, outer, restarts=when == "reset")
-                works = gate = {ON: PortRef(control, "on")}
+                works = PortRef(control, "works")
+                gate = {ON: PortRef(control, "on")}
                 if when == "reset" or RESTART in outer:
-                    gate = {**works, RESTART: PortRef(control, "restart")}
+                    gate[RESTART] = PortRef(control, "restart")
             case TriggeredSubsystem() | EnabledTriggeredSubsystem():
                 around = outer
                 if isinstance(block, EnabledTriggeredSubsystem):
                     enable = self._enable(level, "enable", outer, restarts=False)
                     around = {ON: PortRef(enable, "on"), RESTART: PortRef(enable, "restart")}
                 control = self._trigger(level, "trigger", around, block.edge)
-                works = {FIRE: PortRef(control, "fire")}
-                gate = {**works, ELAPSED: PortRef(control, "elapsed")}
+                works = PortRef(control, "fire")
+                gate = {FIRE: works, ELAPSED: PortRef(control, "elapsed")}
                 if RESTART in outer:
                     gate[RESTART] = outer[RESTART]
             case ResettableSubsystem():
@@ -292,7 +293,7 @@ class _Flattening:
                 self.gates[level] = {**outer, RESTART: PortRef(control, "restart")}
                 return
         self.gates[level] = gate
-        self._hold(level, next(iter(works.values())), fires=FIRE in works)
+        self._hold(level, works, fires=FIRE in gate)
 
     def _enable(self, level: str, port: str, outer: Gate, *, restarts: bool) -> str:
         block = EnableControl(outer=ON in outer, anew=RESTART in outer, restarts=restarts)

@@ -31,7 +31,7 @@ class State:
     ``follows``: whether a mode is a function of the signals of the moment alone. Such modes are made
     consistent before any event (an edge, a trigger, a reset) acts on the signals. ``remembers``: such a
     function may also read the value that the mode had before (a hysteresis): that before the instant, or
-    before the latest event at it.
+    before the latest event at it. A discrete state that ``remembers`` is captured at the same times.
     """
 
     name: str

@@ -78,7 +78,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
     guards = _guards(model, flow)
     entries = [(name, guard) for name, guard, value in guards for _ in range(value.numel())]
     modes, followers, contradictions = _contradictions(model, symbols, flow)
-    remembered = _remembered(model, symbols)
+    remembered, recaptured = _remembered(model, symbols), _recaptured(model, symbols)
     ends = {"t": symbols.t, "x": symbols.x, "z": symbols.z, "w": loops.w, "p": symbols.p}
     m, e, p = {"m": symbols.m}, {"e": symbols.e}, {"p": symbols.p}
 
@@ -115,6 +115,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
         modes=modes,
         followers=followers,
         remembered=remembered,
+        recaptured=recaptured,
         locating=tuple(number for number, (_, guard) in enumerate(entries) if guard.locates),
         contradictions=function("contradictions", ends, c=contradictions) if modes else None,
         reset=function("reset", ends | e, **_reset(model, symbols, flow)),
@@ -274,6 +275,18 @@ def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
         for mode in equations.modes
         if mode.remembers
         for place in zip(_places(ranges[f"{name}/{mode.name}"]), _places(ranges[f"{name}/{mode.before}"]))
+    )
+
+
+def _recaptured(model: Model, symbols: Symbols) -> tuple[int, ...]:
+    """The places in ``z`` of the discrete states that are captured again wherever modes remember."""
+    ranges = signature(*symbols.discrete_slots).ranges
+    return tuple(
+        place
+        for name, equations in model.flow.equations.items()
+        for state in equations.discrete
+        if state.remembers and (SlotKind.CAPTURE, state.name) in equations.group_of
+        for place in _places(ranges[f"{name}/{state.name}"])
     )
 
 

@@ -136,6 +136,8 @@ class HybridSystem:
     remembered: tuple[tuple[int, int], ...] = ()
     """The places in ``z`` of the modes that are functions also of what they were before an instant, or before
     the latest event at it, and of that."""
+    recaptured: tuple[int, ...] = ()
+    """The places in ``z`` of captured values that go with such modes: they are captured again at events."""
     locating: tuple[int, ...] = ()
     """The guards whose zeros only tell when such modes change."""
     tangents: tuple[int, int, int] | None = None

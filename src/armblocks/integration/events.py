@@ -139,6 +139,7 @@ class Events:
                     turns.again()
             r.call(functions.take_signs, f.reals, no)
             self._count_events(time, yes, bounds=True)
+            self._capture_again()
             self._remember_modes()
             self.reset()
             self.take_reset()
@@ -172,6 +173,22 @@ class Events:
         self._hold(quiet_turns, follows=False)
         self.take_reset()
         self._take_fired_signs()
+
+    def _capture_again(self) -> None:
+        """Before the events of a turn act: what goes with modes that remember is captured as it is now."""
+        f, r, places = self.frame, self.frame.r, self.frame.places
+        if not f.sizes.recaptured:
+            return
+        z, new_z, unknowns, ticking = (
+            f.vector(place) for place in (places.z, places.new_z, places.trial_w, places.ticking)
+        )
+        for clock in range(len(f.sizes.clocks)):
+            ticking[clock] = 0.0
+        t = self.point.memory
+        r.call(system_functions.update, t, self.x, z, unknowns, f.p, ticking, new_z)
+        recaptured = r.integers("captured.again", f.sizes.recaptured)
+        for i in r.each(len(f.sizes.recaptured)):
+            z[recaptured[i]] = new_z[recaptured[i]]
 
     def _remember_modes(self) -> None:
         """What a mode is now is what it was before, for what comes next."""

@@ -122,6 +122,7 @@ class CompiledSystem:
             modes=tuple(int(place) for place in description["modes"]),
             followers=tuple(bool(follows) for follows in description["followers"]),
             remembered=tuple((int(mode), int(before)) for mode, before in description["remembered"]),
+            recaptured=tuple(int(place) for place in description["recaptured"]),
             locating=tuple(int(guard) for guard in description["locating"]),
             tangents=None if description["tangents"] is None else tuple(description["tangents"]),
         )
@@ -303,6 +304,7 @@ def _describe(system: HybridSystem, tapes: Mapping[str, Tape]) -> dict[str, Any]
         "modes": list(system.modes),
         "followers": list(system.followers),
         "remembered": [list(places) for places in system.remembered],
+        "recaptured": list(system.recaptured),
         "locating": list(system.locating),
         "tangents": system.tangents,
         "guard_directions": list(system.guard_directions),

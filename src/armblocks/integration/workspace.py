@@ -138,7 +138,8 @@ class LoopSizes:
     those that end the run where they are positive. ``captures``: whether ``update`` is also called just
     before every instant. ``modes``: the places of the modes in ``z``; ``followers``, for each, whether it
     is a function of the signals alone; ``remembered``, the places in ``z`` of those that also read what they
-    were before, each with the place of that; ``locating``, the guards that only tell when such modes change.
+    were before, each with the place of that; ``recaptured``, the places of the captured values that go with
+    these; ``locating``, the guards that only tell when such modes change.
     ``tangents``: from which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any.
     """
 
@@ -153,6 +154,7 @@ class LoopSizes:
     modes: tuple[int, ...] = ()
     followers: tuple[bool, ...] = ()
     remembered: tuple[tuple[int, int], ...] = ()
+    recaptured: tuple[int, ...] = ()
     locating: tuple[int, ...] = ()
     tangents: tuple[int, int, int] | None = None
 

@@ -106,7 +106,8 @@ class Backlash(Block):
         return {"y": inputs["u"]}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("rest", inputs["u"], "the output just before the latest instant"),)
+        doc = "the output just before the latest instant, or before the latest event at it"
+        return (State("rest", inputs["u"], doc, remembers=True),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         doc = "1 driven upwards, -1 downwards, 0 at rest"
