@@ -69,8 +69,8 @@ def test_a_bare_trim_of_a_diagram_without_states_says_so(invoke: Invoke) -> None
 
 def test_what_cannot_be_read_is_refused(refused: Callable[..., str]) -> None:
     assert "--free is given without --trim" in refused("linearize", "falling_pendulum", "--free", "a.b")
-    assert "does not say which name gets which value" in refused("trim", "falling_pendulum", "--fix", "q")
-    assert "'up' is no number" in refused("trim", "falling_pendulum", "--fix", "pendulum/q=up")
+    assert "is not of the form NAME=VALUE" in refused("trim", "falling_pendulum", "--fix", "q")
+    assert "'up' is not a number" in refused("trim", "falling_pendulum", "--fix", "pendulum/q=up")
     assert "the range of 'pendulum/q' has 1 numbers" in refused(
         "trim", "falling_pendulum", "--bound", "pendulum/q=1"
     )

@@ -100,9 +100,7 @@ def test_assignments_are_collected_by_path() -> None:
 
 @pytest.mark.parametrize("text", ["tmax=5", "jtraj.tmax", "=5", ".tmax=5", "jtraj.=5", ""])
 def test_an_assignment_names_block_and_parameter(text: str) -> None:
-    with pytest.raises(
-        InputError, match=r"does not say which parameter gets which value.*--set jtraj.tmax=5"
-    ):
+    with pytest.raises(InputError, match=r"is not of the form block.parameter=value.*--set jtraj.tmax=5"):
         parse_assignments([text])
 
 

@@ -55,7 +55,7 @@ def test_a_search_lists_what_mentions_the_words(invoke: Invoke) -> None:
 def test_a_search_without_a_find_says_so(invoke: Invoke) -> None:
     result = invoke("blocks", "--search", "xyzzy")
     assert result.exit_code == 2
-    assert "no block's documentation has 'xyzzy'" in result.stderr
+    assert "no block's documentation contains 'xyzzy'" in result.stderr
 
 
 def test_options_that_do_not_go_together_are_refused(invoke: Invoke) -> None:

@@ -59,7 +59,7 @@ def test_a_checkout_builds_the_pages_once_and_says_why_it_cannot(
         docs.built_pages(lines.append, absent, script)
     script.parent.mkdir()
     script.write_text("raise SystemExit(3)")
-    with pytest.raises(FormatError, match=r"documentation could not be built; the reason.*mend what it"):
+    with pytest.raises(FormatError, match=r"documentation could not be built; the reason.*correct the rep"):
         docs.built_pages(lines.append, absent, script)
     monkeypatch.setattr(docs, "installed", lambda tool: tool != "furo")
     with pytest.raises(FormatError, match=r"no built documentation, and Sphinx.*pip install --editable"):
@@ -70,6 +70,6 @@ def test_a_checkout_builds_the_pages_once_and_says_why_it_cannot(
     )
     assert docs.built_pages(lines.append, absent, script) == index.parent
     assert len(lines) == 2
-    assert "has no built documentation yet: it is built now" in lines[0]
+    assert "Building the documentation of this checkout" in lines[0]
     script.write_text("raise SystemExit(3)")
     assert docs.built_pages(lines.append, absent, script) == index.parent  # they are there

@@ -46,8 +46,8 @@ def test_a_model_outside_of_the_folder(refused: Refused, tmp_path: Path) -> None
     (tmp_path / "m.json").write_text("{}")
     (tmp_path / "other").mkdir()
     text = said(refused("studio", "--no-browser", "--folder", "other", "m.json"))
-    assert "the model 'm.json' does not lie in the folder" in text
-    assert "leave --folder out" in text
+    assert "the model 'm.json' is not in the folder" in text
+    assert "omit --folder" in text
 
 
 def test_a_model_that_is_not_there(refused: Refused) -> None:

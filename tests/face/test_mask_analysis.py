@@ -63,7 +63,7 @@ def test_what_has_no_slope_says_why() -> None:
     run = ab.begin(loop(), stop_time=1.0)
     with pytest.raises(
         InputError,
-        match=r"parameter 'n' cannot take this value while the diagram runs: 'hold.sample_time', which "
-        r"follows from it, belongs to the structure.*Allowed: tunable parameters, .*: K, ",
+        match=r"parameter 'n' cannot take this value during a run: 'hold.sample_time', which "
+        r"depends on it, is not tunable.*Allowed: tunable parameters, .*: K, ",
     ):
         run.set("n", 0.25)

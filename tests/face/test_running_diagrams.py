@@ -120,7 +120,7 @@ def test_a_run_refuses_what_is_not_tunable() -> None:
     run = ab.begin("van_der_pol_pid", parameters={"PID.P": 3.0})
     assert run.parameters["PID.P"] == 3.0
     run.advance(steps=10)
-    with pytest.raises(InputError, match=r"'error.signs' cannot take this value while the diagram runs"):
+    with pytest.raises(InputError, match=r"'error.signs' cannot take this value during a run"):
         run.set("error.signs", "++")
     with pytest.raises(UnknownNameError, match=r"no parameter named 'Q'"):
         run.set("PID.Q", 1.0)

@@ -1,8 +1,8 @@
-"""What ``--set block.parameter=value`` says: read by rule, nothing is evaluated.
+"""The grammar of ``--set block.parameter=value``: parsed, never evaluated by Python.
 
-The parameter follows the last dot before ``=``. A value is a formula of numbers as everywhere
+The parameter follows the last dot before ``=``. A value is a formula of numbers
 (:mod:`armblocks.diagram.expression_language`), ``2``, ``3*pi/4`` or ``[1 2; 3 4]``; a row without brackets,
-``1,2,3``; ``true`` or ``false``; or a text, in quotes or a bare word.
+``1,2,3``; ``true`` or ``false``; or a text in quotes, or a single word.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _WORD = re.compile(r"(?!pi$)[A-Za-z_][A-Za-z0-9_.-]*", re.ASCII)
 def parse_assignments(texts: Sequence[str]) -> dict[str, Value]:
     """Values by ``block.parameter``, from the texts of ``--set``.
 
-    Raises ``InputError`` for a text that the grammar above does not know and for a parameter set twice.
-    Whether the block and the parameter exist is for the diagram to say.
+    Raises ``InputError`` for a text outside this grammar and for a parameter that is set twice. The diagram
+    checks whether block and parameter exist.
     """
     values: dict[str, Value] = {}
     for text in texts:
@@ -34,7 +34,7 @@ def parse_assignments(texts: Sequence[str]) -> dict[str, Value]:
         block, dot, parameter = path.rpartition(".")
         if not (equals and dot and block and parameter):
             raise InputError(
-                f"'{text}' does not say which parameter gets which value",
+                f"'{text}' is not of the form block.parameter=value",
                 where="--set",
                 allowed="block.parameter=value",
                 fix="write for example --set jtraj.tmax=5",
@@ -46,18 +46,18 @@ def parse_assignments(texts: Sequence[str]) -> dict[str, Value]:
 
 
 def parse_value(text: str, where: str = "--set") -> Value:
-    """The value that one text says; raises ``InputError`` where it says none."""
+    """The value of one text; raises ``InputError`` for an invalid text."""
     if len(text) >= 2 and text[0] == text[-1] and text[0] in "\"'":
         return text[1:-1]
     if _WHOLE.fullmatch(text):
         return int(text)
-    if _PLAIN.fullmatch(text):  # NaN too: the parameter's own check says what it may be
+    if _PLAIN.fullmatch(text):  # NaN too: the parameter's rule checks the range
         return float(text)
     if text in ("true", "false"):
         return text == "true"
     if _WORD.fullmatch(text):
         return text
-    from armblocks.diagram.mask import formula_number  # brings CasADi, which plain values do not need
+    from armblocks.diagram.mask import formula_number  # imports CasADi, which plain values do not need
 
     row = "," in text and not any(mark in text for mark in "[(")
     try:

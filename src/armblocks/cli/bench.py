@@ -1,4 +1,4 @@
-"""``armblocks bench``: what this machine makes of a robot's kernels, in some seconds."""
+"""``armblocks bench``: times the kernels of a robot on this machine, within seconds."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ METHODS: dict[str, tuple[str, ...]] = {
     "rne": ("q", "qd", "qdd"),
     "accel": ("q", "qd", "tau"),
 }
-"""What is measured, with the inputs of each."""
+"""The measured functions, with their inputs."""
 
 _REPEATS = 5
-"""The least of the repeats is told: what the machine can do, not what else it was doing."""
+"""The minimum of the repeats is reported, which is least affected by other load."""
 
 
 def bench(
@@ -37,14 +37,14 @@ def bench(
     samples: Annotated[int, typer.Option(min=1, max=10_000_000, help="Size of the batch.")] = 100_000,
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Threads of the last column.")] = 2,
 ) -> None:
-    """Time the kernels of one robot here: single calls, a batch on one thread and on several."""
+    """Time the kernels of one robot: single calls, a batch on one thread and on several threads."""
     import armblocks as ab
 
     arm = ab.load_robot(robot)
     console = results_console()
     console.print(
         f"{arm.name}, {arm.n} joints; batches of {samples:,}; {os.cpu_count()} processors; "
-        f"the least of {_REPEATS} repeats, ns per evaluation",
+        f"the minimum of {_REPEATS} repeats, ns per evaluation",
         style=STRONG,
     )
     columns = ("one call", "batch", f"{threads} threads", "multiplies", "adds", "fused", "others")
@@ -80,7 +80,7 @@ def _row(arm: Arm, method: str, inputs: int, samples: int, threads: int) -> list
 
 
 def _least(work: Callable[[], object]) -> float:
-    """Seconds of the quickest of some repeats."""
+    """Time of the fastest repeat, s."""
     best = float("inf")
     for _ in range(_REPEATS):
         start = time.perf_counter()

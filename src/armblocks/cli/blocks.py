@@ -18,9 +18,10 @@ if TYPE_CHECKING:
 
 
 def describe_blocks(
-    name: Annotated[str | None, typer.Argument(help="A block, by its type or title; none: all.")] = None,
+    name: Annotated[str | None, typer.Argument(help="A block, by its type or title; by default all.")] = None,
     search: Annotated[
-        str | None, typer.Option("--search", metavar="TEXT", help="Only blocks whose documentation has TEXT.")
+        str | None,
+        typer.Option("--search", metavar="TEXT", help="Only blocks whose documentation contains TEXT."),
     ] = None,
     save: Annotated[
         Path | None,
@@ -35,7 +36,7 @@ def describe_blocks(
         raise InputError(
             f"the block '{name}' and the search '{search}' are both given",
             allowed="a block's name or --search",
-            fix="leave one of them out",
+            fix="omit one of them",
             where="armblocks blocks",
         )
     if name is None and save is not None:
@@ -73,7 +74,7 @@ def _list(console: Console, search: str | None) -> None:
     kinds = [kind for kind in BLOCKS.values() if search is None or _mentions(kind, search)]
     if not kinds:
         raise InputError(
-            f"no block's documentation has '{search}'",
+            f"no block's documentation contains '{search}'",
             allowed="part of a word of a block's name, title or documentation",
             fix="list them all with 'armblocks blocks'",
             where="armblocks blocks --search",
@@ -91,10 +92,10 @@ def _mentions(kind: type[Block], search: str) -> bool:
 
 
 def blocks_table(kinds: list[type[Block]]) -> Table:
-    """A line for each block, under the names of their families."""
+    """One line for each block, grouped by family."""
     from armblocks.blocks import BLOCKS
 
-    rows = table(("block", "left"), ("what it does", "left"))
+    rows = table(("block", "left"), ("description", "left"))
     for family, members in BLOCKS.families.items():
         listed = [kind for kind in members if kind in kinds]
         if listed:
@@ -142,7 +143,7 @@ def _show(console: Console, kind: type[Block]) -> None:
 
 
 def _paragraphs(docstring: str) -> list[Text]:
-    """The docstring for a terminal: prose is filled anew, indented formulas stay as they are."""
+    """The docstring for a terminal: paragraphs are refilled, indented formulas are kept."""
     found: list[Text] = []
     for paragraph in docstring.replace("::\n", ":\n").replace("``", "").split("\n\n"):
         kept = paragraph.startswith("    ")
@@ -151,7 +152,7 @@ def _paragraphs(docstring: str) -> list[Text]:
 
 
 def _ports(title: str, ports: tuple[Port, ...]) -> Table:
-    rows = table((title, "left"), ("shape", "left"), ("unit", "left"), ("what it is", "left"))
+    rows = table((title, "left"), ("shape", "left"), ("unit", "left"), ("description", "left"))
     for port in ports:
         rows.add_row(port.name, shape_text(port), port.unit, port.doc)
     return rows
@@ -165,7 +166,7 @@ def shape_text(port: Port) -> str:
 
 
 def _parameters(rules: tuple[Parameter, ...]) -> Table:
-    rows = table(("parameter", "left"), ("default", "left"), ("unit", "left"), ("what it is", "left"))
+    rows = table(("parameter", "left"), ("default", "left"), ("unit", "left"), ("description", "left"))
     for rule in rules:
         default = "none" if rule.required else str(rule.default)
         doc = f"{rule.doc}: {rule.describe()}" if rule.choices else rule.doc

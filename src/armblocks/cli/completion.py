@@ -1,6 +1,6 @@
-"""Names that the shell completes: of what is shipped, beside the files that the shell finds itself.
+"""Shell completion of shipped names, in addition to files.
 
-They are read from folder listings, so that a press of the Tab key imports no library of armblocks.
+Names are read from folder listings, so that completion imports no library of armblocks.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import typer
 
 
 def complete_models(typed: str) -> list[str]:
-    """Shipped diagrams, and diagram files beneath the folder that is typed."""
+    """Shipped diagrams, and diagram files in the typed folder."""
     from armblocks.formats.shipped import list_examples
 
     return [*_beginning(typed, list_examples()), *_files(typed)]
@@ -37,7 +37,7 @@ def _beginning(typed: str, names: tuple[str, ...]) -> list[str]:
 
 
 def _files(typed: str) -> list[str]:
-    """Folders, and files with a suffix that robots and diagrams have, in the folder typed so far."""
+    """Folders, and files with a suffix of robots or diagrams, in the typed folder."""
     folder, slash, beginning = typed.rpartition("/")
     try:
         entries = sorted(Path(f"{folder}/" if slash else ".").iterdir())

@@ -24,10 +24,12 @@ def convert(
         Path, typer.Argument(help="The file to write: .json, or .py for a diagram as a Python program.")
     ],
     name: Annotated[
-        str | None, typer.Option("--name", help="Which robot of a script that makes several.")
+        str | None, typer.Option("--name", help="Robot to select from a script with several robots.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
-    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagram names.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
+    ] = False,
 ) -> None:
     """Write a robot, diagram or library in another format: .m or .json to .json, a diagram to .py."""
     import armblocks as ab
@@ -39,7 +41,7 @@ def convert(
             "a Python program is not converted, because it would have to be run",
             where=source,
             allowed="robots (.json, .m), diagrams and libraries (.json), shipped names",
-            fix='run it, and let it call ab.save_diagram(diagram, "model.json")',
+            fix='run it with an additional call ab.save_diagram(diagram, "model.json")',
         )
     kind = kind_of_document(source)
     suffixes = (".json", ".py") if kind is DocumentKind.DIAGRAM else (".json",)

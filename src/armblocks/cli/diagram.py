@@ -1,4 +1,4 @@
-"""``armblocks diagram``: a sheet of a diagram as a picture."""
+"""``armblocks diagram``: draws a diagram into a picture file."""
 
 from __future__ import annotations
 
@@ -22,12 +22,16 @@ def diagram(
     ] = "",
     dark: Annotated[
         bool | None,
-        typer.Option("--dark/--light", help="The colours.", show_default="light; SVG as its reader prefers"),
+        typer.Option(
+            "--dark/--light", help="The colours.", show_default="light; for SVG the viewer's preference"
+        ),
     ] = None,
     rates: Annotated[
-        bool, typer.Option("--rates", help="Show the sample times: a colour for each, and a legend.")
+        bool, typer.Option("--rates", help="Show the sample times by colours, with a legend.")
     ] = False,
-    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagram names.")] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
+    ] = False,
 ) -> None:
     """Draw a diagram, or one of its subsystems, into a file."""
     import armblocks as ab

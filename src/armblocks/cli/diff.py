@@ -1,4 +1,4 @@
-"""``armblocks diff``: what is different between two diagrams, whatever their layout."""
+"""``armblocks diff``: the differences between two diagrams, without layout."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 DIFFERENT = 1
 _LONGEST = 160
-"""Longest text of a value that is shown whole."""
+"""Maximum length of a value's text that is shown in full."""
 
 
 def diff(
@@ -33,9 +33,11 @@ def diff(
         str, typer.Argument(help="The diagram to compare it with.", autocompletion=complete_models)
     ],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object instead of lines.")] = False,
-    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that the diagrams name.")] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the Python files that the diagrams name.")
+    ] = False,
 ) -> None:
-    """Say what differs between two diagrams, ignoring their layout. Exit code 0: nothing, 1: something."""
+    """Show the differences between two diagrams, without layout. Exit code 0: none, 1: some."""
     import armblocks as ab
 
     old, new = ab.load_diagram(before, trust=trust), ab.load_diagram(after, trust=trust)
@@ -48,11 +50,12 @@ def diff(
         raise typer.Exit(DIFFERENT)
 
 
-# -- for people ----------------------------------------------------------------------------------------------
+# -- text output
+# ----------------------------------------------------------------------------------------------
 
 
 def print_difference(found: DiagramDifference, before: str, after: str, console: Console) -> None:
-    """A heading, then a line for each difference in groups; the sign in front says what the colour does."""
+    """A heading, then grouped differences, one per line; leading signs repeat the colours."""
     if not found:
         console.print(f"{before} and {after} are the same, layout aside", style=STRONG, soft_wrap=True)
         return
@@ -103,13 +106,13 @@ def _ports(ports: Sequence[PlacedPort]) -> list[str]:
 
 
 def _block_text(block: Block) -> str:
-    """The type and what is not as the type has it by itself."""
+    """The type, and the parameters that differ from their defaults."""
     words = [f"{name}={value_text(value)}" for name, value in own_values(block).items()]
     return " ".join([block.type_name(), *words])
 
 
 def own_values(block: Block) -> dict[str, object]:
-    """The parameters of a block that are not as its type has them; formulas as such."""
+    """The parameters of a block that differ from their defaults; formulas as text."""
     rules = block.own_parameters()
     values = {rule.name: block.stated_value(rule.name) for rule in rules}
     return {
@@ -128,7 +131,7 @@ def _change_text(entry: ValueChange, joint: str) -> str:
 
 
 def _where_different(before: object, after: object) -> str:
-    """Of two values whose short texts agree: which entries of arrays or fields of descriptions do not."""
+    """For two values with equal short texts: the array entries or fields that differ."""
     if isinstance(before, tuple) and isinstance(after, tuple):
         old, new = _as_array(cast("Any", before)), _as_array(cast("Any", after))
         if old.shape == new.shape:
@@ -153,7 +156,7 @@ def _as_array(value: Any) -> NDArray[np.float64]:
 
 
 def value_text(value: object) -> str:
-    """A value in few words: arrays as ``--set`` takes them, robots and functions by name."""
+    """The short text of a value: arrays as for ``--set``, robots and functions by name."""
     if value is None:
         return "none"
     if isinstance(value, bool):
@@ -197,11 +200,11 @@ def _object_text(value: object) -> str:
     return f"{kind} {name}" if name else kind
 
 
-# -- for programs --------------------------------------------------------------------------------------------
+# -- JSON output --------------------------------------------------------------------------------------------
 
 
 def difference_document(found: DiagramDifference) -> dict[str, object]:
-    """The difference as JSON has it: every list there, empty where nothing of the kind differs."""
+    """The differences as a JSON object: all lists are present, possibly empty."""
     return {
         "same": not found,
         "added": [_placed(entry.path, entry.block) for entry in found.added],
@@ -234,7 +237,7 @@ def _change(entry: ValueChange) -> dict[str, object]:
 
 
 def _plain(value: object) -> object:
-    """The value where JSON has such values, else its text (an infinity is the text ``inf``)."""
+    """The value if JSON can represent it, else its text (an infinity is the text ``inf``)."""
     if isinstance(value, tuple):
         return [_plain(entry) for entry in cast("tuple[object, ...]", value)]
     if isinstance(value, float) and not math.isfinite(value):

@@ -17,15 +17,15 @@ from armblocks.extras import installed
 
 PACKAGE = Path(__file__).parents[1]
 INSTALLED = PACKAGE / "shipped" / "docs"
-"""Where a wheel has the pages."""
+"""The folder of the pages in a wheel."""
 BUILD = PACKAGE.parents[1] / "docs" / "build_site.py"
 """The script that builds the pages; only a checkout has it."""
 TOOLS = ("sphinx", "furo", "myst_parser")
-"""What the script needs: the extra ``docs``."""
+"""The libraries of the extra ``docs``, which the script needs."""
 
 
 def complete_pages(typed: str) -> list[str]:
-    """Names of the pages that are there."""
+    """Names of the existing pages."""
     folder = INSTALLED if INSTALLED.is_dir() else BUILD.parent / "_build" / "html"
     return [name for name in pages(folder) if name.startswith(typed)]
 
@@ -40,10 +40,10 @@ def docs(
         ),
     ] = "index",
     path: Annotated[
-        bool, typer.Option("--path", help="Print where the page lies, and open no browser.")
+        bool, typer.Option("--path", help="Print the path of the page without opening a browser.")
     ] = False,
 ) -> None:
-    """Open the documentation in the browser. It lies on this machine and loads nothing from elsewhere."""
+    """Open the documentation in the browser, without network access."""
     console = messages_console()
     folder = built_pages(lambda text: console.print(text, soft_wrap=True), INSTALLED, BUILD)
     found = pages(folder)
@@ -54,15 +54,17 @@ def docs(
 
 
 def pages(folder: Path) -> dict[str, Path]:
-    """Every page by name, blocks by theirs; a guide goes before a block of the same name."""
+    """All pages by name, including blocks; a guide takes precedence over a block of the same name."""
     files = [*sorted(folder.glob("reference/blocks/*.html")), *sorted(folder.glob("reference/*.html"))]
     return {path.stem: path for path in [*files, *sorted(folder.glob("*.html"))]}
 
 
 def built_pages(notify: Callable[[str], None], installed_pages: Path, script: Path) -> Path:
-    """The folder of the built pages. A checkout that has none builds them; ``notify`` gets a line before.
+    """The folder of the built pages, which are built first in a checkout without pages.
 
-    Raises ``FormatError`` where there are none and none can be built.
+    ``notify`` gets a line before the build.
+
+    Raises ``FormatError`` where there are no pages and they cannot be built.
     """
     if (installed_pages / "index.html").is_file():
         return installed_pages
@@ -73,23 +75,23 @@ def built_pages(notify: Callable[[str], None], installed_pages: Path, script: Pa
         raise FormatError(
             "this installation has no documentation: it was installed with ARMBLOCKS_SKIP_DOCS=1",
             where=str(installed_pages),
-            allowed="everything but this command works",
+            allowed="everything except this command works",
             fix="install a wheel that has it, or read the folder docs of the sources",
         )
     if not all(installed(tool) for tool in TOOLS):
         raise FormatError(
             "this checkout has no built documentation, and Sphinx and its theme are not installed",
             where=str(folder),
-            allowed="the sources of the pages can be read as they are, in the folder docs",
+            allowed="the sources of the pages are readable text, in the folder docs",
             fix=f'{sys.executable} -m pip install --editable "{script.parents[1]}[docs]"',
         )
-    notify("This checkout has no built documentation yet: it is built now, once (about a minute).")
+    notify("Building the documentation of this checkout, once (about a minute).")
     done = subprocess.run([sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno())
     if done.returncode != 0:
         raise FormatError(
-            "the documentation could not be built; the reason stands above",
+            "the documentation could not be built; the reason is printed above",
             where=str(script),
-            allowed="the sources of the pages can be read as they are, in the folder docs",
-            fix=f"run 'python {script}' and mend what it names",
+            allowed="the sources of the pages are readable text, in the folder docs",
+            fix=f"run 'python {script}' and correct the reported error",
         )
     return folder

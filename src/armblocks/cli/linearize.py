@@ -18,38 +18,36 @@ if TYPE_CHECKING:
     from armblocks import LinearSystem, OperatingPoint
 
 SECTION = 12
-"""Poles that are listed; more are counted."""
+"""Maximum number of listed poles."""
 
 
 def linearize(
     model: ModelName,
     inputs: Annotated[
         list[str] | None,
-        typer.Option(
-            "--input", metavar="SIGNAL", help="A signal or parameter that is moved; may be repeated."
-        ),
+        typer.Option("--input", metavar="SIGNAL", help="An input: signal or parameter; may be repeated."),
     ] = None,
     outputs: Annotated[
         list[str] | None,
-        typer.Option("--output", metavar="SIGNAL", help="A signal that is looked at; may be repeated."),
+        typer.Option("--output", metavar="SIGNAL", help="An output signal; may be repeated."),
     ] = None,
     opened: Annotated[
         list[str] | None,
-        typer.Option("--open", metavar="SIGNAL", help="A signal whose loop is cut; may be repeated."),
+        typer.Option(
+            "--open", metavar="SIGNAL", help="A signal at which the loop is opened; may be repeated."
+        ),
     ] = None,
-    at: Annotated[float, typer.Option(help="Time of the run to linearize at, s.")] = 0.0,
+    at: Annotated[float, typer.Option(help="Time of the run at which to linearize, s.")] = 0.0,
     delay_order: Annotated[
         int | None,
-        typer.Option(help="States that stand for each dead time (Padé approximation).", show_default=False),
+        typer.Option(help="States per dead time (order of the Padé approximation).", show_default=False),
     ] = None,
     trimmed: Annotated[
-        bool, typer.Option("--trim", help="Linearize where the diagram rests, sought from there.")
+        bool, typer.Option("--trim", help="Trim from there, and linearize at the operating point.")
     ] = False,
     free: Annotated[
         list[str] | None,
-        typer.Option(
-            "--free", metavar="BLOCK.PARAMETER", help="With --trim: a parameter that is sought too."
-        ),
+        typer.Option("--free", metavar="BLOCK.PARAMETER", help="With --trim: a free parameter."),
     ] = None,
     assignments: Annotated[
         list[str] | None,
@@ -61,7 +59,7 @@ def linearize(
 ) -> None:
     """Print the exact linear system of a diagram: matrices, poles, zeros, margins.
 
-    A loop that is opened where it is moved and looked at is shown as the L of 1 + L, so with its sign turned.
+    A loop that is opened at its input and output is shown as L of 1 + L, that is, with inverted sign.
     """
     import armblocks as ab
 
@@ -101,7 +99,7 @@ def linearize(
 
 
 def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: bool) -> None:
-    """Heading, matrices, poles, zeros and, of a single channel, what is told by numbers."""
+    """Heading, matrices, poles, zeros and, for a single channel, gain, bandwidth and margins."""
     from armblocks.analysis.shown_values import shown_dcgain, shown_zeros
     from armblocks.analysis.text import complex_number, heading, matrices, matrix_lines
 
@@ -118,7 +116,7 @@ def print_system(system: LinearSystem, console: Console, *, loop: bool, hertz: b
     if not system.is_siso:
         return
     gain = float(shown_dcgain(system)[0, 0])
-    console.print(f"gain at rest: {gain:.6g}")
+    console.print(f"steady-state gain: {gain:.6g}")
     if loop:
         _print_margins(system, console, hertz=hertz)
     elif system.is_stable and math.isfinite(gain) and gain:

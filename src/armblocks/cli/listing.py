@@ -1,4 +1,4 @@
-"""``armblocks list``: what comes with armblocks, by name, with one line each."""
+"""``armblocks list``: the names of shipped items, with one line each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from armblocks.errors import InertiaWarning
 
 
 class Kind(StrEnum):
-    """What can be listed."""
+    """The kinds of items."""
 
     ROBOTS = "robots"
     BLOCKS = "blocks"
@@ -39,8 +39,8 @@ def list_names(kind: Annotated[Kind, typer.Argument(help="What to list.")]) -> N
 def _robots() -> Table:
     import armblocks as ab
 
-    rows = table(("robot", "left"), ("joints", "left"), ("what it is", "left"))
-    # Each of them is loaded only to be named; its inertias are a matter for those who use it.
+    rows = table(("robot", "left"), ("joints", "left"), ("description", "left"))
+    # Loaded for its name only: warnings about inertias are for users of the robot.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         for name in ab.list_robots():
@@ -59,7 +59,7 @@ def _blocks() -> Table:
 def _examples() -> Table:
     import armblocks as ab
 
-    rows = table(("example", "left"), ("blocks", "right"), ("stop time", "right"), ("what it shows", "left"))
+    rows = table(("example", "left"), ("blocks", "right"), ("stop time", "right"), ("description", "left"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         for name in ab.list_examples():
@@ -72,7 +72,7 @@ def _examples() -> Table:
 def _libraries() -> Table:
     import armblocks as ab
 
-    rows = table(("library", "left"), ("subsystem", "left"), ("parameters", "left"), ("what it is", "left"))
+    rows = table(("library", "left"), ("subsystem", "left"), ("parameters", "left"), ("description", "left"))
     for library in ab.list_libraries():
         for name, subsystem in ab.load_library(library).items():
             inside = subsystem.diagram

@@ -1,7 +1,7 @@
-"""The entry point of the command line: commands, and what becomes of errors, warnings and Ctrl-C.
+"""The entry point of the command line: commands, and handling of errors, warnings and Ctrl-C.
 
-Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 the input was refused (a message, no
-traceback), 130 interrupted with Ctrl-C. ``diff`` alone ends with 1 also where its diagrams differ.
+Exit codes: 0 done, 1 a defect of armblocks (with a traceback), 2 invalid input (a message, no traceback), 130
+interrupted with Ctrl-C. ``diff`` also exits with 1 where its diagrams differ.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from armblocks.errors import ArmblocksError
 REFUSED = 2
 INTERRUPTED = 130
 GARBAGE_THRESHOLD = 50_000
-"""New objects after which Python looks for garbage that refers to itself."""
+"""Number of new objects between runs of Python's cyclic garbage collector."""
 
 
 class Commands(TyperGroup):
-    """All commands: the one place that turns an error into a message and an exit code."""
+    """All commands; errors become a message and an exit code here."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command that the arguments name."""
+        """Run the command given by the arguments."""
         try:
             with tidy_warnings(messages_console()):
                 return super().invoke(ctx)
@@ -87,14 +87,14 @@ def _say_version(asked: bool) -> None:
 def options(
     version: Annotated[
         bool,
-        typer.Option("--version", help="Say the version and stop.", callback=_say_version, is_eager=True),
+        typer.Option("--version", help="Print the version and exit.", callback=_say_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Options that stand before the command."""
+    """Options before the command."""
 
 
 def main() -> None:
-    """What the installed ``armblocks`` script calls."""
-    # Imports and reports make many objects and few cycles: the usual 700 takes a tenth of their time.
+    """The entry point of the installed ``armblocks`` script."""
+    # Imports and reports create many objects and few cycles: the default of 700 costs a tenth of their time.
     gc.set_threshold(GARBAGE_THRESHOLD)
     app()

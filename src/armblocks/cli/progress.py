@@ -1,4 +1,4 @@
-"""How far a run is: a moving bar for a person who watches, plain lines for a file or a pipe."""
+"""Progress of a run: a progress bar in a terminal, plain lines in a file or pipe."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from armblocks.cli.terminal import ACCENT
 
 _FIRST_LINE, _LINE_EVERY = 0.5, 5.0
-"""Seconds until the first plain line, and from one to the next; a short run has none."""
+"""Seconds before the first plain line, and between lines; short runs print none."""
 _WORTH_TELLING = 2.0
-"""Seconds from which on a person is told how long the rest takes."""
+"""Seconds after which the remaining time is shown."""
 
 
 class RunProgress:
@@ -61,7 +61,7 @@ class RunProgress:
 
 
 def _duration(seconds: float) -> str:
-    """A rough time for a person: ``40 s``, ``3 min``, ``1.5 h``."""
+    """A rounded duration: ``40 s``, ``3 min``, ``1.5 h``."""
     if seconds < 100.0:
         return f"about {seconds:.0f} s"
     return f"about {seconds / 60.0:.0f} min" if seconds < 6000.0 else f"about {seconds / 3600.0:.1f} h"

@@ -1,4 +1,4 @@
-"""``armblocks run``: simulate a diagram, tell how it went, and write its report."""
+"""``armblocks run``: simulates a diagram, prints a summary, and writes a report."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class DataFormat(StrEnum):
-    """Files that are written on request, beside CSV and Parquet."""
+    """Optional data formats, in addition to CSV and Parquet."""
 
     NPZ = "npz"
     MAT = "mat"
@@ -37,22 +37,22 @@ def run(
     solver: Annotated[
         str | None,
         typer.Option(
-            help="auto, or one of the table in the docs: rk45, dop853, rk4 …; rodas5p for stiff systems."
+            help="auto, or a solver of the documentation: rk45, dop853, rk4 …; rodas5p for stiff systems."
         ),
     ] = None,
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step solver, s.")] = None,
-    sample_time: Annotated[float | None, typer.Option(help="Spacing of the recorded instants, s.")] = None,
+    sample_time: Annotated[float | None, typer.Option(help="Interval of the recorded samples, s.")] = None,
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance of an adaptive solver.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance of an adaptive solver.")] = None,
     from_state: Annotated[
-        Path | None, typer.Option(help="Go on from the state that an earlier run saved.")
+        Path | None, typer.Option(help="Continue from the saved state of an earlier run.")
     ] = None,
     save_state: Annotated[
-        Path | None, typer.Option(help="Save the final state in this .npz file, to go on from it later.")
+        Path | None, typer.Option(help="Save the final state in this .npz file, for --from-state.")
     ] = None,
     log: Annotated[
         Path | None,
-        typer.Option(help="Write all recorded instants to this .parquet or .csv file while the run goes on."),
+        typer.Option(help="Write all recorded samples to this .parquet or .csv file during the run."),
     ] = None,
     log_signals: Annotated[
         str | None, typer.Option(help="Only these signals, separated by commas.", show_default="all")
@@ -65,13 +65,13 @@ def run(
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
     ] = None,
     formats: Annotated[
-        list[DataFormat] | None, typer.Option("--format", help="Also write the data so; may be repeated.")
+        list[DataFormat] | None, typer.Option("--format", help="An additional data format; may be repeated.")
     ] = None,
     figures: Annotated[
-        bool, typer.Option("--figures/--no-figures", help="Also write each figure as a file.")
+        bool, typer.Option("--figures/--no-figures", help="Also write the figures in this format.")
     ] = True,
     trust: Annotated[
-        bool, typer.Option("--trust", help="Run the Python files whose functions the diagram names.")
+        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
     ] = False,
     open_report: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
 ) -> None:
@@ -111,12 +111,12 @@ def run(
 
 
 def _stated(**settings: Any) -> dict[str, Any]:
-    """The settings that the command line states; the model's own stand for the others."""
+    """The settings of the command line; others are those of the model."""
     return {name: value for name, value in settings.items() if value is not None}
 
 
 def _simulate(diagram: Diagram, settings: dict[str, Any]) -> tuple[SimulationResult, SimulationError | None]:
-    """The result, and why it is only a part of the run where that could not go on."""
+    """The result; for a failed run the partial result and the reason."""
     import armblocks as ab
 
     with RunProgress(diagram.name, messages_console()) as progress:
@@ -135,7 +135,7 @@ def _report(
     from armblocks.report.writing import usable_data_formats
 
     with warnings.catch_warnings():
-        # The summary says every limit that is broken; once is enough.
+        # The summary lists exceeded limits already.
         warnings.simplefilter("ignore", LimitWarning)
         return ab.write_report(
             folder,
@@ -147,7 +147,7 @@ def _report(
 
 
 def _check_files(diagram: Diagram, formats: list[DataFormat]) -> None:
-    """What cannot be written is refused before the run rather than after it."""
+    """Check before the run that the files can be written."""
     from armblocks.report.sink_files import REPORT_DATA, sink_files
     from armblocks.simulation.export import check_format
 
@@ -157,7 +157,7 @@ def _check_files(diagram: Diagram, formats: list[DataFormat]) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    """Make the folder if absent; what cannot be written is refused before the run rather than after it."""
+    """Create the folder if absent; what cannot be written is refused before the run rather than after it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".armblocks-probe"
@@ -173,7 +173,7 @@ def _check_writable(folder: Path) -> None:
 
 @contextmanager
 def _given_back(made: Sequence[Path]) -> Generator[None]:
-    """Where the run is refused, folders that were made for it are taken away again, if they are empty."""
+    """If the run is refused, remove the folders that were created for it, if they are empty."""
     try:
         yield
     except BaseException:

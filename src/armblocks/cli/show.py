@@ -1,4 +1,4 @@
-"""``armblocks show``: a robot's tables, as the toolbox and the paper have them; a diagram's tree."""
+"""``armblocks show``: prints a robot's tables, as in the toolbox and the paper, or a diagram's tree."""
 
 from __future__ import annotations
 
@@ -23,13 +23,19 @@ def show(
     model: Annotated[
         str,
         typer.Argument(
-            help="The name of something shipped, or a file: a robot, a diagram, a library.",
+            help="A shipped name or a file: robot, diagram or library.",
             autocompletion=complete_anything,
         ),
     ],
-    name: Annotated[str | None, typer.Option(help="Which robot of a script that makes several.")] = None,
-    flat: Annotated[bool, typer.Option("--flat", help="All blocks of a diagram, without hierarchy.")] = False,
-    trust: Annotated[bool, typer.Option("--trust", help="Run Python files that a diagram names.")] = False,
+    name: Annotated[
+        str | None, typer.Option(help="Robot to select from a script with several robots.")
+    ] = None,
+    flat: Annotated[
+        bool, typer.Option("--flat", help="List all blocks of a diagram without hierarchy.")
+    ] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the Python files that the diagram names.")
+    ] = False,
 ) -> None:
     """Print a robot's D-H table, dynamics, limits, gravity, base and tool, or a diagram's hierarchy."""
     import armblocks as ab
@@ -49,7 +55,7 @@ def show(
         case DocumentKind.ROBOT:
             pass
     described = ab.load_robot(model, name=name).robot
-    # Loading a shipped robot is silent about what is known of it; here it belongs to what is shown.
+    # Loading a shipped robot gives no warnings about known deviations; here they are shown.
     warn_of_inertias(described)
     warn_of_doubts(described)
     print_robot(described, console)
@@ -79,7 +85,7 @@ def _print_heading(robot: Robot, console: Console) -> None:
 
 
 def _print_kinematics(robot: Robot, console: Console) -> None:
-    """The toolbox's own table where every moving link has a D-H row, else parents, axes and poses."""
+    """The toolbox's table if every moving link has a D-H row, else parents, axes and poses."""
     from armblocks.robot.dh_table import dh_table, kinematics_text
 
     if dh_table(robot):
@@ -133,7 +139,7 @@ _MOTORS: Sequence[Row] = (
 
 
 def _print_links(robot: Robot, console: Console, title: str, rows: Sequence[Row]) -> None:
-    """One column a link, as many side by side as the terminal has room for."""
+    """One column per link, as many side by side as fit into the terminal."""
     width = max([10, *(len(link.name) + 2 for link in robot.links)])
     fitting = max(1, (console.width - 16) // width)
     for start in range(0, len(robot.links), fitting):
@@ -193,7 +199,7 @@ def _or_nan(value: float | None) -> float:
 
 
 def _number(value: float) -> str:
-    """Six digits and no more zeros than needed; nothing for what a link does not have."""
+    """Six digits without trailing zeros; empty for a missing value."""
     return "" if math.isnan(value) else f"{value:.6g}"
 
 

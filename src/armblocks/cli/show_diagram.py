@@ -1,4 +1,4 @@
-"""What ``armblocks show`` prints of a diagram: its hierarchy as a tree, or all its blocks."""
+"""``armblocks show`` for a diagram: its hierarchy as a tree, or all its blocks."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def print_hierarchy(diagram: Diagram, console: Console) -> None:
-    """The tree of subsystems: what kind each is, its parameters, its library, and how much is inside."""
+    """The tree of subsystems, with type, parameters, library and size of each."""
     tree = Tree(_heading(diagram, diagram.name), guide_style=ACCENT)
     if diagram.description:
         tree.add(Text(diagram.description, "italic"))
@@ -28,7 +28,7 @@ def print_hierarchy(diagram: Diagram, console: Console) -> None:
 
 
 def print_flat(diagram: Diagram, console: Console) -> None:
-    """All blocks of the flat diagram, by path, with what is not as their types have it."""
+    """All blocks of the flat diagram, by path, with the parameters that differ from their defaults."""
     from armblocks.cli.diff import own_values
     from armblocks.diagram import flat_diagram
 
@@ -50,7 +50,7 @@ def _add_subsystems(tree: Tree, diagram: Diagram) -> None:
         branch = tree.add(Text.assemble(label, "  ", _count(inner)))
         if values := _values(block):
             branch.add(Text(values))
-        if not inner.link:  # what is inside is told by the library
+        if not inner.link:  # the library describes the content
             _add_subsystems(branch, inner)
 
 
@@ -85,7 +85,7 @@ def _mask_lines(diagram: Diagram) -> Iterator[Text]:
 
 
 def _values(block: DiagramBlock) -> str:
-    """``"w = 20 rad/s (from w0), G = 107.8"``: what the parameters of the mask are, and by which formula."""
+    """``"w = 20 rad/s (from w0), G = 107.8"``: the values of the mask parameters, and their formulas."""
     formulas = dict(block.formulas)
     shown: list[str] = []
     for rule in block.diagram.mask:
@@ -96,5 +96,5 @@ def _values(block: DiagramBlock) -> str:
 
 
 def _short(link: str) -> str:
-    """A link without the folders on the way to its file."""
+    """A library link without the folders of its file."""
     return link.rpartition("/")[2]

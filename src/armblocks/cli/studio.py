@@ -1,4 +1,4 @@
-"""``armblocks studio``: draw, run and watch models in the browser."""
+"""``armblocks studio``: edit and run models in the browser."""
 
 from __future__ import annotations
 
@@ -24,18 +24,22 @@ def studio(
     ] = "",
     folder: Annotated[
         Path | None,
-        typer.Option(help="Folder whose files the studio opens and saves.", show_default="this folder"),
+        typer.Option(
+            help="Folder of the files that the studio can open and save.", show_default="this folder"
+        ),
     ] = None,
     port: Annotated[
-        int, typer.Option(help="Port on this machine; 0 takes a free one.", min=0, max=65535)
+        int, typer.Option(help="Port on this machine; 0 uses a free port.", min=0, max=65535)
     ] = 0,
     new_session: Annotated[
         bool,
-        typer.Option("--new-session", help="Let no page of an earlier start go on without the new link."),
+        typer.Option("--new-session", help="Require the new link: pages of an earlier session lose access."),
     ] = False,
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page.")] = True,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+    ] = True,
 ) -> None:
-    """Open the studio in the browser: build a diagram, run it, watch scopes and arm. Ctrl-C ends it."""
+    """Open the studio in the browser: edit and run diagrams, view scopes and the arm. Ctrl-C ends it."""
     require("studio", "the studio")
     from armblocks.formats import list_examples
     from armblocks.studio.built_page import build_in_checkout
@@ -54,10 +58,10 @@ def studio(
         root = folder or path.resolve().parent
         if not path.resolve().is_relative_to(root.resolve()):
             raise InputError(
-                f"the model '{path}' does not lie in the folder",
+                f"the model '{path}' is not in the folder",
                 where=f"armblocks studio --folder {root}",
-                allowed="a file in this folder or below it: the studio reads and writes no others",
-                fix=f"leave --folder out, or give {path.resolve().parent}",
+                allowed="a file in this folder or its subfolders: the studio accesses no others",
+                fix=f"omit --folder, or give {path.resolve().parent}",
             )
         model = path.resolve().relative_to(root.resolve()).as_posix()
     console = messages_console()
@@ -65,6 +69,6 @@ def studio(
 
     def announce(link: str) -> None:
         console.print(f"The studio is at {link}", soft_wrap=True, highlight=False)
-        console.print("The link is good for one visit. Ctrl-C ends the studio.")
+        console.print("The link is valid once. Ctrl-C ends the studio.")
 
     serve(root, model, port=port, open_browser=browser, announce=announce, afresh=new_session)

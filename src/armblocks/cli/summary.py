@@ -1,4 +1,4 @@
-"""What a run came to, on one screen: how it went, displayed values, joints against their limits, files."""
+"""The summary of a run: statistics, displayed values, joints and their limits, files."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from armblocks.report.writing import ReportFiles
 
 BEYOND = "!"
-"""Marks what is beyond a limit, for readers without colours."""
+"""Marks values beyond a limit, for output without colours."""
 
 
 def print_run(result: SimulationResult, console: Console) -> None:
-    """One line: what was simulated, how, and how fast."""
+    """One line: model, solver and speed."""
     run = result.run
     end = f"{result.time[-1]:,.10g} s" if result.time.size else "nothing"
     how = "evaluated at" if run.solver == "none" else f"{run.solver}, {run.steps:,} steps, recorded at"
@@ -45,7 +45,7 @@ def print_run(result: SimulationResult, console: Console) -> None:
 
 
 def print_displays(diagram: Diagram, result: SimulationResult, console: Console) -> None:
-    """The last value of everything that a Display block shows."""
+    """The last values of all Display blocks."""
     shown = table(("display", "left"), ("signal", "left"), ("at the end", "left"), ("", "left"))
     for block, view in diagram_views(diagram):
         if view.kind is not ViewKind.VALUE or not result.time.size:
@@ -60,14 +60,14 @@ def print_displays(diagram: Diagram, result: SimulationResult, console: Console)
 
 
 def _value_text(value: NDArray[np.float64]) -> str:
-    """Nine digits: more than a Display shows, and what a person needs to compare two runs."""
+    """Nine digits: more than a Display block shows, enough to compare two runs."""
     rows = [[f"{number + 0.0:.9g}" for number in row] for row in np.atleast_2d(value)]
     widths = [max(len(cell) for cell in column) for column in zip(*rows)]
     return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths)) for row in rows)
 
 
 def print_motions(diagram: Diagram, result: SimulationResult, console: Console) -> None:
-    """Each robot's joints against their limits; what is beyond one stands out and is said in words."""
+    """Each robot's joints and their limits; values beyond a limit are marked and listed."""
     if not result.time.size:
         return
     for motion in motions(diagram, result):
@@ -120,7 +120,7 @@ def _joint_table(joints: Sequence[JointSummary], broken: set[tuple[str, LimitKin
 
 
 def _judged(text: str, beyond: bool) -> Text:
-    """A cell; beyond a limit it has a mark as well as a colour."""
+    """A cell; a value beyond a limit has a mark and a colour."""
     return Text(f"{BEYOND} {text}", ERROR) if beyond else Text(text)
 
 
@@ -133,7 +133,7 @@ def _short(value: float | None) -> str:
 
 
 def print_files(files: ReportFiles, console: Console) -> None:
-    """Where the report is."""
+    """The paths of the report and its files."""
     names = [path.name for path in (*files.data, files.diagram)]
     if files.figures:
         names.append(f"{len(files.figures)} figures in {files.figures[0].parent.name}")

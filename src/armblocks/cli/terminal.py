@@ -1,8 +1,8 @@
-"""What the commands say and how it looks: errors, warnings, tables, for wide and narrow terminals.
+"""Terminal output of the commands: errors, warnings, tables.
 
-Colours are chosen to be read on light and on dark backgrounds alike (contrast of at least 4:1 on both), no
-meaning hangs on colour alone, and nothing is dimmed. Results go to standard output; progress, warnings and
-errors go to standard error.
+Colours are legible on light and dark backgrounds (contrast of at least 4:1 on both), colour is never the only
+carrier of a meaning, and no text is dimmed. Results go to standard output; progress, warnings and errors go
+to standard error.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ GOOD = "bold color(28)"
 STRONG = "bold"
 
 _UNWRAPPED = 100_000
-"""Width for errors that do not go to a terminal: a log is searched by line, so lines stay whole."""
+"""Width of errors outside a terminal: lines are not wrapped, because logs are searched by line."""
 
 
 def results_console() -> Console:
-    """Standard output: 80 columns when it is no terminal, unless ``COLUMNS`` says otherwise.
+    """Standard output: 80 columns outside a terminal, unless ``COLUMNS`` is set.
 
-    Square brackets are plain text: messages and docstrings hold vectors, not markup.
+    Markup is disabled: square brackets in messages and docstrings are vectors.
     """
     return Console(highlight=False, markup=False, emoji=False)
 
@@ -65,7 +65,7 @@ def table(*columns: tuple[str, str], title: str | None = None) -> Table:
 
 
 def show_error(error: ArmblocksError) -> None:
-    """What, where, allowed and fix, one under the other."""
+    """The four parts of a message, one below the other."""
     console = messages_console()
     console.print(Text.assemble(("error: ", ERROR), (error.what, STRONG)), soft_wrap=not console.is_terminal)
     grid = Table.grid(padding=(0, 2))
@@ -79,13 +79,13 @@ def show_error(error: ArmblocksError) -> None:
 
 
 def debugging() -> bool:
-    """Whether ``ARMBLOCKS_DEBUG`` asks for tracebacks."""
+    """Whether ``ARMBLOCKS_DEBUG`` enables tracebacks."""
     return os.environ.get("ARMBLOCKS_DEBUG", "") not in ("", "0")
 
 
 @contextmanager
 def tidy_warnings(console: Console) -> Generator[None]:
-    """Show each armblocks warning once, as one line on ``console``; all others as Python does."""
+    """Show each armblocks warning once, as one line on ``console``; others as Python does."""
     shown: set[str] = set()
     pythons_own = warnings.showwarning
 
@@ -112,5 +112,5 @@ def tidy_warnings(console: Console) -> Generator[None]:
 
 
 def is_interactive(stream: TextIO = sys.stderr) -> bool:
-    """Whether a person watches: then progress moves, else it is told in plain lines."""
+    """Whether the output is interactive; if not, progress is printed as plain lines."""
     return stream.isatty()

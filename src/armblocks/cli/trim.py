@@ -1,4 +1,4 @@
-"""``armblocks trim``: the operating point at which a diagram rests."""
+"""``armblocks trim``: finds an equilibrium operating point of a diagram."""
 
 from __future__ import annotations
 
@@ -23,43 +23,47 @@ def trim(
     model: ModelName,
     fixed: Annotated[
         list[str] | None,
-        typer.Option("--fix", metavar="STATE=VALUE", help="A state with a given value; may be repeated."),
+        typer.Option("--fix", metavar="STATE=VALUE", help="A state with a fixed value; may be repeated."),
     ] = None,
     free: Annotated[
         list[str] | None,
-        typer.Option("--free", metavar="BLOCK.PARAMETER", help="A parameter that is sought too."),
+        typer.Option("--free", metavar="BLOCK.PARAMETER", help="A free parameter; may be repeated."),
     ] = None,
     outputs: Annotated[
         list[str] | None,
-        typer.Option("--output", metavar="SIGNAL=VALUE", help="A signal that has to have a value."),
+        typer.Option(
+            "--output", metavar="SIGNAL=VALUE", help="A required value of a signal; may be repeated."
+        ),
     ] = None,
     moving: Annotated[
         list[str] | None,
-        typer.Option("--moving", metavar="STATE", help="A state that need not rest; may be repeated."),
+        typer.Option(
+            "--moving", metavar="STATE", help="A state without equilibrium condition; may be repeated."
+        ),
     ] = None,
     guess: Annotated[
         list[str] | None,
-        typer.Option("--guess", metavar="NAME=VALUE", help="Where the search starts; may be repeated."),
+        typer.Option("--guess", metavar="NAME=VALUE", help="Start value of the search; may be repeated."),
     ] = None,
     bounds: Annotated[
         list[str] | None,
-        typer.Option("--bound", metavar="NAME=LOW,HIGH", help="Range of a state or free parameter."),
+        typer.Option("--bound", metavar="NAME=LOW,HIGH", help="Bounds of a state or free parameter."),
     ] = None,
-    at: Annotated[float, typer.Option(help="Time of the run to start the search at, s.")] = 0.0,
+    at: Annotated[float, typer.Option(help="Time of the run at which the search starts, s.")] = 0.0,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="BLOCK.PARAMETER=VALUE", help="Change a parameter; may be repeated."),
     ] = None,
     save: Annotated[
-        Path | None, typer.Option(help="Save the point, for armblocks run --from-state, as .npz.")
+        Path | None, typer.Option(help="Save the point as .npz, for armblocks run --from-state.")
     ] = None,
     names: Annotated[
-        bool, typer.Option("--names", help="Only list the states, parameters and signals to choose from.")
+        bool, typer.Option("--names", help="Only list the available states, parameters and signals.")
     ] = False,
 ) -> None:
-    """Find the operating point at which a diagram rests, and print it.
+    """Find an equilibrium operating point of a diagram, and print it.
 
-    With MODEL alone all states are sought. Where they find no rest, the names to choose from are listed.
+    With MODEL alone all states are free. If no equilibrium is found, the available names are listed.
     """
     import armblocks as ab
 
@@ -114,7 +118,7 @@ def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
         name, equals, value = text.partition("=")
         if not (equals and name.strip() and value.strip()):
             raise InputError(
-                f"'{text}' does not say which name gets which value",
+                f"'{text}' is not of the form NAME=VALUE",
                 where=option,
                 allowed="NAME=VALUE",
                 fix=f"write {option} NAME=VALUE",
@@ -122,7 +126,7 @@ def _pairs(texts: Sequence[str] | None, option: str) -> dict[str, Any]:
         parsed = parse_value(value.strip(), where=f"{option} {name}")
         if isinstance(parsed, str | bool):
             raise InputError(
-                f"'{value.strip()}' is no number",
+                f"'{value.strip()}' is not a number",
                 where=f"{option} {name}",
                 allowed="numbers",
                 fix="give a number, such as 0.5",
@@ -146,7 +150,7 @@ def _ends(name: str, value: object) -> tuple[float, float]:
 
 
 def print_trim(found: TrimResult, console: Console) -> None:
-    """How well it rests, then the values of all that was sought."""
+    """The residual, then the values of all unknowns."""
     import numpy as np
 
     console.print(

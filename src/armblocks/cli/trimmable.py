@@ -1,4 +1,4 @@
-"""What ``armblocks trim`` can be given for a diagram: states, parameters, signals, and example lines."""
+"""The names that ``armblocks trim`` accepts for a diagram, and example commands."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from armblocks.equations import HybridSystem, Signature
 
 MOST_ROWS = 24
-"""Rows of each table; more names are counted."""
+"""Maximum number of rows of each table."""
 
 MOST_NUMBERS = 8
 
 
 def print_trimmable(system: HybridSystem, start: OperatingPoint, model: str, console: Console) -> None:
-    """Tables of the names with their values at the ``start``, and example lines made of them."""
-    console.print(f"{system.name}: what can be trimmed", style=STRONG)
+    """Tables of the names with their values at the ``start``, and example commands."""
+    console.print(f"{system.name}: names for trim", style=STRONG)
     if not system.states.size:
-        console.print("There are no states: every signal follows from the inputs, and nothing has to rest.")
+        console.print("There are no states, hence no equilibrium conditions.")
     _print_slots("state", "--fix, --moving, --guess, --bound", system.states, start.states, console)
     _print_slots("parameter", "--free, --guess, --bound", system.parameters, start.parameters, console)
     _print_slots("signal", "--output", system.signals_layout, start.signals, console)
@@ -37,7 +37,7 @@ def print_trimmable(system: HybridSystem, start: OperatingPoint, model: str, con
 
 
 def example_lines(system: HybridSystem, model: str) -> list[str]:
-    """Command lines with names of this diagram."""
+    """Example commands with names of this diagram."""
     command = f"armblocks trim {shlex.quote(model)}"
     lines: list[str] = []
     if system.states.size:

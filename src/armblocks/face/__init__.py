@@ -1,1 +1,1 @@
-"""The public Python face: what users type. ``armblocks`` exports what is here, each name when first used."""
+"""The public Python interface: ``armblocks`` exports the names of this package, each at first use."""

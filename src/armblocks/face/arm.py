@@ -1,4 +1,4 @@
-"""The arm that users hold: a robot whose equations are traced once and compiled to native code."""
+"""The class ``Arm``: a robot whose equations are traced once and compiled to native code."""
 
 from __future__ import annotations
 
@@ -84,15 +84,16 @@ _OPTIONS = ("wrench", "payload", "out", "threads")
 
 
 class Arm:
-    """A robot ready to compute.
+    """A robot with compiled kinematics and dynamics.
 
-    Arguments come in order or by name, ``rne(q, qd, qdd)`` or ``rne(q=q, qd=qd, qdd=qdd)``; in order is
-    faster for one sample.
+    Arguments are positional or keywords, ``rne(q, qd, qdd)`` or ``rne(q=q, qd=qd, qdd=qdd)``; positional
+    arguments are faster for one sample.
 
     Every method takes one sample, joint vectors of shape ``(n,)``, or a batch, ``(N, n)``; any float or
     integer dtype, any strides (C-contiguous float64 is fastest). ``out=`` takes a float64 C-contiguous array
-    for the result, ``threads=`` spreads a batch. The same input gives the same bits either way. The first
-    call of a method compiles it (a fraction of a second, kept on disk for later processes).
+    for the result, ``threads=`` distributes a batch over threads. Samples and batches give exactly the same
+    results. The first call of a method compiles it (a fraction of a second; cached on disk for later
+    processes).
 
     Units are SI: rad or m, N m or N. Frames: world, unless said otherwise.
     """
@@ -103,7 +104,7 @@ class Arm:
         self._kernels: dict[str, Kernel] = {}
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle and copy the robot alone; code is made, or loaded from the cache, anew."""
+        """Pickle and copy the robot alone; code is compiled again or loaded from the cache."""
         return Arm, (self.robot,)
 
     # ---- description -------------------------------------------------------------------------------------
@@ -114,7 +115,7 @@ class Arm:
 
     @property
     def n(self) -> int:
-        """Count of moving joints."""
+        """Number of moving joints."""
         return self.robot.n
 
     def nofriction(self, which: str = "coulomb") -> Arm:
@@ -168,7 +169,7 @@ class Arm:
         """``rne(q, qd, qdd)`` → tau (n,) N m or N: joint torques of a motion, with motors and friction.
 
         ``wrench=`` [fx fy fz mx my mz] in the last link's frame, ``payload=`` a :class:`Payload` at the tool,
-        or the mass (kg) of a point there.
+        or the mass (kg) of a point mass at the tool.
         """
         return self._loadable("rne")
 
@@ -212,7 +213,7 @@ class Arm:
         """``centre_of_mass(q)`` → (3,) m: centre of mass of all links, in the world."""
         return self._entry("centre_of_mass")
 
-    # ---- how it was made ---------------------------------------------------------------------------------
+    # ---- compilation ---------------------------------------------------------------------------------
     def operation_count(self, method: str) -> OperationCount:
         """Multiplies, adds and other operations in one evaluation of a method, such as ``"rne"``."""
         if method not in _traces():
@@ -221,7 +222,7 @@ class Arm:
 
     @cached_property
     def _description_key(self) -> str:
-        """What the equations depend on: everything but how the robot looks and where it was read."""
+        """The content on which the equations depend: all except appearance and source file."""
         links = tuple(replace(link, geometry=None) for link in self.robot.links)
         return hashlib.sha256(repr(replace(self.robot, links=links, source="")).encode()).hexdigest()
 
@@ -233,12 +234,12 @@ class Arm:
         return kernel
 
     def _entry(self, method: str) -> Callable[..., Array]:
-        """The builtin of a method; another process finds it by the robot and the method's name."""
+        """The native function of a method; it is pickled as robot and method name."""
         kernel = self._kernel(method)
         return kernel.entry_before(kernel.__call__, maker=(Arm, (self.robot,)))
 
     def _loadable(self, method: str) -> Callable[..., Array]:
-        """The plain kernel, and the one with wrench and payload as soon as a call names either."""
+        """The plain kernel, and the kernel with wrench and payload, which is compiled at its first use."""
         plain = self._kernel(method)
 
         @cache
@@ -262,7 +263,7 @@ class Arm:
             try:
                 return loaded()(*arguments, force, carried, out=out, threads=threads)
             except InputError:
-                check_count(method, plain.inputs, arguments)  # a message without what is given by name
+                check_count(method, plain.inputs, arguments)  # the message concerns positional arguments only
                 raise
 
         return plain.entry_before(general, maker=(Arm, (self.robot,)))
@@ -271,16 +272,16 @@ class Arm:
         return f"<Arm {self.name}: {self.n} joints {self.robot.joint_letters}>"
 
     def __str__(self) -> str:
-        """What ``print`` shows: the D-H table, or the links and joints of a robot without one."""
+        """The text for ``print``: the D-H table, or a table of links and joints."""
         return f"{self!r}\n{kinematics_text(self.robot)}"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the arm with all joints at zero, and its table."""
+        """The notebook view: a picture of the arm with all joints at zero, and its table."""
         return robot_view(self.robot)
 
 
 def _traces() -> Mapping[str, Callable[[Robot], TracedFunction]]:
-    """All traced quantities; imported late, because a warm cache needs no tracing."""
+    """All traced quantities; imported here, because a warm cache needs no tracing."""
     from armblocks.dynamics import TRACES
 
     return TRACES

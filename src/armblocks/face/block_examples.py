@@ -1,7 +1,7 @@
-"""The worked example of every block, as a diagram that runs.
+"""The worked example of every block as an executable diagram.
 
-A block says in ``example`` what shows it at work; what it leaves open is chosen here, by the shapes of its
-ports: sines for numbers and vectors, a turning pose for poses, a joint trajectory for robots.
+A block describes its example in ``example``. Unspecified inputs are chosen here by the shapes of its ports:
+sines for numbers and vectors, a rotating pose for poses, a joint trajectory for robots.
 """
 
 from __future__ import annotations
@@ -35,46 +35,46 @@ from armblocks.errors import InertiaWarning, InputError
 from armblocks.robot import Robot
 
 ROBOT = "twolink"
-"""The shipped robot of the examples that name no other."""
+"""The default robot of the examples."""
 SAMPLE_TIME = 0.5
-"""s; the period of a sampled block whose example states none."""
+"""The default period of sampled blocks, s."""
 
 _OPEN_SHAPES: tuple[Shape, ...] = ((), (3,), (2, 2), (3, 3), (4,), (4, 4))
 
 
 def block_example(kind: str | type[Block]) -> Diagram:
-    """The worked example of a kind of block (by class or type name): a small diagram that shows what it does.
+    """The worked example of a block type (by class or type name), a small diagram.
 
-    Raises UnknownNameError for a name that no block has.
+    Raises UnknownNameError for an unknown name.
     """
     chosen = BLOCKS[kind] if isinstance(kind, str) else kind
     return _Assembly(chosen).diagram()
 
 
 def example_block(kind: type[Block]) -> Block:
-    """The block that the worked example shows, with its parameters."""
+    """The block of the worked example, with its parameters."""
     return _block(kind, kind.example.parameters)
 
 
 def caption(kind: type[Block]) -> str:
-    """What one sees in the plot of the worked example."""
+    """The caption of the worked example's plot."""
     if kind.example.shows:
         return kind.example.shows
     block = example_block(kind)
     if not block.input_ports():
-        return f"What {kind.title} gives."
-    return f"What feeds {kind.title} and what comes of it." if block.output_ports() else kind.summary()
+        return f"The output of {kind.title}."
+    return f"Inputs and outputs of {kind.title}." if block.output_ports() else kind.summary()
 
 
 def block_name(kind: type[Block]) -> str:
-    """The name of the block in its example: its title in small letters, but for abbreviations."""
+    """The name of the block in its example: its title in lower case, except for abbreviations."""
     return " ".join(
         word.lower() if word.isalpha() and word[1:].islower() else word for word in kind.title.split()
     ).replace("/", "-")
 
 
 class _Assembly:
-    """The diagram of one example while it is put together: blocks first, wires when all blocks are there."""
+    """Builds the diagram of one example: blocks first, then connections."""
 
     def __init__(self, kind: type[Block]) -> None:
         self._example: WorkedExample = kind.example
@@ -92,7 +92,7 @@ class _Assembly:
         self._feeds: dict[str, PortRef] = {}
 
     def diagram(self) -> Diagram:
-        """All of it, checked."""
+        """The checked diagram."""
         feeds = fitting_feeds(self._block, self._example.inputs)
         for port, feed in feeds.items():
             self._feeds[port] = self._source(feed)
@@ -106,7 +106,7 @@ class _Assembly:
         return self._builder.build()
 
     def _show(self) -> None:
-        """The sink: a scope of what matters, unless the block is a sink itself."""
+        """The sink: a scope of the shown signals, unless the block is a sink itself."""
         across, up = self._example.across, self._example.up
         if across is not None and up is not None:
             self._builder.add("XY graph", XYGraph(), self._source(across), self._source(up))
@@ -120,7 +120,7 @@ class _Assembly:
             self._builder.add("scope", Scope(inputs=len(shown)), *shown)
 
     def _source(self, feed: Feed) -> PortRef:
-        """The output that a feed means; blocks that are not there yet are added."""
+        """The output port of a driver; adds its block if necessary."""
         if isinstance(feed, str):
             block, slash, port = feed.rpartition("/")
             if slash:
@@ -130,14 +130,14 @@ class _Assembly:
         return PortRef(name, feed.port or self._handles[name].block.output_ports()[0].name)
 
     def _added(self, feed: Fed) -> str:
-        """The name of a block that a feed means, after it was added with what feeds it."""
+        """The block name of a driver, after adding the block and its drivers."""
         block = _block(BLOCKS[feed.type_name], feed.parameters)
         name = self._free_name(feed, block)
         if name not in self._handles:
             self._handles[name] = self._builder.add(name, block)
             for port, deeper in fitting_feeds(block, feed.inputs).items():
                 self._wires.append((deeper, PortRef(name, port)))
-            while self._wires:  # what feeds it, now, so that names are given in reading order
+            while self._wires:  # its drivers now, so that names are assigned in reading order
                 deeper, target = self._wires.pop(0)
                 self._builder.connect(self._source(deeper), target)
         return name
@@ -156,7 +156,7 @@ def _numbered(stem: str) -> Iterator[str]:
 
 
 def _block(kind: type[Block], parameters: Mapping[str, Any]) -> Block:
-    """A block with these parameters, a robot and a sample time where it needs one and none is said."""
+    """A block with these parameters, and with the default robot and sample time if required."""
     values = dict(parameters)
     for rule in kind.parameters():
         if rule.kind is ParameterKind.ROBOT:
@@ -168,14 +168,14 @@ def _block(kind: type[Block], parameters: Mapping[str, Any]) -> Block:
 
 @cache
 def shipped_robot(name: str) -> Robot:
-    """A shipped robot; what is to be said of its inertias is for those who use it."""
+    """A shipped robot, loaded without warnings about its inertias."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         return formats.load_robot(name)
 
 
 def fitting_feeds(block: Block, stated: Mapping[str, Feed]) -> Mapping[str, Feed]:
-    """What feeds each input: what is stated, else a signal of a shape that the block takes."""
+    """The driver of each input: the given one, else a signal with a shape that the block accepts."""
     shapes = _fitting_shapes(block)
     ports = block.input_ports()
     robot = next(
@@ -192,7 +192,7 @@ def fitting_feeds(block: Block, stated: Mapping[str, Feed]) -> Mapping[str, Feed
 
 
 def _fitting_shapes(block: Block) -> Shapes:
-    """The first of a few shapes that the block takes, for all inputs whose shape is open."""
+    """The first of some candidate shapes that the block accepts, for all inputs without declared shape."""
     shapes: Shapes = {}
     for open_shape in _OPEN_SHAPES:
         shapes = {port.name: open_shape if port.shape is None else port.shape for port in block.input_ports()}
@@ -215,7 +215,7 @@ def _signal(port: Port, shape: Shape, number: int, robot: Robot | None) -> Fed:
         return made("T2Rp").by(T=turning_pose()).at("R")
     spread = np.arange(int(np.prod(shape)), dtype=np.float64).reshape(shape)
     if len(shape) == 2 and shape[0] == shape[1]:
-        # regular at all times: the diagonal outweighs the rest
+        # regular at all times: diagonally dominant
         return made(
             "SineWave",
             amplitude=(0.5 + 0 * spread).tolist(),
@@ -226,6 +226,6 @@ def _signal(port: Port, shape: Shape, number: int, robot: Robot | None) -> Fed:
 
 
 def turning_pose() -> Fed:
-    """A pose that turns about z, once around in ten seconds."""
+    """A pose that rotates about z with a period of ten seconds."""
     still = made("Ground").named("zero")
     return made("Rpy2T").by(roll=still, pitch=still, yaw=made("Ramp", slope=0.6).named("yaw"))

@@ -1,4 +1,4 @@
-"""The Python functions of a diagram that a run has to call: from blocks to places in a compiled system."""
+"""The Python functions that a run calls: from blocks to indices in a compiled system."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from armblocks.simulation import CalledFunction
 
 
 def called_functions(diagram: Diagram, compiled: CompiledSystem) -> tuple[CalledFunction, ...]:
-    """What Python has to be called for in a run, in the order of a tick.
+    """The calls of Python in a run, in the order of a tick.
 
-    Raises ``DiagramError`` for a called block without a sample time of its own, or in a triggered subsystem.
+    Raises ``DiagramError`` for a called block without an explicit sample time, or in a triggered subsystem.
     """
     if not compiled.called:
         return ()
@@ -32,10 +32,10 @@ def called_functions(diagram: Diagram, compiled: CompiledSystem) -> tuple[Called
         clock = own_clock(block)
         if clock is None or FIRE in flat.gates.get(name, {}):
             raise DiagramError(
-                "a block that calls Python has no clock of its own",
+                "a block that calls Python has no clock",
                 where=f"block '{name}' ({block.title})",
                 allowed="a sample_time > 0, outside of triggered subsystems",
-                fix="give it a period, and let the trigger decide what becomes of its output",
+                fix="give it a period, and move it out of the triggered subsystem",
             )
         found.append(
             CalledFunction(

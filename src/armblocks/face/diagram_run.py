@@ -1,4 +1,4 @@
-"""A diagram that is being run: paused, looked at, tuned and taken up again, by the names of its blocks."""
+"""A run of a diagram that can be paused, inspected, tuned and continued, by block names."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ class DiagramRun:
         raise InputError(
             "a run in progress cannot be copied or pickled",
             allowed="its diagram, run.state() and run.result()",
-            fix="go on elsewhere with simulate(run.diagram, initial_state=run.state())",
+            fix="continue elsewhere with simulate(run.diagram, initial_state=run.state())",
             where=self.diagram.name,
         )
 
     @property
     def time(self) -> float:
-        """Time that is reached, s."""
+        """Present time of the run, s."""
         return self.simulation.time
 
     @property
@@ -53,17 +53,17 @@ class DiagramRun:
 
     @property
     def finished(self) -> bool:
-        """Whether nothing is left to do: complete, stopped or failed."""
+        """Whether the run has ended: complete, stopped or failed."""
         return self.simulation.finished
 
     @property
     def recorded(self) -> int:
-        """How many instants are recorded so far."""
+        """Number of samples recorded so far."""
         return self.simulation.recorded
 
     @property
     def parameters(self) -> Mapping[str, Array]:
-        """The tunable parameters, ``block.parameter``, as they are now."""
+        """The present values of the tunable parameters, by ``block.parameter``."""
         return self.simulation.parameters
 
     def advance(
@@ -74,17 +74,17 @@ class DiagramRun:
         wall_time: float | None = None,
         exactly: bool = False,
     ) -> None:
-        """Go on until a time (s), for a number of steps or for a wall time (s); else to the end.
+        """Continue until a time (s), for a number of steps or for a wall time (s); by default to the end.
 
-        A step is never cut short, so the time reached may be later than ``until`` by a part of a step;
-        ``exactly`` ends a step there. See :meth:`armblocks.simulation.Simulation.advance`.
+        Steps are not shortened, so the reached time may exceed ``until`` by part of a step; ``exactly`` ends
+        a step at ``until``. See :meth:`armblocks.simulation.Simulation.advance`.
 
-        Raises ``SimulationError``, with all that is good so far as its ``partial``.
+        Raises ``SimulationError`` with the valid samples so far as its ``partial``.
         """
         self.simulation.advance(until, steps=steps, wall_time=wall_time, exactly=exactly)
 
     def set(self, path: str, value: ArrayLike) -> None:
-        """Give a tunable parameter, ``"block.parameter"``, another value from the time reached on.
+        """Change a tunable parameter, ``"block.parameter"``, from the present time on.
 
         Nothing is compiled. Raises ``UnknownNameError`` for a name that does not exist, ``InputError`` for
         one that is not tunable, a value that its block does not allow, and a run that has ended.
@@ -95,31 +95,31 @@ class DiagramRun:
             follows = (
                 followers(self.diagram, path).structural if path in mask_parameters(self.diagram) else []
             )
-            why = f": '{follows[0]}', which follows from it, belongs to the structure" if follows else ""
+            why = f": '{follows[0]}', which depends on it, is not tunable" if follows else ""
             names = [name for name, _, _ in tunable_parameters(self.diagram)]
             raise InputError(
-                f"parameter '{path}' cannot take this value while the diagram runs{why}",
+                f"parameter '{path}' cannot take this value during a run{why}",
                 where=self.diagram.name,
-                allowed=f"tunable parameters, of the shape that they have: {', '.join(names)}",
+                allowed=f"tunable parameters, with unchanged shape: {', '.join(names)}",
                 fix="end the run, change the diagram and begin another run",
             )
         self.simulation.set(tuned)
         self.diagram = changed
 
     def samples(self, begin: int = 0) -> Samples:
-        """Signals at the recorded instants from number ``begin`` on: ``samples["block/port"]``."""
+        """The recorded samples from index ``begin`` on: ``samples["block/port"]``."""
         return self.simulation.samples(begin)
 
     def state(self) -> RunState:
-        """What another run can go on from: ``simulate(diagram, initial_state=run.state())``."""
+        """The present state; another run continues from it: ``simulate(…, initial_state=run.state())``."""
         return self.simulation.state()
 
     def stop(self, message: str = "stopped") -> None:
-        """End the run where it stands."""
+        """End the run at the present time."""
         self.simulation.stop(message)
 
     def result(self) -> SimulationResult:
-        """All that is recorded so far, and how the run went."""
+        """The samples recorded so far, with the statistics of the run."""
         return self.simulation.result()
 
 

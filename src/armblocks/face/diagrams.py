@@ -1,4 +1,4 @@
-"""Diagrams by name or path, and the blocks that they are made of."""
+"""Loading and saving of diagrams and libraries, and lists of names."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ def load_diagram(
 ) -> Diagram:
     """A shipped example by name (``"kr180model"``), or a diagram from a ``.json`` file.
 
-    ``blocks``: classes of own blocks that the file may have besides those of the library.
+    ``blocks``: additional block classes that the file may contain.
 
-    A diagram may name functions in Python files beside it. With ``trust`` those files are run; without it,
-    such a diagram is refused.
+    A diagram may name functions in Python files beside it. With ``trust`` these files are run; without it,
+    such a diagram is an error.
     """
     return formats.load_diagram(name_or_path, BLOCKS.with_kinds("own", blocks), trust=trust)
 
 
 def save_diagram(diagram: Diagram, path: str | PathLike[str]) -> Path:
-    """Write a diagram as canonical JSON, all or nothing; returns the path."""
+    """Write a diagram as canonical JSON, atomically; returns the path."""
     return formats.write_diagram(path, diagram)
 
 
 def to_python(diagram: Diagram) -> str:
     """The Python program that builds a diagram, as ``diagram``, and runs it, as ``result``.
 
-    What is drawn only (layout, notes, description) is left out. Raises ``FormatError`` where a block has a
+    Layout, notes and description are omitted. Raises ``FormatError`` where a block has a
     robot that is neither shipped nor from a file, or a Python function.
     """
     return formats.diagram_to_python(diagram)
@@ -41,15 +41,15 @@ def to_python(diagram: Diagram) -> str:
 def load_library(name_or_path: str | PathLike[str], *, trust: bool = False) -> Mapping[str, Subsystem]:
     """The blocks of a library of subsystems by name, linked to it: a shipped name, or a file's path.
 
-    ``load_library("joint_servos")["JointServo"].with_parameters(kp=40.0)`` is a block for a builder. What
-    ``trust`` means is as in :func:`load_diagram`.
+    ``load_library("joint_servos")["JointServo"].with_parameters(kp=40.0)`` is a block for a builder.
+    ``trust`` is as in :func:`load_diagram`.
     """
     entries = formats.load_library(name_or_path, BLOCKS, trust=trust)
     return {name: Subsystem(diagram=diagram) for name, diagram in entries.items()}
 
 
 def save_library(blocks: Mapping[str, DiagramBlock | Diagram], path: str | PathLike[str]) -> Path:
-    """Write diagrams, or what is inside blocks, as a library, all or nothing; returns the path."""
+    """Write diagrams, or the diagrams inside subsystem blocks, as a library, atomically; returns the path."""
     return formats.write_library(
         path, {name: b.diagram if isinstance(b, DiagramBlock) else b for name, b in blocks.items()}
     )

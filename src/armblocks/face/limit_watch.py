@@ -1,4 +1,4 @@
-"""Runs from Python say it when an arm leaves its limits."""
+"""Limit warnings for runs from Python."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Array = NDArray[np.float64]
 
 
 class LimitWatch:
-    """Knows the joint signals of a diagram and looks at every run of it; cheap where all limits are kept."""
+    """Checks the joint signals of every run of a diagram; cheap if no limit is exceeded."""
 
     def __init__(self, diagram: Diagram, result: SimulationResult) -> None:
         self._arms = [(arm, *_limits(arm)) for arm in moving_arms(diagram, result)]
@@ -25,7 +25,7 @@ class LimitWatch:
         _warn_of_angles(diagram)
 
     def warn(self, result: SimulationResult) -> None:
-        """Issue a ``LimitWarning`` for each limit of position, speed or torque that the run breaks.
+        """Issue a ``LimitWarning`` for each limit of position, speed or torque that the run exceeds.
 
         Joint angles at the start that look like degrees give an ``ArmblocksWarning``.
         """

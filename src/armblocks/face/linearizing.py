@@ -1,4 +1,4 @@
-"""Linearising a diagram: which signals go in and come out, where, and with which loops cut."""
+"""Linearisation of a diagram: inputs, outputs, loop openings and operating point."""
 
 from __future__ import annotations
 
@@ -71,25 +71,24 @@ def linearize(
 ) -> LinearSystem | tuple[LinearSystem, ...]:
     """The exact linear system of a diagram about an operating point, by differentiating its equations.
 
-    ``inputs``: signals that are moved. ``"step"`` or ``"step/y"`` adds a small change to that output;
-    ``"plant/u"`` to what reaches that input only; ``"const.value"`` moves a tunable parameter, a mask's too.
-    ``outputs``: signals that are looked at, by the names that a result knows. An output port shows the signal
-    before a change that is added to it, an input port what arrives. ``open``: signals that are cut; what
-    comes behind the cut stays as it is at the operating point, but for the change of an input at the same
-    place.
-    So ``inputs="e", outputs="e", open="e"`` is the loop transfer function, signs included.
+    ``inputs``: perturbed signals. ``"step"`` or ``"step/y"`` adds a perturbation to that output,
+    ``"plant/u"`` to that input only; ``"const.value"`` perturbs a tunable parameter, also of a mask.
+    ``outputs``: signal names as in a result. An output port is read before a perturbation that is added to
+    it, an input port after it. ``open``: loop openings; the signal after an opening keeps its value at the
+    operating point, plus the perturbation of an input at the same port. So ``inputs="e", outputs="e",
+    open="e"`` is the loop transfer function, signs included.
 
     ``at``: a time of a run (0: the start), several times (one system each), where a run ended
-    (``result.final_state``) or the point that ``trim`` found. ``delay_order``: dead time is approximated by
-    so many states each (Padé); needed where there is any, and exact in :func:`frequency_response`.
-    ``parameters`` other values of parameters,
-    ``settings`` those of the run to ``at``, as in :func:`simulate`.
+    (``result.final_state``) or the point that ``trim`` found. ``delay_order``: number of states of the Padé
+    approximation of each dead time; required if there is dead time. (:func:`frequency_response` is exact.)
+    ``parameters`` other values of parameters, ``settings`` those of the run to ``at``, as in
+    :func:`simulate`.
 
-    Modes (a limiter at its limit) stay as they are at the point. A diagram with sample times gives a
-    discrete system with the common period of all clocks, inputs held in between. The time stands still.
+    Modes (a limiter at its limit) are constant. A diagram with sample times gives a discrete system with the
+    common period of all clocks and held inputs. Explicit time is constant.
 
-    Raises ``UnknownNameError`` and ``InputError`` for names, ``SimulationError`` where the run, or a slope,
-    has no finite value.
+    Raises ``UnknownNameError`` and ``InputError`` for names, ``SimulationError`` where the run or a
+    derivative is not finite.
     """
     check_settings(settings, linearize)
     described = described_diagram(diagram, parameters)
@@ -106,7 +105,7 @@ def linearize(
 def described_diagram(
     diagram: Diagram | CompiledDiagram | str | PathLike[str], parameters: Mapping[str, object] | None
 ) -> Diagram:
-    """The diagram that is meant, with other values of its parameters."""
+    """The diagram, with the given parameter values."""
     if isinstance(diagram, CompiledDiagram):
         diagram = diagram.diagram
     elif not isinstance(diagram, Diagram):
@@ -143,7 +142,7 @@ def frequency_response(
 ) -> NDArray[np.complex128]:
     """The response (N, ny, nu) of a diagram's linear system at angular frequencies (N,) in rad/s.
 
-    Dead time is exact: it is ``exp(-j w T)``, however it lies in loops. Arguments and errors are those of
+    Dead time is exact, ``exp(-j w T)``, also inside loops. Arguments and errors are those of
     :func:`linearize`; dead time beside sampled blocks raises ``InputError``.
     """
     check_settings(settings, frequency_response)
@@ -154,7 +153,7 @@ def frequency_response(
 
 
 class _Prepared:
-    """A diagram with its points, traced; linearised as often as wanted."""
+    """A traced diagram with linearisation points, for repeated linearisation."""
 
     def __init__(
         self,
@@ -171,7 +170,7 @@ class _Prepared:
         )
         system = with_mask_parameters(system, diagram, self.points.inputs.values())
         places, names = input_ends(system, self.points.inputs)
-        # Ports of subsystems are not in the flat diagram that has the points.
+        # The flat diagram with points has no ports of subsystems.
         aliases = flatten_hierarchy(diagram).aliases
         known = (name if name in system.aliases else str(aliases.get(name, name)) for name in outputs)
         rows, ends = output_ends(system, dict(zip(outputs, known)))
@@ -185,7 +184,7 @@ class _Prepared:
         return linearise(self.evaluated, self._placed(known), self.ends, known, delay_order=delay_order)
 
     def response(self, known: OperatingPoint, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """The frequency response about such a point."""
+        """The frequency response about an operating point."""
         return exact_response(self.evaluated, self._placed(known), self.ends, frequencies)
 
     def _placed(self, known: OperatingPoint) -> Point:
@@ -199,7 +198,7 @@ class _Prepared:
 
 
 def _units(system: HybridSystem, path: str) -> tuple[str, ...]:
-    """Units of the scalars of an input: those of the signal that it is added to, or the parameter's own."""
+    """Units of the scalars of an input: those of its signal or parameter."""
     slot = system.parameters[path]
     point, _, name = path.rpartition(".")
     signal = f"{point}/y"
@@ -253,7 +252,7 @@ def _of_state(evaluated: EvaluatedSystem, state: RunState) -> OperatingPoint:
             f"the state of '{state.name}' at {state.time:g} s has other variables",
             where=system.name,
             allowed="a state of the same diagram",
-            fix="run the diagram anew",
+            fix="run the diagram again",
         )
     point = Point(
         t=state.time, x=state.states, z=state.discrete, w=state.algebraic, p=system.parameter_values

@@ -1,4 +1,4 @@
-"""Running a diagram: traced and compiled once, run as often as wanted with other parameters."""
+"""Running diagrams: traced and compiled once, run any number of times with different parameters."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ from armblocks.simulation.whole_run import Progress, run_to_the_end
 
 
 class CompiledDiagram:
-    """A diagram with its equations and its native code, made when first needed."""
+    """A diagram with its equations and native code, created at first use."""
 
     def __init__(self, diagram: Diagram) -> None:
         self.diagram = diagram
         self._watch: LimitWatch | None = None
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle and copy the diagram alone; equations and code are made, or loaded from the cache, anew."""
+        """Pickle and copy the diagram alone; equations and code are created again or read from the cache."""
         return CompiledDiagram, (self.diagram,)
 
     @cached_property
@@ -47,7 +47,7 @@ class CompiledDiagram:
 
     @cached_property
     def compiled(self) -> CompiledSystem:
-        """The equations as native code; nothing is traced that an earlier process has compiled."""
+        """The equations as native code; with a cache entry there is no tracing."""
         key = content_key(self.diagram)
         return compile_system(self.system) if key is None else recall_system(key, lambda: self.system)
 
@@ -68,7 +68,7 @@ class CompiledDiagram:
         log: LogRequest | None = None,
         **settings: Unpack[RunSettings],
     ) -> SimulationResult:
-        """Run once; see :func:`simulate`. The ``options`` are the diagram's own where none are given."""
+        """Run once; see :func:`simulate`. ``options`` default to those of the diagram."""
         check_settings(settings, CompiledDiagram.simulate)
         tuned, values = self._tuned(parameters)
         options = with_settings(options or tuned.diagram.settings, settings)
@@ -104,7 +104,7 @@ class CompiledDiagram:
     def _tuned(
         self, parameters: Mapping[str, object] | None
     ) -> tuple[CompiledDiagram, NDArray[np.float64] | None]:
-        """What to run for other parameters: itself with their vector, or another where one is structural."""
+        """The model for other parameters: itself with a new vector, or a new model for structural ones."""
         if not parameters:
             return self, None
         changed = with_parameters(self.diagram, parameters)
@@ -115,26 +115,26 @@ class CompiledDiagram:
 
 
 Start = RunState | OperatingPoint | str | PathLike[str]
-"""Where a run may begin: another run's state, the file of one, or an operating point."""
+"""The start of a run: another run's state, the path of a saved one, or an operating point."""
 
 _compiled: dict[int, CompiledDiagram] = {}
 
 
 def compile_diagram(diagram: Diagram | str | PathLike[str]) -> CompiledDiagram:
-    """The compiled form of a diagram, the same one as long as the diagram object lives."""
+    """The compiled form of a diagram, cached for the lifetime of the diagram object."""
     if not isinstance(diagram, Diagram):
         return CompiledDiagram(load_diagram(diagram))
     known = _compiled.get(id(diagram))
     if known is None:
-        # By identity, because comparing by content would cost more than a run; forgotten with the diagram, of
-        # which the entry therefore holds a copy.
+        # Cached by identity, because comparing by content would cost more than a run. The entry is dropped
+        # with # the diagram, and therefore holds a copy of it.
         _compiled[id(diagram)] = known = CompiledDiagram(dataclasses.replace(diagram))
         weakref.finalize(diagram, _compiled.pop, id(diagram), None)
     return known
 
 
 def state_at(diagram: Diagram | CompiledDiagram, point: OperatingPoint) -> RunState:
-    """The state of a run that stands at an operating point."""
+    """The run state at an operating point."""
     system = (diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)).compiled
     layouts = (system.states, system.discrete, system.algebraic)
     parts = (point.states, point.discrete, point.algebraic)
@@ -164,17 +164,17 @@ def simulate(
 
     ``diagram`` an object, a shipped example's name or a path. ``settings`` override those of the diagram by
     the names of :class:`SimulationOptions`: ``stop_time``, ``solver``, ``step``, ``sample_time``,
-    ``max_step``, ``rtol``, ``atol``. ``parameters`` gives other values to parameters of blocks,
-    ``{"jtraj.tmax": 5.0}``; tunable ones need no new compilation. ``progress(time, fraction,
-    real_time_factor)`` is called now and then during a long run. ``initial_state``: another run's
-    ``final_state``, or the file that its ``save`` wrote; the run goes on from there to ``stop_time``, bit for
-    bit as if the other had not ended where nothing else is changed. Or an operating point, such as ``trim``
-    finds: the run begins there, at its time. ``log``: a ``.parquet`` or ``.csv`` file to which all signals,
-    or the ``log_signals``, are written while the run goes on; memory stays flat however long it is, and the
-    result holds the rows that show all extremes.
+    ``max_step``, ``rtol``, ``atol``. ``parameters`` changes parameters of blocks, ``{"jtraj.tmax": 5.0}``;
+    tunable ones need no new compilation. ``progress(time, fraction, real_time_factor)`` is called repeatedly
+    during a long run. ``initial_state``: another run's ``final_state``, or the file that its ``save`` wrote;
+    the run continues from there to ``stop_time``. Without other changes the result is exactly that of one
+    longer run. An operating point, such as that of ``trim``, is also valid: the run begins there, at its
+    time. ``log``: a ``.parquet`` or ``.csv`` file to which all signals, or the ``log_signals``, are written
+    during the run. Memory use is then independent of the duration, and the result holds a subset of rows with
+    all extremes.
 
     Raises InputError for a setting out of range, UnknownNameError for an unknown argument, SimulationError
-    (with the ``partial`` result) where the run cannot go on.
+    (with the ``partial`` result) where the run fails.
     """
     check_settings(settings, simulate)
     model = diagram if isinstance(diagram, CompiledDiagram) else compile_diagram(diagram)
@@ -197,7 +197,7 @@ def begin(
     log_signals: Sequence[str] = (),
     **settings: Unpack[RunSettings],
 ) -> DiagramRun:
-    """Begin a run of a diagram that can be paused, looked at and tuned: nothing happens before ``advance``.
+    """Create a run of a diagram that can be paused, inspected and tuned; ``advance`` starts it.
 
     Arguments are those of :func:`simulate`, and so are the errors.
     """
@@ -212,7 +212,7 @@ def begin(
 
 
 def _starting_state(model: CompiledDiagram, start: object) -> RunState | None:
-    """Where a run begins, as a state of it. Raises ``InputError`` for what is none."""
+    """The initial state of a run. Raises ``InputError`` for unsupported values."""
     if start is None or isinstance(start, RunState):
         return start
     if isinstance(start, OperatingPoint):
@@ -223,7 +223,7 @@ def _starting_state(model: CompiledDiagram, start: object) -> RunState | None:
         f"initial_state is a {type(start).__name__}",
         where=model.diagram.name,
         allowed="a run's final_state, the path of a saved one, or an operating point",
-        fix="to begin with other values, give parameters={'block.initial': …}",
+        fix="to start from other values, give parameters={'block.initial': …}",
     )
 
 

@@ -1,4 +1,4 @@
-"""How descriptions show themselves in notebooks: what their classes name as the writer of their view."""
+"""Notebook views of descriptions: the functions that their classes name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from armblocks.robot import Robot
 
 
 def diagram_svg(diagram: Diagram) -> str:
-    """The top sheet, in the colours that the reader prefers."""
+    """The top-level sheet, in the viewer's colour scheme."""
     from armblocks.drawing import drawing_bytes
 
     return drawing_bytes(diagram, "svg").decode()

@@ -1,4 +1,4 @@
-"""What the tool carries: a run-time input of the dynamics, never a reason to compile again."""
+"""Payloads: run-time inputs of the dynamics, which need no new compilation."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Payload:
 
 
 def payload_numbers(payload: ArrayLike | None) -> ArrayLike:
-    """The ten numbers of what a tool carries: a mass (kg), nothing, or the numbers themselves."""
+    """The ten numbers of a payload that is given as a mass (kg), nothing, or the numbers themselves."""
     if payload is None:
         return _NOTHING
     return Payload(mass=float(payload)).numbers if isinstance(payload, float | int) else payload

@@ -1,4 +1,4 @@
-"""Reports and drawings from Python: the same files as the command line writes."""
+"""Reports and drawings from Python: the same files as from the command line."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def write_report(
     formats: Sequence[str] | None = None,
     data: Sequence[str] | None = None,
 ) -> ReportFiles:
-    """Write ``report.html``, the diagram, figures and data of a run into a folder, made if absent.
+    """Write ``report.html``, the diagram, figures and data of a run into a folder, created if absent.
 
     ``formats`` of the figures: svg, png. ``data``: csv, parquet, npz, mat. By default svg and csv, with png
-    where matplotlib is installed and parquet where pyarrow is. The files of To File blocks lie there
+    where matplotlib is installed and parquet where pyarrow is. The files of To File blocks are written there
     too. Returns the paths. Raises UnknownNameError for another format, MissingLibraryError for one whose
     library is not installed, DiagramError where two blocks ask for one file, FormatError where the folder
     cannot be written.
@@ -36,11 +36,11 @@ def write_report(
 
 
 def write_files(folder: str | PathLike[str], diagram: Diagram, result: SimulationResult) -> tuple[Path, ...]:
-    """Write what the To File blocks of a diagram keep of a run into a folder that is there, and nothing else.
+    """Write the files of the To File blocks of a run into an existing folder.
 
-    A run by itself writes nothing: here, or by ``write_report``, the caller says in which folder the paths of
-    the blocks lie; none leads out of it. Returns the paths. Raises DiagramError where two blocks ask for one
-    file, FormatError where one cannot be written.
+    A run itself writes no files. Here and in ``write_report`` the caller gives the folder to which the paths
+    of the blocks are relative; paths outside it are errors. Returns the paths. Raises DiagramError where two
+    blocks ask for one file, FormatError where one cannot be written.
     """
     from armblocks.report.sink_files import write_files
 
@@ -58,10 +58,10 @@ def draw_diagram(
 ) -> Path:
     """Draw a diagram into a ``.svg``, ``.png`` or ``.pdf`` file; returns the path.
 
-    ``sheet``: the path of a subsystem, such as ``"controller/filter"``; ``""`` is the top. ``theme``
-    ``None``: SVG follows the reader's preference, the others are light. With a ``result``, scopes and
-    displays show what it holds; ``rates`` shows the clocks of sampled blocks. Raises UnknownNameError for
-    another suffix or sheet.
+    ``sheet``: the path of a subsystem, such as ``"controller/filter"``; ``""`` is the top level. ``theme``
+    ``None``: SVG follows the viewer's preference, other formats are light. With a ``result``, scopes and
+    displays show its data; ``rates`` shows the clocks of sampled blocks. Raises UnknownNameError for another
+    suffix or sheet.
     """
     from armblocks import drawing
 

@@ -1,4 +1,4 @@
-"""A robot as a notebook shows it: picture and table, in one piece of HTML that needs nothing else."""
+"""The notebook view of a robot: picture and table in self-contained HTML."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ def load_robot(
     """A shipped robot by name (``"kr180"``), or a robot from a file (``.json``, a toolbox script ``.m``).
 
     ``name`` picks one of several robots in a script. ``friction_model``: the formula of another toolbox
-    release, see :class:`FrictionModel`; the file's own when left out. Raises UnknownNameError for a name that
+    release, see :class:`FrictionModel`; by default that of the file. Raises UnknownNameError for a name that
     is not shipped, FormatError for a file that cannot be read.
     """
     arm = Arm(formats.load_robot(name_or_path, name=name))
@@ -28,7 +28,7 @@ def load_robot(
 
 
 def save_robot(robot: Robot | Arm, path: str | PathLike[str]) -> Path:
-    """Write a robot as canonical JSON, all or nothing; returns the path."""
+    """Write a robot as canonical JSON, atomically; returns the path."""
     target = Path(path)
     write_atomically(target, formats.write_robot(robot.robot if isinstance(robot, Arm) else robot))
     return target

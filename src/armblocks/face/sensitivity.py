@@ -1,4 +1,4 @@
-"""How the signals of a run follow its parameters."""
+"""Sensitivities: derivatives of the signals of a run by its parameters."""
 
 from __future__ import annotations
 
@@ -76,17 +76,18 @@ def sensitivity(
 ) -> SensitivityResult:
     """Run a diagram together with the exact derivatives of ``outputs`` by tunable ``parameters``.
 
-    Parameters of masks are among them, and what follows from them by formulas is moved with them.
+    Mask parameters are allowed; parameters that depend on them by formulas are included.
 
     The traced equations are differentiated and integrated beside the equations themselves, natively, under
     the same error control. The instants of events, of jumps at known times and of the arrival of delayed
-    jumps are differentiated too, and so are implicit equations.
+    jumps are differentiated too, as are implicit equations.
     ``values``: other values of parameters; ``settings`` those of the run, as in :func:`simulate`.
 
-    Raises ``UnknownNameError`` for names; ``InputError`` for a parameter that is a table that is read by
-    index, that acts by its whole part only, or that moves an event at the start, and where implicit equations
-    come together with delays or with a parameter that says when a signal jumps; ``SimulationError`` as a run
-    does, and where events coincide that a change of a parameter would part: there is no derivative then.
+    Raises ``UnknownNameError`` for names; ``InputError`` for a table that is read by index, for a parameter
+    whose integer part alone has an effect, for one that shifts an event at the start, and for implicit
+    equations together with delays or with a parameter that determines a jump time. Raises ``SimulationError``
+    like a run, and where coinciding events would be separated by a parameter change, because the derivative
+    does not exist then.
     """
     check_settings(settings, sensitivity)
     described = described_diagram(diagram, values)
@@ -119,7 +120,7 @@ def sensitivity(
 
 
 def _check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
-    """Raise ``SimulationError`` where events came together at one instant that a parameter would part."""
+    """Raise ``SimulationError`` for coinciding events that a parameter change would separate."""
     place = compiled.discrete.ranges.get(MIXED)
     if place is None or run.final_state is None:
         return
@@ -127,9 +128,9 @@ def _check_instants(compiled: CompiledSystem, run: SimulationResult) -> None:
     if time >= 0.0:
         raise SimulationError(
             f"several events coincide at {time:.9g} s, one of '{compiled.guard_names[int(guard) - 1]}' among "
-            "them, and a change of a parameter would part them: there is no derivative",
+            "them, and a parameter change would separate them: the derivative does not exist",
             where=compiled.name,
-            allowed="instants that stay together, or apart, when a parameter changes a little",
-            fix="move one of the events a little, or take the difference of two runs",
+            allowed="events that coincide, or do not, for all small parameter changes",
+            fix="shift one of the events, or use the difference of two runs",
             partial=run,
         )

@@ -14,7 +14,7 @@ Call = TypeVar("Call", bound=Callable[..., Any])
 
 
 class RunSettings(TypedDict, total=False):
-    """The fields of :class:`SimulationOptions`; what a call leaves out is as the diagram says."""
+    """The fields of :class:`SimulationOptions`; omitted fields default to the diagram's settings."""
 
     stop_time: float
     solver: str
@@ -36,9 +36,9 @@ class _OfTheDiagram:
 
 
 def takes_settings(call: Call) -> Call:
-    """Mark a function whose ``**settings`` are :class:`RunSettings`: its signature lists them one by one.
+    """Mark a function whose ``**settings`` are :class:`RunSettings`: its signature lists all of them.
 
-    Type checkers know them by the annotation; ``help``, notebooks and the documentation by the signature.
+    Type checkers read the annotation; ``help``, notebooks and the documentation read the signature.
     """
     signature = inspect.signature(call)
     hints, default = get_type_hints(RunSettings), _OfTheDiagram()
@@ -61,5 +61,5 @@ def check_settings(settings: Mapping[str, object], call: Callable[..., object]) 
 
 
 def with_settings(options: SimulationOptions, settings: RunSettings) -> SimulationOptions:
-    """The options of a diagram, with the settings that a call states."""
+    """The options of a diagram, with the settings of a call."""
     return dataclasses.replace(options, **settings) if settings else options

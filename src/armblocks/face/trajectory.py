@@ -32,7 +32,7 @@ class JointTrajectory:
         return iter((self.q, self.qd, self.qdd))
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: q, qd and qdd over the time, in the units that they were given in."""
+        """The notebook view: q, qd and qdd over time, in their units."""
         head = f"{self.q.shape[1]} joints, {len(self)} samples to {self.t[-1]:g} s"
         shape = self.q.shape[1:]
         rows = [(Slot(name, shape), values) for name, values in zip(("q", "qd", "qdd"), self)]
@@ -51,10 +51,10 @@ def jtraj(
 ) -> JointTrajectory:
     """Quintic motion from ``q0`` to ``qf`` (n,), zero acceleration at both ends.
 
-    ``t`` is either the instants (N,) in s, the first one 0 and the last one the end of the motion, or a count
-    N: then the time is the toolbox's normalised one, ``linspace(0, 1, N)``, and rates are per unit of it.
-    ``qd0``, ``qd1`` (n,): speeds at the ends, zero when left out. Same polynomial as the toolbox's ``jtraj``.
-    ``q, qd, qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
+    ``t`` is either the times (N,) in s, from 0 to the end of the motion, or a number of samples N: then the
+    time is normalised as in the toolbox, ``linspace(0, 1, N)``, and rates are per unit of it. ``qd0``,
+    ``qd1`` (n,): speeds at the ends, zero by default. Same polynomial as the toolbox's ``jtraj``. ``q, qd,
+    qdd = jtraj(…)`` unpacks the motion. Warns of angles that look like degrees.
     """
     start, goal = _joint_vector("q0", q0), _joint_vector("qf", qf)
     first = None if qd0 is None else _joint_vector("qd0", qd0)
@@ -95,8 +95,8 @@ def _instants(t: ArrayLike | int) -> NDArray[np.float64]:
             raise InputError(
                 f"t = {t} samples",
                 where="jtraj",
-                allowed="2 or more, or a vector of instants",
-                fix="use np.linspace(0, T, N) for instants in s",
+                allowed="2 or more, or a vector of times",
+                fix="use np.linspace(0, T, N) for times in s",
             )
         return np.linspace(0.0, 1.0, t)
     times = np.asarray(t, dtype=np.float64)
@@ -105,7 +105,7 @@ def _instants(t: ArrayLike | int) -> NDArray[np.float64]:
         raise InputError(
             f"t of shape {times.shape}",
             where="jtraj",
-            allowed="rising finite instants that start at 0, or a count of samples",
+            allowed="finite ascending times that start at 0, or a number of samples",
             fix="use np.linspace(0, T, N)",
         )
     return times

@@ -1,4 +1,4 @@
-"""Trimming a diagram: the operating point at which it rests."""
+"""Trimming: equilibrium operating points of a diagram."""
 
 from __future__ import annotations
 
@@ -38,20 +38,21 @@ def trim(
     tolerance: float = 1e-9,
     **settings: Unpack[RunSettings],
 ) -> TrimResult:
-    """Find an operating point at which a diagram rests.
+    """Find an equilibrium operating point of a diagram.
 
-    All states are sought, but for those in ``states``, which have the values given there, and all have to
-    rest, but for those that are ``moving``. ``free``: tunable parameters that are sought too,
+    The unknowns are all states except those with given values in ``states``. All derivatives must be zero,
+    except those of the ``moving`` states. ``free``: tunable parameters that are also unknowns,
     ``"torque.value"`` (or ``"torque"`` for a block that has one only), or an entry, ``"map.table[3]"``.
-    ``outputs``: values that signals have to have; NaN leaves an entry open. ``bounds``: ``(lower, upper)`` of
-    states and free parameters. The search starts where the run is ``at`` (0: its start), with the values of
-    ``guess`` put in; time-dependent signals have their value of that time. A state is named ``block/state``,
-    or by its block if that has only one.
+    ``outputs``: required values of signals; NaN leaves an entry free. ``bounds``: ``(lower, upper)`` of
+    states and free parameters. The search starts at the state of the run at time ``at`` (0: its start), with
+    the values of ``guess``; time-dependent signals have their values at that time. A state is named
+    ``block/state``, or by its block if that has one state only.
 
-    Sampled blocks rest when a tick changes nothing. Every equation holds to ``tolerance``, in its own unit.
+    Sampled blocks are in equilibrium if a tick changes no state. Every equation holds to ``tolerance``, in
+    its own unit.
 
-    Raises ``SimulationError``, naming what does not rest and why, with the best point found as ``partial``;
-    ``UnknownNameError`` and ``InputError`` for names and values that do not fit.
+    Raises ``SimulationError``, with the equations that are not satisfied, the reason, and the best point
+    found as ``partial``; ``UnknownNameError`` and ``InputError`` for names and values that do not fit.
     """
     check_settings(settings, trim)
     described = described_diagram(diagram, parameters)
@@ -111,7 +112,7 @@ def _places(layout: Signature, name: str, kind: str, system: HybridSystem) -> li
 
 
 def _values(layout: Signature, values: Values, kind: str, system: HybridSystem) -> dict[int, float]:
-    """Values by place in the flat vector; a number is spread over a vector."""
+    """Values by index in the flat vector; a number is broadcast to a vector."""
     found: dict[int, float] = {}
     for name, value in values.items():
         slot = layout[_slot_name(layout, name, kind, system)]
@@ -146,8 +147,8 @@ def _parameter_places(system: HybridSystem, free: Sequence[str]) -> list[int]:
             raise InputError(
                 f"the free parameter '{name}' is part of a table that is read by index",
                 where=system.name,
-                allowed="parameters that are no entries of such tables",
-                fix="free what the table is fed with, or a gain behind it",
+                allowed="parameters outside such tables",
+                fix="free the input of the table, or a gain after it",
             )
         found += places
     return found
@@ -189,7 +190,7 @@ def _bounds(
 
 
 def _state_or_parameter(system: HybridSystem, name: str) -> tuple[Signature, str]:
-    """The layout and the slot that a name means; a state rather than a parameter."""
+    """The layout and the slot of a name; states take precedence over parameters."""
     try:
         return system.states, _slot_name(system.states, name, "state", system)
     except UnknownNameError:

@@ -140,7 +140,7 @@ class DeadZone(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class Relay(Block):
-    """A relay: y = on_value once u rises to on_point, off_value once u falls to off_point.
+    """A relay with hysteresis: on_value once u rises to on_point, off_value once u falls to off_point.
 
     It starts off, unless u begins at or above on_point.
     """
