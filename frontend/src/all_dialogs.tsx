@@ -12,7 +12,7 @@ import { QuickInsert } from './library/quick_insert'
 import { Configuration } from './run/configuration'
 import { Shortcuts } from './shortcuts'
 
-/** All that opens over the page, in one piece that comes after the first picture. */
+/** All dialogs, in one bundle that is loaded after the first rendering. */
 export function AllDialogs() {
   return (
     <>

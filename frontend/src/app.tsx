@@ -42,13 +42,13 @@ const panels: Record<string, FunctionComponent<IDockviewPanelProps>> = {
   robot: RobotPanel,
 }
 
-/** Where nothing but the processor draws, the arm's first picture takes seconds: the diagram comes first. */
+/** With software rendering the first picture of the arm takes seconds: the diagram is shown first. */
 function RobotPanel() {
   const settled = useSettled()
   return settled ? <RobotView /> : <p className="empty">Loading the robot view …</p>
 }
 
-/** A panel that is drawn from when it first comes to the front: what stands behind another costs nothing. */
+/** A panel that is rendered when it is first shown: hidden panels cost nothing. */
 function inFront(Part: ComponentType): FunctionComponent<IDockviewPanelProps> {
   return function Panel({ api }) {
     const [seen, setSeen] = useState(api.isVisible)
@@ -61,12 +61,12 @@ function inFront(Part: ComponentType): FunctionComponent<IDockviewPanelProps> {
   }
 }
 
-/** A tab with nothing to press inside it: the panels stay, and only their places change. */
+/** A tab without a close button: panels can be moved but not closed. */
 function Tab({ api }: IDockviewPanelHeaderProps) {
   return <span className="tab">{api.title}</span>
 }
 
-/** The first arrangement: library, canvas, robot, and the scopes below. */
+/** The default layout: library, canvas, robot, and the scopes below. */
 function arrange({ api }: DockviewReadyEvent): void {
   api.addPanel({ id: 'canvas', component: 'canvas', title: 'Diagram' })
   api.addPanel({
@@ -113,7 +113,7 @@ function arrange({ api }: DockviewReadyEvent): void {
   })
 }
 
-/** A component of its own: a dialog that opens or closes renders nothing else of the page. */
+/** A separate component: opening or closing a dialog renders no other part of the page. */
 function DialogsWhenWanted() {
   const settled = useSettled()
   const wanted = useWanted()

@@ -3,7 +3,7 @@ import { commands } from './commands'
 import { show, useDialogs } from './dialogs'
 import { PickList } from './library/pick_list'
 
-/** All that can be done, by its name: Ctrl+K. Find is beside it, Ctrl+F. */
+/** The command palette, Ctrl+K. Find is a separate dialog, Ctrl+F. */
 export function CommandPalette() {
   const opened = useDialogs((s) => s.open === 'commands')
   const typed = useDialogs((s) => s.typed)
@@ -21,7 +21,7 @@ export function CommandPalette() {
       list="Commands"
       typed={typed}
       onTyped={(next) => useDialogs.setState({ typed: next })}
-      nothing={`No command matches “${typed}”. Blocks are added by typing their name on the sheet.`}
+      nothing={`No command matches “${typed}”. To add a block, type its name on the sheet.`}
       items={found.map(({ title, keys }) => ({ key: title, title, ...(keys ? { keys } : {}) }))}
       onPick={(index) => {
         // When the list has closed and the focus is back.

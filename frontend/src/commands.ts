@@ -6,16 +6,16 @@ import { exportDrawing, openReport } from './documents/export'
 import { startOrResume } from './run/start'
 import { alter, ask, look, useStudio } from './store'
 
-/** Something that can be done: in the command palette, in the list of keys, and by its key. */
+/** A command: in the command palette, in the list of keys, and by its key. */
 export interface Command {
   title: string
-  /** As people write it, `Ctrl+Shift+G`; several ways apart by a comma. */
+  /** Key combination, `Ctrl+Shift+G`; alternatives separated by a comma. */
   keys?: string
-  /** Whether the key is heard only while the sheet has the focus. */
+  /** Whether the key is active only while the sheet has the focus. */
   onSheet?: boolean
-  /** Whether fields have this key for themselves while they are typed into. */
+  /** Whether text fields handle this key themselves. */
   fieldsOwn?: boolean
-  /** Whether it can be done now; always where it is not said. */
+  /** Whether the command is available now; by default always. */
   possible?: () => boolean
   run: () => void
 }
@@ -32,7 +32,7 @@ export function commands(): Command[] {
 }
 
 const LIST: Command[] = [
-  { title: 'Run, or go on after a pause', keys: 'Ctrl+Enter', run: startOrResume },
+  { title: 'Run or continue', keys: 'Ctrl+Enter', run: startOrResume },
   { title: 'Find blocks, types and values', keys: 'Ctrl+F', run: () => show('find') },
   { title: 'Add a block', run: () => show('insert') },
   { title: 'Draw a wire by the names of its ends', keys: '>', run: () => show('connect') },

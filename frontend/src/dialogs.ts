@@ -2,8 +2,7 @@ import { create } from 'zustand'
 import { ask, useStudio } from './store'
 
 /**
- * Every dialog that opens by itself; that of a block opens with `useStudio().edit`, and the tour has its own
- * stops.
+ * All dialogs, except that of a block (`useStudio().edit`) and the tour.
  */
 type Dialog =
   | 'commands'
@@ -19,9 +18,9 @@ type Dialog =
 
 interface Dialogs {
   open: Dialog | null
-  /** Tells one opening from the next. */
+  /** Distinguishes one opening from the next. */
   times: number
-  /** What is typed into the lists that are searched. */
+  /** Text typed into the lists that are searched. */
   typed: string
   /**
    * The subsystem whose mask is edited; `''` is the model. `ofSheet`: it is the one whose sheet is on the
@@ -47,11 +46,11 @@ export const useDialogs = create<Dialogs>(() => ({
 
 /** Open a dialog, or close the one that is open. */
 export function show(open: Dialog | null, typed = '', at: Dialogs['at'] = null): void {
-  // What closes still says for a moment what it said.
+  // A closing dialog still shows its content for a moment.
   useDialogs.setState((s) => (open ? { open, times: s.times + 1, typed, at } : { open }))
 }
 
-/** The stop of the tour that is shown; `null` while nobody is shown around. */
+/** The visible stop of the tour; `null` while the tour is not shown. */
 export const useTour = create<{ stop: number | null }>(() => ({ stop: null }))
 
 export const openTour = (): void => useTour.setState({ stop: 0 })

@@ -1,5 +1,5 @@
 /**
- * Views that draw what changes outside of React's state: samples, the time cursor, sizes. Each view is called
+ * Views of data outside React's state: samples, the time cursor, sizes. Each view is called
  * in the animation frame after a change, and compares there what it shows with what it drew last. While
  * nothing changes the page requests no frames.
  */
@@ -8,7 +8,7 @@ type Look = (now: number) => void
 const looks = new Set<Look>()
 let requested = 0
 
-/** Call every view in the next animation frame. */
+/** Run all views in the next animation frame. */
 export function changed(): void {
   requested ||= requestAnimationFrame((now) => {
     requested = 0 // a view may request the frame after this one

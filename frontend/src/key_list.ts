@@ -1,9 +1,9 @@
-/** The keys of one place of the page that are no commands: how one moves about there. */
+/** The keys of one part of the page that are not commands, such as navigation keys. */
 interface KeysOf {
   place: string
-  /** The sources whose keys these are: a test compares them. */
+  /** The source files that handle these keys; a test compares them. */
   sources: string[]
-  /** Ways to press, apart by a comma, and what they do. */
+  /** Key combinations, separated by a comma, and their effect. */
   keys: [ways: string, what: string][]
 }
 
@@ -17,7 +17,7 @@ export const KEYS: KeysOf[] = [
       ['Enter', 'Open the block: its parameters, or the sheet inside; edit the note'],
       ['arrows', 'Move what is selected; with Shift by single pixels'],
       ['Del, Backspace', 'Delete blocks, wires and notes'],
-      ['Esc', 'Select nothing; then out of the subsystem'],
+      ['Esc', 'Clear the selection; again: leave the subsystem'],
       ['>', 'Draw a wire by the names of its ends'],
       ['"', 'Write a note'],
       ['Space', 'Fit the sheet into the window'],
@@ -31,16 +31,16 @@ export const KEYS: KeysOf[] = [
       ['Shift+drag', 'Take a block out of its wires, which close behind it'],
       ['double click', 'Open a block or write its name; on the empty sheet add a block'],
       ['middle button', 'Move the sheet'],
-      ['Ctrl+wheel', 'Nearer and farther'],
+      ['Ctrl+wheel', 'Zoom'],
     ],
   },
   {
     place: 'Names and notes',
     sources: ['canvas/block_node.tsx', 'canvas/note_node.tsx'],
     keys: [
-      ['Enter', 'Take the name'],
-      ['Ctrl+Enter', 'Take the note'],
-      ['Esc', 'Leave it as it was'],
+      ['Enter', 'Accept the name'],
+      ['Ctrl+Enter', 'Accept the note'],
+      ['Esc', 'Discard the change'],
     ],
   },
   {
@@ -54,8 +54,8 @@ export const KEYS: KeysOf[] = [
       'robot/editor/joints_panel.tsx',
     ],
     keys: [
-      ['↑, ↓', 'Go through the list'],
-      ['Enter', 'Take what is chosen or typed'],
+      ['↑, ↓', 'Move through the list'],
+      ['Enter', 'Accept the selected or typed entry'],
       ['Esc', 'Close'],
     ],
   },
@@ -63,19 +63,19 @@ export const KEYS: KeysOf[] = [
     place: 'Time line',
     sources: ['run/timeline.tsx'],
     keys: [
-      ['Space', 'Play the run, or hold it'],
-      ['arrows', 'One instant on or back; with Shift ten'],
-      ['Home, End', 'To the begin and the end of the run'],
+      ['Space', 'Play or pause the playback'],
+      ['arrows', 'One sample forward or back; with Shift ten'],
+      ['Home, End', 'Go to the start or end of the run'],
     ],
   },
   {
     place: 'Scopes',
     sources: [],
     keys: [
-      ['wheel', 'Zoom the time in all scopes; over the axis of values zoom that scope\u2019s values'],
-      ['drag', 'Show a stretch of time; over the axis of values move them'],
-      ['Shift+drag', 'Move through the time'],
-      ['double click', 'The whole run; on the axis of values all of them'],
+      ['wheel', 'Zoom the time axis of all scopes; over the value axis zoom that scope\u2019s values'],
+      ['drag', 'Pan the time axis; over the value axis pan the values'],
+      ['Shift+drag', 'Move the time cursor'],
+      ['double click', 'Show the whole run; on the value axis show all values'],
     ],
   },
   {
@@ -96,9 +96,9 @@ export const KEYS: KeysOf[] = [
       ['Ctrl+S', 'Save the robot'],
       ['Ctrl+Z', 'Undo'],
       ['Ctrl+Y, Ctrl+Shift+Z', 'Redo'],
-      ['↑, ↓', 'The same cell of the next link or of the one before'],
-      ['Enter', 'Take what is typed and go to the next link; with Shift to the one before'],
-      ['Esc', 'Leave the cell as it was'],
+      ['↑, ↓', 'The same cell of the next or previous link'],
+      ['Enter', 'Accept and go to the next link; with Shift to the previous link'],
+      ['Esc', 'Discard the change of the cell'],
       ['?', 'This list'],
     ],
   },

@@ -21,10 +21,10 @@ export function later(load: () => Promise<ComponentType>, words = ''): Component
   ))
 }
 
-/** Whether the first picture of the page is there, so that what comes later may come. */
+/** Whether the first rendering is complete, so that deferred parts may load. */
 export const useSettled = create(() => false)
 
-/** Wait for the first picture, then fetch what comes later. */
+/** Wait for the first rendering, then fetch the deferred parts. */
 export function useSettling(): void {
   const shown = useStudio((s) => s.document !== null)
   useEffect(() => {
@@ -38,7 +38,7 @@ export function useSettling(): void {
   }, [shown])
 }
 
-/** Whether somebody wants a dialog, now or before the page has settled. */
+/** Whether a dialog is requested, now or before the page was idle. */
 export function useWanted(): boolean {
   const dialog = useDialogs((s) => s.open !== null)
   const touring = useTour((s) => s.stop !== null)

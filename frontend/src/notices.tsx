@@ -13,8 +13,8 @@ export function Notices() {
     <Stack className="notices" gap="xs" role="status" aria-live="polite">
       {started && line === 'down' && (
         <Alert color="orange" icon={<IconAlertTriangle />} title="The studio does not answer">
-          What you do is kept here and sent when it is back. If it was ended, start it again in the same
-          folder.
+          Your edits are stored here and sent after reconnection. If the studio was ended, start it again in
+          the same folder.
         </Alert>
       )}
       {started && line === 'stranger' && (
@@ -23,8 +23,7 @@ export function Notices() {
           icon={<IconAlertTriangle />}
           title="The studio was started again and does not know this page"
         >
-          Open the link that it printed in another tab: this one then goes on by itself, with what you did
-          meanwhile.
+          Open the link that it printed in another tab. This tab then reconnects and sends your edits.
         </Alert>
       )}
       <DiskNotice />

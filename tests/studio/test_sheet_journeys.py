@@ -193,7 +193,7 @@ def test_a_mask_is_made_used_renamed_and_undone(sheet: Page) -> None:
     expect(subsystem).to_have_class(re.compile("selected"))
     sheet.keyboard.press("Control+m")
     dialog = sheet.get_by_role("dialog")
-    dialog.get_by_role("textbox", name="What its face says").fill("Viscous damper")
+    dialog.get_by_role("textbox", name="Text on the block").fill("Viscous damper")
     dialog.get_by_role("button", name="Add a parameter").click()
     for field, text in (("Default", "0.25"), ("Unit", "N s/m"), ("Range", "> 0"), ("Name", "d")):
         dialog.get_by_role("textbox", name=f"{field} of k").fill(text)

@@ -99,8 +99,8 @@ def test_a_run_is_tuned_stepped_back_and_the_value_kept(opened: Opened) -> None:
     page.keyboard.press("Home")
     page.keyboard.press("ArrowRight")
     expect(page.locator(".timeline .instant")).to_have_text("0.010 s")
-    page.get_by_role("button", name="Go back to here").click()
-    expect(page.get_by_role("button", name="Go back to here")).to_be_hidden()
+    page.get_by_role("button", name="Return to this time").click()
+    expect(page.get_by_role("button", name="Return to this time")).to_be_hidden()
     wait_until(page, lambda: shown_time(page) <= 0.02)
     page.get_by_role("combobox", name="Speed").select_option("as fast as possible")
     page.get_by_role("button", name="Resume").click()
@@ -168,7 +168,7 @@ def measured(table: Locator, signal: str) -> dict[str, str]:
 def test_scopes_measure_what_the_closed_form_says(opened: Opened) -> None:
     page = opened(lag_model("measured"))
     run(page)
-    page.get_by_role("button", name="Measures of what is shown").click()
+    page.get_by_role("button", name="Measures of the visible range").click()
     table = page.locator(".measures table")
     lag = measured(table, "lag")
     assert number(lag["min"]) == 0.0
@@ -222,7 +222,7 @@ def test_a_wire_is_logged_by_a_click_and_its_value_pinned(opened: Opened) -> Non
     page.keyboard.press("Home")
     expect(page.locator(".wire-value")).to_have_text("0")
     page.keyboard.press("Space")
-    expect(page.get_by_role("button", name="Hold the playback")).to_be_visible()
+    expect(page.get_by_role("button", name="Pause the playback")).to_be_visible()
     page.keyboard.press("Space")
     page.keyboard.press("Control+s")
     expect(page.locator(".title")).to_have_text("logged")

@@ -35,7 +35,7 @@ const SPREADS = [
   },
 ]
 
-/** What can be done with the selected blocks, at the head of the sheet while several are selected. */
+/** Commands for several selected blocks, at the top of the sheet. */
 export function ArrangeBar() {
   const count = useStudio((s) => [...s.selection].filter((name) => s.document?.blocks[name]).length)
   if (count < 2) return null

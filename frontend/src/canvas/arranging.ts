@@ -1,7 +1,7 @@
 import type { Place, SheetBlock } from '../protocol'
 import { change, freeName, useStudio } from '../store'
 
-/** What is done with the selected blocks at once: each is one step of undo. */
+/** Commands on all selected blocks: each is one undo step. */
 
 export function chosenBlocks(): SheetBlock[] {
   const { document, selection } = useStudio.getState()

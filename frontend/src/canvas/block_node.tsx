@@ -8,7 +8,7 @@ import { nameSide, nameWidth, PORT, side, WIDEST_NAME } from './sheet_layout'
 
 export type BlockNodeType = Node<{ block: SheetBlock; findings: Finding[] }, 'block'>
 
-/** A block: the drawing that the server made of it, its ports, its name, and what is wrong with it. */
+/** A block: its drawing from the server, its ports, its name, and its errors. */
 export const BlockNode = memo(function BlockNode({
   data: { block, findings },
   selected,

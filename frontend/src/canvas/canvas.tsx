@@ -66,7 +66,7 @@ export function Canvas() {
   )
 }
 
-/** Says that a sheet is a library's, and gives a copy of one's own. */
+/** Notice that a sheet belongs to a library, with a button that breaks the link. */
 function LibraryNote({ link, linked }: { link: string; linked: string[] }) {
   return (
     <div className="library-note">
@@ -81,7 +81,7 @@ function LibraryNote({ link, linked }: { link: string; linked: string[] }) {
   )
 }
 
-/** Make the library block of this path one's own, and look at the sheet anew. */
+/** Break the library link of the block at this path, and reload the sheet. */
 async function breakLink(linked: string[]): Promise<void> {
   const { document } = useStudio.getState()
   const block = linked.at(-1)
@@ -167,7 +167,7 @@ function Sheet() {
   )
 }
 
-/** Going through the blocks with Tab selects the one that has the focus. */
+/** Moving through the blocks with Tab selects the focused one. */
 function selectFocused({ target }: React.FocusEvent): void {
   const name =
     target.classList.contains('react-flow__node') && target.matches(':focus-visible')
@@ -176,7 +176,7 @@ function selectFocused({ target }: React.FocusEvent): void {
   if (name) useStudio.getState().select([name])
 }
 
-/** A double click beside all blocks: one is chosen by its name, to be put there. */
+/** A double click on the empty sheet: choose a block by name and insert it there. */
 function insertAt(event: React.MouseEvent): void {
   if ((event.target as Element).classList.contains('react-flow__pane'))
     show('insert', '', { x: event.clientX, y: event.clientY })
@@ -205,7 +205,7 @@ function nodesChanged(changes: NodeChange<SheetNode>[], graph: SheetGraph, { set
   if (chosen) useStudio.getState().select(chosen)
 }
 
-/** The wires that are chosen after some were or were no more. */
+/** The selected wires after a selection change. */
 function chosenAfter(changes: EdgeChange<WireEdgeType>[], before: ReadonlySet<string>): ReadonlySet<string> {
   const chosen = new Set(before)
   for (const one of changes) {

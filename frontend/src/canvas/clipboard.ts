@@ -2,7 +2,7 @@ import { ask, change, freeName, useStudio } from '../store'
 
 const SHIFT = 30
 
-/** What is selected on the sheet, as the text of a diagram file; nothing where that is nothing. */
+/** The selection of the sheet as the text of a diagram file; undefined if it is empty. */
 async function copied(): Promise<string | undefined> {
   const { document, selection } = useStudio.getState()
   const blocks = [...selection].filter((name) => document?.blocks[name])
@@ -17,7 +17,7 @@ async function copied(): Promise<string | undefined> {
   })
 }
 
-/** Put what such a text holds on the sheet, under names that are free, and select it. */
+/** Paste the blocks of such a text under unused names, and select them. */
 async function add(text: string): Promise<void> {
   const { document, select } = useStudio.getState()
   if (!document) return
@@ -35,7 +35,7 @@ export async function duplicate(): Promise<void> {
   if (text) await add(text)
 }
 
-/** Blocks travel as the text of a diagram file, so that they can be pasted into another window or a mail. */
+/** Blocks are copied as the text of a diagram file, which can be pasted into another window or a mail. */
 export async function copy(): Promise<void> {
   const text = await copied()
   if (text) await navigator.clipboard.writeText(text)
@@ -56,7 +56,7 @@ export async function paste(): Promise<void> {
   if (isDiagram(text)) await add(text)
 }
 
-/** Whether a text says that it is a diagram; anything else on the clipboard is not for the sheet. */
+/** Whether a text is a diagram; other clipboard contents are not pasted on the sheet. */
 function isDiagram(text: string): boolean {
   try {
     const found: unknown = JSON.parse(text)

@@ -1,10 +1,10 @@
 import type { Place, Wire } from '../protocol'
 import { change, freeName, useStudio } from '../store'
 
-/** What is dragged out of the library: the type of a block. */
+/** Drag data from the library: a block type. */
 export const BLOCK_TYPE = 'application/x-armblocks-block'
 
-/** px: where blocks may stand. */
+/** Grid of block positions, px. */
 export const GRID = 5
 
 /**

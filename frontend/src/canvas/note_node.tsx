@@ -6,7 +6,7 @@ import { change, useStudio } from '../store'
 
 export type NoteNodeType = Node<{ note: SheetNote }, 'note'>
 
-/** The note that is being written, new ones before they are on the sheet included. */
+/** The note that is being edited, including new ones that are not on the sheet yet. */
 const useWriting = create<{ id: string | null }>(() => ({ id: null }))
 
 /** Begin a note at a place on the sheet. */
@@ -26,7 +26,7 @@ export function writeNote(x: number, y: number): void {
 
 export const editNote = (id: string): void => useWriting.setState({ id })
 
-/** Words on the sheet; a double click edits them in place. */
+/** An annotation on the sheet; a double click edits it in place. */
 export const NoteNode = memo(function NoteNode({ id, data: { note }, selected }: NodeProps<NoteNodeType>) {
   const writing = useWriting((s) => s.id === id)
   return (

@@ -2,7 +2,7 @@ import { MiniMap, useStore, type ReactFlowState } from '@xyflow/react'
 import { useCallback, useMemo } from 'react'
 import type { SheetBlock } from '../protocol'
 
-/** A small map of a large sheet, as long as some of the sheet is out of sight. */
+/** A small map of the sheet, shown while part of the sheet is outside the window. */
 export function Overview({ blocks }: { blocks: Record<string, SheetBlock> }) {
   const [left, top, right, low] = useMemo(() => {
     const all = Object.values(blocks)

@@ -3,13 +3,13 @@ import { change, look, useStudio } from '../store'
 import { writeNote } from './note_node'
 import type { Places } from '../model/wires'
 
-/** What commands do with the sheet on the screen; `null` while there is none. */
+/** Commands of the visible sheet; `null` while there is none. */
 export const sheetView: { fit: (() => void) | null; middle: (() => { x: number; y: number }) | null } = {
   fit: null,
   middle: null,
 }
 
-/** Begin a note in the middle of what is seen. */
+/** Begin a note in the middle of the visible part. */
 export function addNote(): void {
   const at = sheetView.middle?.()
   if (at) writeNote(at.x, at.y)
@@ -22,7 +22,7 @@ export function openBlock(block: SheetBlock): void {
   else edit(block.name)
 }
 
-/** Put blocks and notes where they are now, as one step; some wires may give way to others by it. */
+/** Send the present positions of blocks and notes as one step; some wires may be rerouted. */
 export async function move(to: Places, wiring?: { wires: Wire[]; instead: Wire[] }): Promise<void> {
   const { document } = useStudio.getState()
   const places: Record<string, Place> = {}

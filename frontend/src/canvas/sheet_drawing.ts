@@ -7,7 +7,7 @@ import { SheetGraph } from './sheet_graph'
 import { SheetRoutes } from './sheet_layout'
 import { useBending } from './wire_edge'
 
-/** The nodes and edges of the sheet on the screen, as the mouse has them now. */
+/** The nodes and edges of the visible sheet, including the present drag. */
 export function useSheetDrawing({ drag, freed, loose, into }: SheetDrag, chosenWires: ReadonlySet<string>) {
   const blocks = useStudio((s) => s.document!.blocks)
   const wires = useStudio((s) => s.document!.wires)

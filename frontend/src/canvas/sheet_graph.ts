@@ -29,7 +29,7 @@ class Kept<T> {
     return entry.made
   }
 
-  /** What was not asked for since the last call is forgotten. */
+  /** Drop entries that were not used since the last call. */
   turn(): void {
     this.known = this.seen
     this.seen = new Map()
@@ -70,7 +70,7 @@ export class SheetGraph {
           selected,
           width: block.width,
           height: block.height,
-          // All is known, so nothing of a block need be measured on the screen.
+          // All sizes are known, so React Flow need not measure blocks.
           measured: { width: block.width, height: block.height },
           handles: [
             ...block.inputs.map((spot) => port(spot, false)),
@@ -162,7 +162,7 @@ function unlessSame<T>(before: T[], now: T[]): T[] {
   return before.length === now.length && now.every((one, k) => one === before[k]) ? before : now
 }
 
-/** What the check found, by the block of this sheet that it is in. */
+/** The findings of the check, by the block of this sheet. */
 function byBlock(findings: Finding[], level: string): Map<string, Finding[]> {
   const found = new Map<string, Finding[]>()
   for (const finding of findings) {

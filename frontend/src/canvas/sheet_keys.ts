@@ -13,13 +13,13 @@ import type { WireEdgeType } from './wire_edge'
 
 const NUDGE = 5
 
-/** What the list of blocks has heard: who types fast does so before it has the focus. */
+/** Keys typed before the list of blocks has the focus. */
 function typedSoFar(): string {
   const { open, typed } = useDialogs.getState()
   return open === 'insert' ? typed : ''
 }
 
-/** Remove the chosen blocks, notes and wires. */
+/** Delete the selected blocks, notes and wires. */
 function removeChosen(chosenWires: ReadonlySet<string>): void {
   const { document, selection, select } = useStudio.getState()
   const wires = (document?.wires ?? []).filter((wire) => chosenWires.has(wireKey(wire)))
@@ -29,7 +29,7 @@ function removeChosen(chosenWires: ReadonlySet<string>): void {
   select([])
 }
 
-/** The keys of the sheet: they are its own while it has the focus, and while nothing has it. */
+/** The keys of the sheet: active while the sheet or nothing has the focus. */
 export function useSheetKeys(
   sheet: RefObject<HTMLDivElement | null>,
   flow: ReactFlowInstance<SheetNode, WireEdgeType>,

@@ -6,9 +6,9 @@ import { route, type Net, type Obstacle, type RoutedNet, type WireEnd } from '..
 const NAME_SIZE = 11
 const NAME_FONT = `${NAME_SIZE}px 'Inter Variable', sans-serif`
 const NAME_ROOM = 20
-/** px: longer names are cut. */
+/** Maximum width of a name, px; longer names are cut. */
 export const WIDEST_NAME = 168
-/** px: a port is so wide and high. */
+/** Width and height of a port, px. */
 export const PORT = 9
 
 /** The side of a block at which a port is. */
@@ -28,12 +28,12 @@ export function nameWidth(name: string): number {
   if (!ruler) return 6 * name.length
   ruler.font = NAME_FONT
   const width = Math.min(ruler.measureText(name).width, WIDEST_NAME)
-  // Before the face of the page has come another one is measured.
+  // Before the page's font is loaded, a fallback font is measured.
   if (document.fonts.check(NAME_FONT)) widths.set(name, width)
   return width
 }
 
-/** Where a block's name stands: where no wire leaves, as in the drawings of reports. */
+/** The side of a block's name: one without wires, as in the drawings of reports. */
 export function nameSide({ place, inputs, height }: SheetBlock): 'below' | 'beside' | 'above' {
   if ((place.rotation ?? 0) % 180 !== 0) return 'beside' // signals run from top to bottom
   return inputs.some(({ y }) => y >= height) ? 'above' : 'below' // wires enter a round sum from below
@@ -122,7 +122,7 @@ export class SheetRoutes {
   }
 }
 
-/** How far a wire's drawn way moves: with its blocks, while both are dragged alike. */
+/** The offset of a wire's drawn route: it moves with its blocks while both are dragged together. */
 function shift(from: SheetBlock, to: SheetBlock, places: Places): [number, number] {
   const [a, b] = [places[from.name], places[to.name]]
   if (!a || !b) return [0, 0]

@@ -11,7 +11,7 @@ const SETTLE_MS = 120
 type Sheet = RefObject<HTMLDivElement | null>
 type Flow = ReactFlowInstance<SheetNode, WireEdgeType>
 
-/** Brings the block that somebody has found into the middle, with the focus on it. */
+/** Centres a block that was found by search, and focuses it. */
 export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, SheetBlock>): void {
   const sought = useStudio((s) => s.sought)
   useEffect(() => {
@@ -32,7 +32,7 @@ export function useSought(sheet: Sheet, flow: Flow, blocks: Record<string, Sheet
   }, [sheet, sought, blocks, flow])
 }
 
-/** The sheet fits its panel, whatever size that takes, until somebody moves it. */
+/** The sheet is fitted to its panel, at every panel size, until the user moves it. */
 export function useFitted(sheet: Sheet, flow: Flow): void {
   useEffect(() => {
     const element = sheet.current

@@ -2,7 +2,7 @@ import { Anchor } from '@mantine/core'
 import { openTour } from '../dialogs'
 import { ask, useStudio } from '../store'
 
-/** An empty sheet: how to begin, and the examples with their pictures. */
+/** The view of an empty sheet: first steps, and the examples with their pictures. */
 export function Welcome() {
   const examples = useStudio((s) => s.welcome?.examples ?? {})
   return (

@@ -22,7 +22,7 @@ export type WireEdgeType = Edge<
   'wire'
 >
 
-/** The wire whose way is being drawn, with the bends that it has so far. */
+/** The wire whose route is being drawn, with its present bends. */
 export const useBending = create<{ wire: Required<Wire> | null }>(() => ({ wire: null }))
 
 const SNAP = 7
@@ -71,7 +71,7 @@ export const WireEdge = memo(function WireEdge({
   )
 })
 
-/** One straight piece of a wire, to be taken hold of. */
+/** One segment of a wire, which can be dragged. */
 function Piece({ id, path, piece, way }: { id: string; path: Point[]; piece: number; way: () => Point[] }) {
   const flow = useReactFlow()
   const [[x1, y1], [x2, y2]] = [path[piece]!, path[piece + 1]!]

@@ -26,8 +26,8 @@ export function FileNotice({
     <>
       {disk === 'changed' && (
         <Alert color="yellow" icon={<IconFileAlert />} title={`${path} has changed on the disk`}>
-          {dirty ? 'Your edits are here and in the journal.' : 'You have no edits that are not saved.'}{' '}
-          Reloading can be undone.
+          {dirty ? 'Your edits are here and in the journal.' : 'You have no unsaved edits.'} Reloading can be
+          undone.
           <Group gap="xs" mt="xs">
             <Button size="compact-sm" onClick={actions.reload}>
               Reload
@@ -42,20 +42,20 @@ export function FileNotice({
         </Alert>
       )}
       {disk === 'gone' && (
-        <Alert color="yellow" icon={<IconFileAlert />} title={`${path} is gone from the disk`}>
+        <Alert color="yellow" icon={<IconFileAlert />} title={`${path} is deleted from the disk`}>
           What it held is here and in the journal; saving writes the file again.
         </Alert>
       )}
       {!journaled && (
         <Alert color="red" icon={<IconAlertTriangle />} title="The journal cannot be written">
-          What you edit is only in memory: save it. The disk may be full.
+          Your edits are in memory only: save them. The disk may be full.
         </Alert>
       )}
     </>
   )
 }
 
-/** What is to be known of the drawing or the robot on the screen, and of what else was not saved. */
+/** Notices about the visible diagram or robot, and about other unsaved documents. */
 export function DiskNotice() {
   const lost = useStudio((s) => (s.returned ? s.recoveries.length : 0))
   const robot = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
@@ -65,7 +65,7 @@ export function DiskNotice() {
         <Alert
           color="blue"
           icon={<IconHistory />}
-          title={lost === 1 ? 'Something else was not saved' : `${lost} other things were not saved`}
+          title={lost === 1 ? 'Another document was not saved' : `${lost} other documents were not saved`}
         >
           The studio ended before; its journal has kept what was edited.
           <Group gap="xs" mt="xs">

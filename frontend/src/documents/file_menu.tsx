@@ -13,7 +13,7 @@ import { showRobot, useDesk } from '../robot/editor/desk'
 import { ask, useStudio } from '../store'
 import { save, show } from '../dialogs'
 
-/** Files that the menu itself lists; the dialog has them all. */
+/** Maximum number of files in the menu; the dialog lists all. */
 const MOST_FILES = 12
 
 /** The menu of documents: new, open, save, what is open, what can be recovered, and the examples. */

@@ -1,6 +1,6 @@
 import type { DocumentState } from '../protocol'
 
-/** What a tab showed last: by it the same document comes back after a reload. */
+/** The document that a tab showed last, which is shown again after a reload. */
 interface Shown {
   document: string
   inside: string[]

@@ -80,7 +80,7 @@ function Choice() {
         {found && !open.length && !recent.length && !files.length && (
           <p className="empty">
             {typed
-              ? 'No file has such a name.'
+              ? 'No file matches.'
               : 'This folder has no models yet: save one, or begin with an example.'}
           </p>
         )}

@@ -9,7 +9,7 @@ const when = (seconds: number) =>
 
 const counted = (count: number, thing: string) => `${count} ${thing}${count === 1 ? '' : 's'}`
 
-/** What was drawn and not saved when the studio ended: offered when a page comes, and from the menu later. */
+/** Unsaved work from the last session: offered when a page connects, and later in the menu. */
 export function RecoveryDialog() {
   const recoveries = useStudio((s) => s.recoveries)
   const opened = useDialogs((s) => s.open === 'recovery')

@@ -7,7 +7,7 @@ import { projectFiles, show, useDialogs } from '../dialogs'
 
 const named = (typed: string) => (/\.json$/i.test(typed.trim()) ? typed.trim() : `${typed.trim()}.json`)
 
-/** Save as: a name in the project folder; a file that is there is only overwritten when told so. */
+/** Save as: a name in the project folder; an existing file is overwritten only on request. */
 export function SaveDialog() {
   const opened = useDialogs((s) => s.open === 'save_as')
   const times = useDialogs((s) => s.times)
@@ -71,8 +71,8 @@ function SaveAs() {
           </Text>
         )}
         {taken && (
-          <Alert color="yellow" title={`${path} is there already`}>
-            What it holds is replaced by this drawing.
+          <Alert color="yellow" title={`${path} exists already`}>
+            Its content will be replaced by this diagram.
           </Alert>
         )}
         <Group justify="flex-end" gap="xs">

@@ -2,7 +2,7 @@ import { Text, Tooltip } from '@mantine/core'
 import { useEffect } from 'react'
 import { useStudio } from '../store'
 
-/** The document's name, and whether its file holds what is drawn; the window's title says the same. */
+/** The document's name, and whether it has unsaved changes; also in the window's title. */
 export function DocumentTitle() {
   const state = useStudio((s) => s.document?.state)
   const description = useStudio((s) => s.document?.description)
@@ -11,10 +11,10 @@ export function DocumentTitle() {
     window.document.title = state ? `${state.dirty ? '• ' : ''}${title} – armblocks` : 'armblocks'
   }, [state, title])
   const kept = state?.dirty
-    ? 'Not saved. The journal keeps it: you may close the page, and find it again when you come back.'
+    ? 'Not saved. The journal keeps your changes even if you close the page.'
     : state?.path
       ? `Saved in ${state.path}`
-      : 'As it began; nothing to save yet.'
+      : 'No changes to save.'
   return (
     <Tooltip multiline maw={340} openDelay={400} label={description ? `${description} – ${kept}` : kept}>
       <Text fw={600} className="title" tabIndex={-1}>

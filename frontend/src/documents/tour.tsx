@@ -8,7 +8,7 @@ const WIDTH = 320
 const GAP = 14
 
 interface Stop {
-  /** What of the page it is about; the first that is there. */
+  /** The element of the page; the first that exists. */
   at: string
   title: string
   text: string
@@ -19,7 +19,7 @@ const STOPS: Stop[] = [
     at: '.sheet',
     title: 'The sheet',
     text:
-      'Blocks and wires of the model. Drag from port to port to wire; drag a piece of a wire to lead ' +
+      'Blocks and wires of the model. Drag from port to port to wire; drag a segment of a wire to move ' +
       'it elsewhere; double-click a block to open it.',
   },
   {
@@ -46,12 +46,12 @@ const STOPS: Stop[] = [
   {
     at: '.timeline',
     title: 'One time for everything',
-    text: 'Drag the cursor or play the run: scopes, values on wires and the arm all show this instant.',
+    text: 'Drag the cursor or play the run: scopes, values on wires and the arm all show this time.',
   },
   {
     at: '.robot',
     title: 'The arm',
-    text: 'Turn the view with the mouse. The arm stands as the signals say at the instant of the cursor.',
+    text: 'Turn the view with the mouse. The pose follows the signals at the time cursor.',
   },
   {
     at: '[aria-label="Menu"]',
@@ -67,7 +67,7 @@ function leave(): void {
   localStorage.setItem(SEEN, 'yes')
 }
 
-/** A walk of two minutes through the page: offered at the first visit, and whenever asked for. */
+/** A tour of the page of two minutes: offered at the first visit, and on request. */
 export function Tour() {
   const { stop } = useTour()
   const offered = useStudio((s) => s.document !== null)
@@ -147,7 +147,7 @@ export function Tour() {
   )
 }
 
-/** Asks at the first visit whether somebody wants to see the tour. */
+/** Offers the tour at the first visit. */
 function Offer({ done }: { done: () => void }) {
   const answered = () => {
     localStorage.setItem(SEEN, 'yes')
@@ -156,7 +156,7 @@ function Offer({ done }: { done: () => void }) {
   return (
     <Paper className="tour offer" withBorder shadow="md" p="sm" role="dialog" aria-label="A first look">
       <Text size="sm" fw={600}>
-        New here? Two minutes show you around.
+        New here? The tour takes two minutes.
       </Text>
       <Group gap="xs" mt={8}>
         <Button size="compact-sm" onClick={() => (answered(), openTour())}>
@@ -170,7 +170,7 @@ function Offer({ done }: { done: () => void }) {
   )
 }
 
-/** Where the words stand: right of what they are about, left of it, or else over its middle. */
+/** Position of the text: right of the element, left of it, or else over its middle. */
 function beside(box: DOMRect | null): React.CSSProperties {
   if (!box) return { left: (innerWidth - WIDTH) / 2, top: innerHeight / 3, width: WIDTH }
   const top = Math.min(Math.max(box.y + 8, 8), innerHeight - 190)

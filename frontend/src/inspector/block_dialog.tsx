@@ -214,7 +214,7 @@ function Field({ rule, block, text, focus, onText, onFault }: FieldProps) {
   )
 }
 
-/** What the server says of a text while it is typed: its value, or what is wrong with it. */
+/** The server's answer to a text while it is typed: its value, or the error. */
 function useCheck(rule: ParameterRule, block: SheetBlock, text: string, onFault: (fault: string) => void) {
   const [state, setState] = useState({ fault: '', value: '' })
   useEffect(() => {
@@ -251,7 +251,7 @@ function sent(rule: ParameterRule, text: string, formula: boolean): unknown {
   return rule.kind === 'boolean' && !formula ? text === 'true' : text
 }
 
-/** What a parameter is: one of the block's own, or of its mask. */
+/** The origin of a parameter: the block, or its mask. */
 function valueOf(block: SheetBlock, rule: ParameterRule): unknown {
   return block.mask.includes(rule) ? rule.default : block.parameters[rule.name]
 }

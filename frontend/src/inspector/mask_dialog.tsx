@@ -17,7 +17,7 @@ const KINDS = [
   { value: 'string', label: 'text' },
   { value: 'robot', label: 'robot' },
 ]
-const COLUMNS = ['Name', 'Kind', 'Default', 'Unit', 'Range or choices', 'What it is']
+const COLUMNS = ['Name', 'Kind', 'Default', 'Unit', 'Range or choices', 'Description']
 
 /**
  * A parameter as its row is typed; `range` is `0 … 10`, `> 0`, or for a choice what may be chosen, apart by
@@ -94,12 +94,11 @@ function Mask({ onClose }: { onClose: () => void }) {
       <Stack gap="sm">
         <Text size="sm">
           Values of the blocks inside may be formulas over these names, such as{' '}
-          <code>2*{rows[0]?.name ?? 'k'}</code>.{' '}
-          {block && 'From outside they are the parameters of the block.'}
+          <code>2*{rows[0]?.name ?? 'k'}</code>. {block && 'They are the parameters of the subsystem block.'}
         </Text>
         {block && (
           <TextInput
-            label="What its face says"
+            label="Text on the block"
             size="sm"
             w={280}
             value={face}
@@ -109,7 +108,7 @@ function Mask({ onClose }: { onClose: () => void }) {
         <Rows rows={rows} setRows={setRows} />
         {rows.length === 0 && (
           <Text size="sm" c="dimmed">
-            It has no parameters yet.
+            The mask has no parameters yet.
           </Text>
         )}
         <AddRow rows={rows} setRows={setRows} />

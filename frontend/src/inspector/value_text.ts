@@ -1,4 +1,4 @@
-/** A parameter's value as one types it: `[1 2; 3 4]`, a robot by its name. */
+/** The text of a parameter's value: `[1 2; 3 4]`, a robot by its name. */
 export function valueText(value: unknown): string {
   if (Array.isArray(value)) {
     const rows = value as unknown[]

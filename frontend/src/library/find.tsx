@@ -6,7 +6,7 @@ import { PickList } from './pick_list'
 
 const WAIT_MS = 80
 
-/** Blocks of the whole model by name, type or what a parameter says; Enter goes there. */
+/** Search of all blocks of the model by name, type or parameter value; Enter shows the block. */
 export function Find() {
   const opened = useDialogs((s) => s.open === 'find')
   const typed = useDialogs((s) => s.typed)

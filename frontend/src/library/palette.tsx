@@ -6,7 +6,7 @@ import type { BlockType } from '../protocol'
 import { useStudio } from '../store'
 import { matching } from './search'
 
-/** All blocks by family; what is typed above narrows them. A block is dragged to the sheet. */
+/** All blocks by family, filtered by the search text. Blocks are dragged to the sheet. */
 export function Palette() {
   const library = useStudio((s) => s.welcome?.library)
   const [sought, setSought] = useState('')

@@ -14,7 +14,7 @@ interface PickListProps {
   onClose: () => void
   label: string
   placeholder: string
-  /** What the list is called. */
+  /** The label of the list. */
   list: string
   typed: string
   onTyped: (typed: string) => void
@@ -23,7 +23,7 @@ interface PickListProps {
   onPick: (index: number) => void
 }
 
-/** Type a few letters, choose with the arrows, press Enter: how blocks, commands and places are found. */
+/** A search list: type a few letters, select with the arrow keys, press Enter. */
 export function PickList({
   opened,
   onClose,
@@ -82,7 +82,7 @@ export function PickList({
             tabIndex={-1}
             onClick={() => pick(index)}
             onMouseMove={({ movementX, movementY }) => {
-              // Browsers also report a move where the list changes under a pointer that rests.
+              // Browsers also report a move when the list changes under a resting pointer.
               if (movementX || movementY) setChosen(index)
             }}
           >

@@ -8,7 +8,7 @@ import { matching } from './search'
 
 const MOST_SHOWN = 8
 
-/** Type a few letters, press Enter: the way to add a block by keyboard alone. */
+/** Adds a block by keyboard alone: type a few letters, press Enter. */
 export function QuickInsert() {
   const opened = useDialogs((s) => s.open === 'insert')
   const typed = useDialogs((s) => s.typed)
@@ -49,7 +49,7 @@ function place(at: { x: number; y: number }): { x: number; y: number } {
   }
 }
 
-/** Right of the selected block, or right of everything: a new block never lies on another. */
+/** Right of the selected block, or right of all blocks: a new block never overlaps another. */
 function freePlace(): { x: number; y: number } {
   const { document: open, selection } = useStudio.getState()
   const blocks = Object.values(open?.blocks ?? {})

@@ -1,6 +1,6 @@
 import type { BlockType } from '../protocol'
 
-/** Blocks that fit what is typed, the best first: by title, then type and family, then what they do. */
+/** Blocks that match the search text, best first: by title, then type and family, then description. */
 export function matching(library: readonly BlockType[], typed: string): BlockType[] {
   const words = typed.toLowerCase().split(/\s+/).filter(Boolean)
   const ranked: [rank: number, kind: BlockType][] = []

@@ -75,7 +75,7 @@ export interface Extremes {
 }
 
 /**
- * The least and the greatest value of each trace in each of `width` equal intervals of a time window: no more
+ * The least and maximum of each trace in each of `width` equal intervals of a time window: no more
  * points than can be seen, and no peak is lost. Rows of the same window that `before` holds are not computed
  * again.
  */

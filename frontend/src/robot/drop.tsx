@@ -51,7 +51,7 @@ export function DropZone() {
 export async function open(file: File): Promise<void> {
   if (!KINDS.some((kind) => file.name.toLowerCase().endsWith(kind))) {
     refuse({
-      what: 'this kind of file cannot be opened',
+      what: 'this file type cannot be opened',
       where: file.name,
       fix: 'drop a robot script (.m), a robot or a diagram (.json)',
     })

@@ -32,8 +32,8 @@ export function StaticArm({ name, drawing, state, children }: StaticArmProps) {
     <figure className="robot still">
       {svg && <img src={`data:image/svg+xml;utf8,${encodeURIComponent(svg)}`} alt={`The robot ${name}`} />}
       <figcaption className="empty">
-        This browser shows no 3-D (WebGL is off or missing), so the arm stands still here. Runs, scopes and
-        the editor work as usual. Turn hardware acceleration on in the browser's settings to see it move.
+        This browser has no WebGL, so the arm is shown as a still picture. Runs, scopes and the editor work as
+        usual. Turn hardware acceleration on in the browser's settings to see it move.
       </figcaption>
       {children && <div className="view-tools">{children}</div>}
     </figure>

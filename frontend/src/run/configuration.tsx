@@ -62,8 +62,8 @@ function solverChoices(solvers: SolverChoice[]) {
         .filter(({ name }) => name === 'auto')
         .map(({ name, title }) => ({ value: name, label: `${name}: ${title}` })),
     },
-    group('Chooses its steps', true, false),
-    group('Chooses its steps, for stiff systems', true, true),
+    group('Variable step', true, false),
+    group('Variable step, for stiff systems', true, true),
     group('Fixed step', false, false),
     group('Fixed step, for stiff systems', false, true),
   ]

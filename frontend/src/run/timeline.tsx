@@ -15,7 +15,7 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
   const { time, playing, loop, rate } = useCursor()
   const stop = run?.stopTime ?? 10
   const at = time ?? run?.time ?? 0
-  const label = playing ? 'Hold the playback' : 'Play the run'
+  const label = playing ? 'Pause the playback' : 'Play the run'
   const keys = (event: React.KeyboardEvent) => {
     if (event.target instanceof HTMLSelectElement || event.ctrlKey || event.metaKey) return
     const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key]
@@ -39,7 +39,7 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
           {playing ? <IconPlayerPauseFilled size={15} /> : <IconPlayerPlayFilled size={15} />}
         </ActionIcon>
       </Tooltip>
-      <Tooltip label="Begin again at the end" openDelay={400}>
+      <Tooltip label="Loop the playback" openDelay={400}>
         <ActionIcon
           variant={loop ? 'light' : 'subtle'}
           color={loop ? 'accent' : 'gray'}
@@ -86,7 +86,7 @@ function GoBack() {
   if (run?.state !== 'paused' || time === null || time >= run.time) return null
   return (
     <Tooltip
-      label="The run returns to this instant; what came later is forgotten, tuned values stay"
+      label="Return the run to this time: later samples are deleted, tuned values are kept"
       multiline
       w={260}
     >
@@ -99,7 +99,7 @@ function GoBack() {
           )
         }
       >
-        Go back to here
+        Return to this time
       </Button>
     </Tooltip>
   )

@@ -97,7 +97,7 @@ function RunControls({ known }: { known: boolean }) {
         {state === 'paused' ? 'Resume' : 'Run'}
       </Button>
       <Tool
-        label={busy ? 'Step back' : 'One instant back'}
+        label={busy ? 'Step back' : 'One sample back'}
         icon={IconPlayerSkipBackFilled}
         disabled={!runKey || state === 'running'}
         onClick={() => (busy ? goBack() : stepCursor(-1))}
@@ -109,7 +109,7 @@ function RunControls({ known }: { known: boolean }) {
         onClick={() => control('pause')}
       />
       <Tool
-        label={busy ? 'Step' : 'One instant on'}
+        label={busy ? 'Step' : 'One sample forward'}
         icon={IconPlayerSkipForwardFilled}
         disabled={!runKey || state === 'running'}
         onClick={() => (busy ? control('step') : stepCursor(1))}

@@ -164,7 +164,7 @@ function TuneRow({ tunable }: { tunable: Tunable }) {
               size="xs"
               variant="subtle"
               color="gray"
-              aria-label={`Drop the value of ${path}`}
+              aria-label={`Discard the value of ${path}`}
               onClick={() => drop([path], new Map([[path, tunable]]))}
             >
               <IconArrowBackUp size={13} />

@@ -183,7 +183,7 @@ function WireTools({
           <IconAntennaBars5 size={15} />
         </ActionIcon>
       </Tooltip>
-      <Tooltip label={isPinned ? 'Take the value off the sheet' : 'Keep the value on the sheet'}>
+      <Tooltip label={isPinned ? 'Remove the value from the sheet' : 'Keep the value on the sheet'}>
         <ActionIcon
           size="sm"
           variant={isPinned ? 'light' : 'subtle'}
@@ -202,7 +202,7 @@ function WireTools({
         </ActionIcon>
       </Tooltip>
       {edge.data?.bent && (
-        <Tooltip label="Let the wire find its own way again">
+        <Tooltip label="Reset to automatic routing">
           <ActionIcon
             size="sm"
             variant="subtle"

@@ -47,7 +47,7 @@ export function SignalInspector() {
   if (!runs.length)
     return (
       <p className="empty">
-        Every run is kept here, to be looked at and compared. Run the model (Ctrl+Enter).
+        All runs are listed here for inspection and comparison. Run the model (Ctrl+Enter).
       </p>
     )
   return (
@@ -229,7 +229,7 @@ function SignalList({ runs }: { runs: KeptRun[] }) {
             </label>
           )
         })}
-        {!found.length && <p className="empty">No signal is called so.</p>}
+        {!found.length && <p className="empty">No signal has this name.</p>}
       </div>
     </div>
   )

@@ -8,13 +8,13 @@ import { shownWindow, useWindow } from './window'
 
 const REFRESH_MS = 200
 const ROWS: [name: keyof Measures, head: string, title: string][] = [
-  ['least', 'min', 'the least value'],
-  ['greatest', 'max', 'the greatest value'],
-  ['mean', 'mean', 'the mean over time'],
-  ['rms', 'RMS', 'the root of the mean square over time'],
-  ['peakToPeak', 'p–p', 'from the least to the greatest'],
-  ['riseTime', 'rise', 'time from 10 to 90 % of the way, where the signal settles'],
-  ['overshoot', 'over', 'how far beyond the last value, as a part of the way'],
+  ['least', 'min', 'minimum'],
+  ['greatest', 'max', 'maximum'],
+  ['mean', 'mean', 'mean over time'],
+  ['rms', 'RMS', 'root mean square over time'],
+  ['peakToPeak', 'p–p', 'peak-to-peak value'],
+  ['riseTime', 'rise', 'rise time from 10 % to 90 %, if the signal settles'],
+  ['overshoot', 'over', 'overshoot beyond the last value, relative to the step'],
 ]
 
 /** Draw again a few times a second while something changes: no sample goes through React's state. */

@@ -80,7 +80,7 @@ export function PlotTools() {
       />
       <PlotTool label="Measuring cursors" icon={IconRulerMeasure} pressed={cursors} onClick={toggleCursors} />
       <PlotTool
-        label="Measures of what is shown"
+        label="Measures of the visible range"
         icon={IconTableOptions}
         pressed={measuring}
         onClick={() => useWindow.setState({ measuring: !measuring })}

@@ -10,7 +10,7 @@ from armblocks.errors import InputError
 Row = tuple[float, ...]
 
 CONSISTENCY = 1e-12
-"""Largest residual of a row sum: rounding of published decimals, and nothing that hides a misprint."""
+"""Largest accepted residual of a row sum: rounding of published decimals; misprints give larger ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,14 +21,14 @@ class ButcherTableau:
 
         K[i]   = f(t + nodes[i] h,  x + h * sum_j matrix[i][j] K[j])        i = 0 … s-1,  j < i
         x_new  = x + h * sum_j weights[j] K[j]
-        K[s]   = f(t + h, x_new)                 the first stage of the next step, so it costs nothing
-        K[s+1…] = the extra stages, of the same form, evaluated only where a sample instant asks for them
+        K[s]   = f(t + h, x_new)                 the first stage of the next step (FSAL)
+        K[s+1…] = the extra stages, of the same form, evaluated only where a sample time requires them
         x(t + theta h) = x + h * sum_j (sum_m dense[j][m] theta^(m+1)) K[j]
 
     An adaptive method also has ``error`` (s + 1 weights): the estimate ``h * sum_j error[j] K[j]`` is of
     order ``error_order``, so the step scales with ``norm^(-1 / (error_order + 1))``. Where
-    ``stretched_error`` is given, both estimates are joined as in DOP853:
-    ``e = h |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2)``.
+    ``stretched_error`` is given, both estimates are combined as in DOP853: ``e = h |e5|^2 / sqrt(|e5|^2 +
+    0.01 |e3|^2)``.
 
     ``order`` is that of the steps, ``dense_order`` that of the values between them (global, both).
     """
@@ -87,7 +87,7 @@ class ButcherTableau:
 
     @property
     def adaptive(self) -> bool:
-        """Whether the method estimates its error and chooses its steps."""
+        """Whether the method has an error estimate and adapts its steps."""
         return self.error is not None
 
     @property
@@ -149,7 +149,7 @@ class ButcherTableau:
 
     @property
     def content(self) -> str:
-        """All numbers of the method as text, exactly: the part of a cache key that stands for it."""
+        """All numbers of the method as text, exactly: the part of a cache key that identifies it."""
         return repr(
             (
                 self.nodes,

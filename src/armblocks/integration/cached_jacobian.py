@@ -1,4 +1,5 @@
-"""The Jacobian of a system's flow: differentiated when a stiff solver first asks, then cached on disk."""
+"""The Jacobian of a system's derivative: differentiated at the first use by a stiff solver, cached on
+disk."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CachedJacobian:
-    """Where its entries are, and the digest of the tape that works them out."""
+    """The sparsity pattern, and the digest of the tape that computes the entries."""
 
     pattern: JacobianPattern
     digest: str
@@ -45,7 +46,7 @@ def cached_jacobian(derivative: str, residual: str, trace: Callable[[], HybridSy
             tape = lambda: kept_tape(digest, lambda: _traced(trace).function)  # noqa: E731
             return CachedJacobian(pattern=pattern, digest=digest, tape=tape)
         except (ValueError, KeyError, TypeError):
-            pass  # a record of another make is made anew
+            pass  # a record of another version is computed again
     traced = _traced(trace)
     made = tape_of(traced.function)
     states, size = (slot.size for slot in (traced.function.inputs["x"], traced.function.outputs["T"]))

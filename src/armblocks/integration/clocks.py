@@ -1,4 +1,4 @@
-"""Clocks of a loop: when they tick, and what an update does then.
+"""Clocks of a loop: tick times and updates.
 
 Tick ``k`` of a clock is at ``offset + k period``, one product and one sum, never accumulated.
 """
@@ -33,9 +33,9 @@ class Clocks:
         return product if offset == 0.0 else product + offset
 
     def capture(self, time: Real) -> None:
-        """Update with no clock marked, with the flow just before an instant and the old ``z``.
+        """Update without a marked clock, with the left limits of the states and the old ``z``.
 
-        Nothing was before the start: there ``z`` keeps its start values.
+        At the start there is no left limit: ``z`` keeps its initial values.
         """
         if not self.frame.sizes.captures:
             return
@@ -61,7 +61,7 @@ class Clocks:
                 self.update()
 
     def update(self) -> None:
-        """``z`` becomes what ``update`` gives for the clocks that are marked."""
+        """Set ``z`` to the result of ``update`` for the marked clocks."""
         f, places = self.frame, self.frame.places
         x, z, unknowns, new_z = (
             f.vector(place) for place in (places.x, places.z, places.trial_w, places.new_z)
@@ -72,7 +72,7 @@ class Clocks:
         f.copy(places.new_z, places.z, f.sizes.discrete)
 
     def halt(self, time: Real) -> None:
-        """Return before the ticks of an instant that a caller waits for, all values as they are there."""
+        """Return before the ticks at a time that a caller has requested."""
         if not self.count:
             return
         f = self.frame

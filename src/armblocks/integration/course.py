@@ -1,4 +1,4 @@
-"""The course of a run: into which pieces it is divided, and what happens between them."""
+"""The course of a run: its division into pieces, and the actions between them."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ INSTANT, START, STEP = "instant", "start", "step"
 STAGE = {Stage.INSTANT: INSTANT, Stage.START: START, Stage.RUNNING: STEP}
 
 Trial = Callable[[Real, Real], Real]
-"""Writes the stages of a step between two times; gives its length."""
+"""Emits the stages of a step between two times; returns its length."""
 
 
 class Course(ABC):
-    """Writes what bounds steps beside their error, and what follows an accepted step."""
+    """Emits the bounds of steps other than their error, and the actions after an accepted step."""
 
     @abstractmethod
     def enter(self, stages: Stages) -> None:
-        """Go on where the last call stopped."""
+        """Continue where the last call stopped."""
 
     def before_step(self) -> None:  # noqa: B027  # a flow leaves nothing
-        """Make sure that what a step leaves behind has room."""
+        """Make sure that there is memory for the results of a step."""
 
     @abstractmethod
     def first_step(self, time: Real) -> None:
@@ -33,7 +33,7 @@ class Course(ABC):
 
     @abstractmethod
     def accept(self, stages: Stages) -> None:
-        """Record an accepted step and make its end the new point; go on at a stage."""
+        """Record an accepted step, make its end the new point, and continue at a stage."""
 
     @abstractmethod
     def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
@@ -41,14 +41,14 @@ class Course(ABC):
 
     @abstractmethod
     def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
-        """Steps are as short as they can be: where they are not finite, return, or leave ``accepted``."""
+        """Handle steps of minimum length: where they are not finite, return or leave ``accepted``."""
 
     def passed(self, time: Real, spacing: Real) -> Real:
-        """Grid instants of fixed steps up to this time are behind."""
+        """Grid points of fixed steps up to this time are in the past."""
         return time
 
     def bounded(self, time: Real, new_time: Real) -> Real:
-        """The end of a fixed step, where something else than the grid may bound it."""
+        """The end of a fixed step, which may be earlier than the next grid point."""
         return new_time
 
     def next_length(self, proposed: Real) -> Real:

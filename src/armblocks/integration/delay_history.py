@@ -1,13 +1,13 @@
-"""Small native functions that keep the past of delayed signals, and look it up.
+"""Native functions of the delay buffer: store and interpolate the history of delayed signals.
 
-The past is a table at the end of the array of doubles: a row is a time, whether the row stands in the middle
-of a step, and the value and the exact slope of every signal that is delayed. Each step leaves two rows, its
-middle and its end, so that between the ends of a step the quintic through three values and slopes (Hermite)
-is as good as the step. A signal can bend more than the states do (a root, a fast sine, no state at all): a
-step is then divided until the quintics meet the signal within the tolerances. Where a slope is not finite,
-the parabola through the three values gives another. Where a signal jumps, or its slope does, two rows have
-the same time: what was before and what is after. A line (one delayed scalar) looks no further than the next
-such place until it has come to it: its value is then smooth, and the loop ends a step exactly there.
+The history is a table at the end of the array of doubles. A row has a time, a flag for the middle of a step,
+and the value and exact derivative of every delayed signal. Each step adds two rows, its middle and its end;
+the quintic Hermite interpolant through three values and derivatives has the accuracy of the step. A signal
+may vary faster than the states (a root, a fast sine, no state at all): the step is then subdivided until the
+interpolant matches the signal within the tolerances. Where a derivative is not finite, the parabola through
+the three values replaces it. Where a signal or its derivative jumps, two rows have the same time: the left
+and the right limit. A line (one delayed scalar) reads only up to the next jump until its delayed time has
+passed the jump: its value is then smooth, and the loop ends a step exactly there.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ from armblocks.routines.values import Boolean, Integer, Real
 
 SAME_ABOVE = 1.0 + 2.0**-50
 MOST_PIECES = 256
-"""Of one step: on both sides of a root's steepest point they shrink and grow by 48 powers of two."""
+"""Maximum number of pieces of one step: on both sides of a root's singularity they shrink and grow by 48
+powers of two."""
 ROWS_OF_A_STEP = 2 * MOST_PIECES + 6
-"""Rows that one step, the instant at its end and the row that a signal is compared in add at most."""
+"""Maximum number of rows that one step adds, including events at its end and the row for comparison."""
 NO_SLOPE = sys.float_info.max
-"""Stands in the table for a slope that is not finite."""
+"""Marks a derivative that is not finite."""
 
 
 class DelayHistory:
@@ -53,7 +54,7 @@ class DelayHistory:
     # The table.
 
     def entry(self, row: Integer, column: Integer | int) -> Integer:
-        """Where an entry of the table lies in ``reals``."""
+        """The index of a table entry in ``reals``."""
         return row * self.places.history_width + self.places.history + column
 
     def time(self, reals: Reals, row: Integer) -> Real:
@@ -73,11 +74,11 @@ class DelayHistory:
         return reals[self.entry(row, line + (2 + self.count))]
 
     def first_rows(self, counts: Integers) -> Integers:
-        """The first row that each line looks at."""
+        """The first row that each line reads."""
         return counts.after(self.first)
 
     def last_rows(self, counts: Integers) -> Integers:
-        """The last row that each line looks at: a place where its signal jumps; -1 for the newest row."""
+        """The last row that each line reads: a jump of its signal; -1 for the newest row."""
         return counts.after(self.first + self.count)
 
     # Reading.
@@ -98,13 +99,13 @@ class DelayHistory:
     def at_instant(
         self, r: Routine, reals: Reals, counts: Integers, instant: Real, line: int
     ) -> tuple[Real, Real]:
-        """Value and slope of a line's signal at an instant of the past."""
+        """Value and derivative of a line's signal at a past time."""
         first, last = self.first_rows(counts)[line], self.last_rows(counts)[line]
         newest = counts[Count.HISTORY_ROWS] - 1
-        # A middle whose end is still to come is no place to look from.
+        # A middle row whose end row does not exist yet is not a start for the search.
         newest = newest - self.middle(reals, newest).to_integer()
         last = select(last < 0, newest, last)
-        # The last row not after the instant, by bisection; the first one if there is none.
+        # The last row at or before the time, by bisection; the first one if there is none.
         low, high = r.integer(first), r.integer(last)
         with r.loop() as bisection:
             a, b = low.value, high.value
@@ -118,7 +119,7 @@ class DelayHistory:
         i = low.value
         before = instant < self.time(reals, i)
         with r.when(before | (i >= last)):
-            # A rounding error past the last row, or before anything was: straight on.
+            # A rounding error after the last row, or before the first row: extrapolate linearly.
             past = instant - self.time(reals, i)
             known = self.slope(reals, i, line)
             known = select(is_slope(known), known, 0.0)
@@ -142,11 +143,12 @@ class DelayHistory:
         value: RealVariable,
         slope: RealVariable,
     ) -> None:
-        """Hermite's quintic through values and slopes at -1, 0 and 1, at ``s``; its own slope too."""
+        """The quintic Hermite interpolant through values and derivatives at -1, 0, 1, at ``s``; and its
+        derivative."""
         minus = -1.0 * s
         square = s * s
         rest = 1.0 - square
-        # Over the differences from the middle: a constant is then itself, to the bit.
+        # Computed from differences to the middle value: exact for constants.
         centre = self.value(reals, rows[1], line)
         values = [self.value(reals, row, line) - centre for row in rows]
         bases = end_basis(minus, -1.0), middle_basis(s, square, rest), end_basis(s, 1.0)
@@ -167,7 +169,7 @@ class DelayHistory:
     def fill(
         self, r: Routine, t: Reals, x: Reals, reals: Reals, counts: Integers, p: Reals, middle: Real | float
     ) -> Integer:
-        """Write the row after the last one, without counting it; its number."""
+        """Write the row after the last one, without counting it; return its index."""
         rows = counts[Count.HISTORY_ROWS]
         z, unknowns = (reals.after(place) for place in (self.places.z, self.places.trial_w))
         reals[self.entry(rows, 0)] = t[0]
@@ -198,7 +200,7 @@ class DelayHistory:
             old, new = reals[self.entry(before, place)], reals[self.entry(rows, place)]
             same.value = select(old == new, same.value, 0.0)
         with r.when(same.value == 0.0):
-            # What comes after stands at the very time of what was before.
+            # Left and right limit have exactly the same time.
             reals[self.entry(rows, 0)] = self.time(reals, before)
             counts[Count.HISTORY_ROWS] = counts[Count.HISTORY_ROWS] + 1
 
@@ -230,10 +232,10 @@ class DelayHistory:
             found.value = found.value | beyond
         return found.value
 
-    # Places where a signal jumps.
+    # Jumps of signals.
 
     def _pass_jumps(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> None:
-        """Move each line past the places that it has come to, and find the next one."""
+        """Move each line past the jumps that it has reached, and find the next one."""
         until = now * SAME_ABOVE
         first_rows, last_rows = self.first_rows(counts), self.last_rows(counts)
         for k, line in enumerate(self.lines):
@@ -260,7 +262,7 @@ class DelayHistory:
                 last_rows[k] = here
 
     def _next_jump(self, r: Routine, reals: Reals, counts: Integers) -> Real:
-        """When a line comes to such a place; infinite if none is known."""
+        """The time at which a line reaches its next jump; infinite if none is known."""
         soonest = r.constant(float("inf"))
         for k, line in enumerate(self.lines):
             if not line.fixed:
@@ -275,14 +277,14 @@ class DelayHistory:
     # Room.
 
     def _make_room(self, r: Routine, now: Real, reals: Reals, counts: Integers) -> Boolean:
-        """Forget what no line can reach any more; whether there is room for another step."""
+        """Drop rows that no line can reach any more; return whether there is memory for another step."""
         places = self.places
         capacity = counts[Count.HISTORY_ROOM]
         needed = counts[Count.HISTORY_ROWS] + ROWS_OF_A_STEP
         with r.when(needed <= capacity):
             r.return_(r.constant_boolean(True))
         oldest = now - reals[places.longest]
-        # The first row that must stay: an end of a step, the last one before all that can be looked at.
+        # The first row to keep: the end of a step, the last one before all readable times.
         keep, i = r.integer(0), r.integer(0)
         with r.loop() as search:
             here = i.value
@@ -302,23 +304,23 @@ class DelayHistory:
             reals[target] = reals[target + shift]
         for k in range(self.count):
             first, last = self.first_rows(counts), self.last_rows(counts)
-            # The first row may be forgotten; where no last one is known, the number is -1.
+            # The first row may be dropped; -1 where the last one is the newest.
             for rows, unknown in ((first, 0), (last, last[k])):
                 shifted = rows[k] - gone
                 rows[k] = select(shifted >= 0, shifted, unknown)
-        # Twice the room where half of it is not free: else it would soon be full again.
+        # Request twice the memory if less than half is free, else it would soon be full again.
         enough = left * 2 <= capacity
         fits = left + ROWS_OF_A_STEP <= capacity
         return enough & fits
 
 
 def is_slope(slope: Real) -> Boolean:
-    """Whether an entry of the table is a slope, and not ``NO_SLOPE``."""
+    """Whether an entry of the table is a finite derivative, and not ``NO_SLOPE``."""
     return abs(slope) < NO_SLOPE
 
 
 def parabola_slope(before: Real, after: Real, place: int) -> Real:
-    """Slope at -1, 0 or 1 (``place`` 0, 1, 2) of the parabola with values at -1 and 1, and 0 at 0."""
+    """Derivative at -1, 0 or 1 (``place`` 0, 1, 2) of the parabola with values at -1 and 1, and 0 at 0."""
     of_before, of_after = ((-1.5, -0.5), (-0.5, 0.5), (0.5, 1.5))[place]
     return fma(of_before, before, of_after * after)
 

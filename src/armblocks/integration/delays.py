@@ -1,4 +1,4 @@
-"""Delayed signals in a loop: bounds of the steps, and the history that each step leaves."""
+"""Delayed signals in a loop: bounds of the steps, and the history that each step stores."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from armblocks.routines.memory import RealVariable
 from armblocks.routines.values import Boolean, Real
 
 HIGH_ORDER = 7
-"""From this order on, steps are too long for one quintic of the history."""
+"""From this method order on, steps are too long for one quintic of the history."""
 
 
 class Delays:
-    """Writes what a loop does for delayed signals. ``point`` holds the time of an evaluation."""
+    """Emits the code of a loop for delayed signals. ``point`` holds the time of an evaluation."""
 
     def __init__(
         self,
@@ -37,7 +37,7 @@ class Delays:
         self.point = point
 
     def bound_steps(self) -> None:
-        """No step is longer than a delay: the values that a step needs are then always in the history."""
+        """Limit steps to the shortest delay, so that all delayed values are in the history."""
         f, places, n = self.frame, self.frame.places, len(self.frame.sizes.delays)
         bounds, taus = f.vector(places.bounds), f.vector(places.taus)
         f.r.call(system_functions.delay_bounds, f.p, bounds)
@@ -50,21 +50,21 @@ class Delays:
         f.reals[places.longest] = longest
 
     def make_room(self) -> None:
-        """Return where the history has no room for another step."""
+        """Return where the history has no memory for another step."""
         f = self.frame
         room = f.r.call(self.history.make_room, f.time.value, f.reals, f.counts)
         f.leave_unless(room, Status.HISTORY_FULL)
 
     def next_jump(self) -> Real:
-        """When a delayed signal comes to a place where it jumps."""
+        """The next time at which a delayed signal jumps."""
         return self.frame.r.call(self.history.next_jump, self.frame.reals, self.frame.counts)
 
     def pass_jumps(self, time: Real) -> None:
-        """Move each delayed signal past the jumps that it has come to."""
+        """Move each delayed signal past the jumps that it has reached."""
         self.frame.r.call(self.history.pass_jumps, time, self.frame.reals, self.frame.counts)
 
     def write_change(self, time: Real) -> None:
-        """Write the signals after an instant into the history, where it has changed them."""
+        """Store the signals after an event or tick in the history, if they have changed."""
         f = self.frame
         t, x = self.point.memory, f.vector(f.places.x)
         self.point.value = time
@@ -73,12 +73,11 @@ class Delays:
         self.pass_jumps(time)
 
     def write_step(self, time: Real, new_time: Real, h: Real) -> None:
-        """Write an accepted step into the history, by pieces with a middle and an end.
+        """Store an accepted step in the history, in pieces with a middle and an end.
 
-        A piece is the whole step, a half of the long steps of a method of high order, or shorter where the
-        quintic of a piece strays from a signal.
-
-        From half of the most pieces on, the tolerance grows, so that the rest fits into the other half.
+        A piece is the whole step, half of a step for methods of high order, or shorter where the quintic
+        deviates from a signal. After half of the maximum number of pieces the tolerance grows, so that the
+        rest fits into the other half.
         """
         f, r, history = self.frame, self.frame.r, self.history
         self.records.extra_stages_once(time, h)
@@ -92,7 +91,7 @@ class Delays:
         with r.loop() as pieces:
             a, b = begin.value, end.value
             length, known = b - a, f.counts[Count.HISTORY_ROWS]
-            # Past the most pieces, all that is left is one.
+            # Beyond the maximum number, the rest of the step is one piece.
             last = known >= most
             b = select(last, new_time, b)
             for part, mark in ((0.5, 1.0), (1.0, 0.0)):
@@ -118,7 +117,8 @@ class Delays:
             pieces.leave_when(b >= new_time)
 
     def _point(self, part: float, a: Real, b: Real, time: Real, new_time: Real, h: Real) -> None:
-        """The state at a part of the piece from ``a`` to ``b`` into ``new_x``, and what follows from it."""
+        """Write the state within the piece from ``a`` to ``b`` to ``new_x``, and evaluate the system
+        there."""
         f, places = self.frame, self.frame.places
         x, y = f.vector(places.new_x), f.vector(places.y)
         instant = b if part == 1.0 else fma(part, b - a, a)

@@ -1,7 +1,7 @@
-"""The plan of a sparse Gaussian elimination: in which order, and where entries fill in. No numbers, no LLVM.
+"""Symbolic analysis of a sparse Gaussian elimination: pivot order and fill-in, without numbers or LLVM.
 
-The matrix ``diagonal - h J`` of a stiff step has the same places filled at every step, so all of this is
-worked out once. Pivots stand on the diagonal; how good they were is judged by the numbers, at every step.
+The matrix ``diagonal - h J`` of a stiff step has the same sparsity pattern at every step, so the analysis is
+done once. Pivots are on the diagonal; their quality is checked numerically at every step.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianPattern:
-    """Where the derivatives of ``(f, g)`` by ``(x, w)`` may differ from zero: entry k at rows[k], columns[k].
+    """The sparsity pattern of the derivatives of ``(f, g)`` by ``(x, w)``: entry k at rows[k], columns[k].
 
     The first ``states`` rows and columns are those of the flow, the rest those of the implicit equations.
     """
@@ -45,10 +45,11 @@ class Elimination:
 
 
 def plan_elimination(pattern: JacobianPattern) -> Elimination:
-    """The elimination in the order of least degree, which keeps few entries filled in (George, Liu, *Computer
+    """The elimination in minimum-degree order, which limits the fill-in (George, Liu, *Computer
     Solution of Large Sparse Positive Definite Systems*, chapter 5).
 
-    An implicit equation is put at the unknown that a matching of both gives it: its own place may be empty.
+    An implicit equation is assigned to an unknown by bipartite matching, because its diagonal entry may be
+    zero.
     """
     equation_of = _match(pattern)
     place_of = {equation: place for place, equation in enumerate(equation_of)}
@@ -92,7 +93,8 @@ def plan_elimination(pattern: JacobianPattern) -> Elimination:
 def _match(pattern: JacobianPattern) -> list[int]:
     """The equation for every unknown: a state's own, and implicit ones by augmenting paths.
 
-    Where no complete matching exists the rest is put anywhere: the numbers will be singular, and say so.
+    Where no complete matching exists the rest is assigned arbitrarily: the matrix is singular, which the
+    numerical check detects.
     """
     n, size = pattern.states, pattern.size
     equation_of = list(range(n)) + [-1] * (size - n)
@@ -101,7 +103,7 @@ def _match(pattern: JacobianPattern) -> list[int]:
         if row >= n and column >= n:
             unknowns[row].append(column)
     for start in range(n, size):
-        reached: dict[int, int] = {}  # unknown: the equation that came to it
+        reached: dict[int, int] = {}  # unknown: the equation from which it was reached
         queue = [start]
         free = -1
         while queue and free < 0:
@@ -124,7 +126,7 @@ def _match(pattern: JacobianPattern) -> list[int]:
 
 
 def _least_degree(neighbours: Sequence[set[int]]) -> list[int]:
-    """Eliminate an unknown with the fewest neighbours, join these to one another, and so on."""
+    """Repeatedly eliminate an unknown with the fewest neighbours, and connect these with each other."""
     around = [set(near) for near in neighbours]
     heap = [(len(near), place) for place, near in enumerate(around)]
     heapq.heapify(heap)
@@ -140,7 +142,7 @@ def _least_degree(neighbours: Sequence[set[int]]) -> list[int]:
         near = around[place]
         left -= 1
         if len(near) == left:
-            # All that is left is joined to all: any order is as good.
+            # The rest is fully connected: any order is equally good.
             order.extend(sorted(near))
             break
         for other in near:

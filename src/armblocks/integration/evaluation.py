@@ -11,7 +11,7 @@ from armblocks.routines.memory import Reals
 
 
 class Evaluation:
-    """Writes evaluations; arrays of one element hold the time."""
+    """Emits evaluations; arrays of one element hold the time."""
 
     def __init__(self, frame: Frame, history: DelayHistory | None) -> None:
         self.frame = frame
@@ -44,6 +44,6 @@ class Evaluation:
         f.r.call(system_functions.flow_jacobian, t, x, self.z, self.unknowns, f.p, J, T)
 
     def accept_unknowns(self) -> None:
-        """``w`` becomes what was found last."""
+        """Set ``w`` to the last solution."""
         places = self.frame.places
         self.frame.copy(places.trial_w, places.w, self.frame.sizes.algebraic)

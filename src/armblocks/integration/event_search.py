@@ -1,6 +1,6 @@
-"""Events within a step: the first instant at which a guard fires, by the values between the steps.
+"""Event location within a step: the first time at which a guard fires, on the dense output.
 
-They are those of the method's dense output. Where these are poor, the end of a shorter step decides.
+Where the dense output is not accurate enough, the end of a shorter step decides.
 """
 
 from __future__ import annotations
@@ -16,33 +16,33 @@ from armblocks.routines.routine import Part
 from armblocks.routines.values import Boolean, Integer, Real
 
 LAST_PLACE = 2.0**-52
-"""Of a double, beside its size."""
+"""Relative rounding error of a double."""
 FINEST = 2.0**-12
-"""Guards are evaluated at distances no shorter than this part of a step."""
+"""Minimum distance of guard evaluations, as a fraction of a step."""
 NEAR_START = 2.0**-6
-"""Up to this part of a step, values between the steps are poor beside what has changed since its start."""
+"""Fraction of a step up to which the dense output is inaccurate relative to the change since the step's
+start."""
 
 
 class EventSearch:
-    """Writes the search of a step for events, and the step across the border of a mode."""
+    """Emits the event search of a step, and the step across the boundary of a mode."""
 
     def __init__(self, events: Events) -> None:
         self.events = events
         self.frame, self.method, self.records = events.frame, events.method, events.records
         self.functions, self.guards = events.functions, events.guards
         self.happened = self.frame.r.integer(0)
-        """Whether the step ends where a guard has fired by the values between the steps."""
+        """Whether the step ends at an event that was located on the dense output."""
         places = self.frame.places
         self.y, self.new_x = (self.frame.vector(place) for place in (places.y, places.new_x))
 
     def first_event(self, time: Real) -> None:
-        """If a guard fires within the step, let it end at the first instant at which one does.
+        """If a guard fires within the step, end the step at the first such time.
 
-        The step is searched in windows, at the middle and the end of each. A window is as long as the last
-        ones proved to be smooth enough, at the start an eighth of the step, and is halved where a guard may
-        have gone to zero and come back (``dips``). Then bisection: what is bracketed is "some guard has
-        fired", so that the first of several is found; the step ends on the far side of the zero, where it has
-        fired.
+        The step is searched in windows, at the middle and the end of each. A window starts with an eighth of
+        the step, grows while the guards are smooth, and is halved where a guard may have touched zero and
+        returned (``dips``). Then follows bisection on "some guard has fired", so that the first of several
+        events is found. The step ends after the zero, where the guard has fired.
         """
         f, r = self.frame, self.frame.r
         low, high, doubt = r.real(time), r.real(time), r.integer(0)
@@ -50,7 +50,7 @@ class EventSearch:
         with r.part() as search:
             with r.part() as attempt:
                 h, end = f.h.value, f.new_time.value
-                # A step across the border of a mode has no stages of its own, and cannot be taken again.
+                # A step across the boundary of a mode has no stages, and cannot be repeated.
                 divisible = h > 2.0 * self.crossing(time)
                 self.records.extra_stages_once(time, h)
                 with r.part() as judged:
@@ -69,12 +69,12 @@ class EventSearch:
                     self.method.interpolate(high.value, time, h, self.y)
                     f.new_time.value = high.value
             self.happened.value = 1
-            # An event that is one instant with a tick or breakpoint is at its time.
+            # An event that coincides with a tick or breakpoint gets its time.
             known, new_time = f.end.value, f.new_time.value
             f.new_time.value = select(new_time * SAME_ABOVE >= known, known, new_time)
 
     def _scan(self, time: Real, h: Real, low: RealVariable, high: RealVariable, found: Part) -> None:
-        """Go through the windows of a step; leave ``found`` where a guard has fired between the variables."""
+        """Search the windows of a step; leave ``found`` with a bracket in which a guard has fired."""
         f, r, places = self.frame, self.frame.r, self.frame.places
         end = f.new_time.value
         low.value = time
@@ -86,8 +86,8 @@ class EventSearch:
             a = low.value
             middle = fma(0.5, scan[0], a)
             reached = a + scan[0]
-            # What would leave less than half a window goes along with it, and so does all that is
-            # left where the middle of a window cannot be told from its ends.
+            # A rest shorter than half a window is added to the window; so is the whole rest if the middle of
+            # a window equals one of its ends.
             whole = fma(0.5, scan[0], reached) >= end
             apart = (middle > a) & (middle < reached)
             whole = whole | ~apart
@@ -119,16 +119,16 @@ class EventSearch:
             window.again_unless(reached >= end)
 
     def watch_inside(self, instant: Real, time: Real, h: Real) -> Integer:
-        """How many guards have fired at an instant within the step."""
+        """The number of guards that have fired at a time within the step."""
         self.method.interpolate(instant, time, h, self.new_x)
         return self.events.watch(minimum(instant, self.frame.clamp.value), self.new_x)
 
     def _judge(self, doubt: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
-        """Whether an event that the values between the steps show is doubtful, and why.
+        """Whether an event on the dense output is doubtful, and why.
 
-        These values are poor near the start of the step, and where a guard is next to zero there. What leaves
-        zero as a high power of the time has the wrong sign between the steps, but not at their ends: a mass
-        at rest moves once its speed does, and does not pass zero.
+        The dense output is inaccurate near the start of the step, and where a guard is near zero there. A
+        guard that leaves zero as a high power of time may have the wrong sign on the dense output, but not at
+        the ends of steps: a mass that starts to move from rest does not cross zero.
         """
         f, r, functions, t = self.frame, self.frame.r, self.functions, self.events.point.memory
         self.watch_inside(instant, time, h)
@@ -140,10 +140,10 @@ class EventSearch:
         doubt.value = select(early & (found == 0), NEXT_TO_ZERO, found)
 
     def _take_shorter(self, instant: Real, undecided: Boolean, time: Real, h: Real, attempt: Part) -> None:
-        """Take a step to an instant at which an event is doubtful: what it says at its end holds.
+        """Take a step to the time of a doubtful event; the guards at its end are valid.
 
-        Where nothing has fired there, an eighth of the step is searched instead, unless that is shorter. A
-        guard without a sign takes one halfway to the instant.
+        If no guard has fired there, an eighth of the step is searched instead, unless that is shorter. A
+        guard without a sign gets one halfway to that time.
         """
         f, r, crossing = self.frame, self.frame.r, self.crossing(time)
         distance, shorter = instant - time, 0.125 * h
@@ -159,7 +159,7 @@ class EventSearch:
                 attempt.again()
             step.leave_unless(self.events.watch(minimum(new_time.value, f.clamp.value), self.y) == 0)
             with r.when(last):
-                # No shorter, so that steps without an event do not creep.
+                # No shorter, so that steps without an event do not become tiny.
                 step.leave_when(f.h.value > 0.5 * crossing)
                 new_time.value = time + crossing
                 step.again()
@@ -169,13 +169,13 @@ class EventSearch:
         self._grow_from(f.h.value)
 
     def _keep_start(self) -> None:
-        """Keep what is known of the guards at the start of the step."""
+        """Save the guard data of the start of the step."""
         places, f = self.frame.places, self.frame
         f.copy(places.signs, places.signs_at_start, self.guards)
         f.copy(places.guards_before, places.guards_at_start, self.guards)
 
     def _restore_start(self) -> None:
-        """What is known of the guards is again what it was at the start of the step."""
+        """Restore the guard data of the start of the step."""
         places, f = self.frame.places, self.frame
         f.copy(places.signs_at_start, places.signs, self.guards)
         f.copy(places.guards_at_start, places.guards_before, self.guards)
@@ -196,11 +196,11 @@ class EventSearch:
         self.method.stages(time, h, new_time)
 
     def _bisect(self, low: RealVariable, high: RealVariable, time: Real, h: Real) -> None:
-        """Move ``high`` to the first instant, to the last place, at which a guard has fired.
+        """Bisect until ``high`` is the first time, to one unit in the last place, at which a guard has fired.
 
-        None has at ``low``, some has at ``high``. Instants within four units in the last place are one
-        instant: located to the last place, an event at a recorded instant or a tick belongs to it. Near the
-        time 0 the last place is that of a millionth of the run.
+        No guard has fired at ``low``, some guard has at ``high``. Times within four units in the last place
+        are equal, so an event at a recorded time or a tick coincides with it. Near time 0 the unit is that of
+        a millionth of the run.
         """
         r = self.frame.r
         closest = (LAST_PLACE * 1e-6) * self.frame.reals[Scalar.SPAN]
@@ -214,7 +214,7 @@ class EventSearch:
                 high.value = middle
 
     def shortest(self, time: Real) -> Real:
-        """A length that is as good as nothing beside the time."""
+        """A length that is negligible relative to the time."""
         return 2.0**-46 * maximum(time, self.frame.reals[Scalar.SPAN])
 
     def crossing(self, time: Real) -> Real:
@@ -222,16 +222,17 @@ class EventSearch:
         return 8.0 * self.shortest(time)
 
     def cross(self, time: Real) -> None:
-        """A step of next to no length along the old derivative, after which some guard must have fired.
+        """A step of negligible length along the old derivative, after which some guard must have fired.
 
-        The equations of a mode may end where the mode does: a root of something that is about to be mirrored.
+        The equations of a mode may be undefined beyond its boundary, such as the root of a quantity that
+        changes its sign.
         """
         f, method = self.frame, self.method
         new_time = minimum(time + self.crossing(time), f.end.value)
         h = new_time - time
         f.new_time.value = new_time
         f.h.value = h
-        # All stages alike, so that the values between the steps are on the same line.
+        # All stages are equal, so that the dense output is linear.
         for row in range(1, method.tableau.rows):
             copy(f.r, method.K(0), method.K(row), f.n)
         self.records.extra_done.value = 1

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods: stages, and how stiff a step felt."""
+"""Explicit Runge-Kutta methods: stages and stiffness detection."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from armblocks.routines.values import Real
 CHECK_EVERY = 16
 """Steps between two checks of what bounds them: a power of two."""
 NEAR_BORDER = 0.97
-"""Of the stability interval: a step beyond it is bound by stability (3.2 of 3.3, as in Hairer's DOPRI5)."""
+"""Fraction of the stability interval: a longer step is limited by stability (3.2 of 3.3, as in Hairer's
+DOPRI5)."""
 STIFF_CHECKS, CALM_CHECKS = 250, 6
-"""So many checks that find a step bound by stability, 4000 steps, make the system stiff; so many in a row
-that do not make it calm again."""
+"""Number of checks with a stability-limited step (4000 steps) after which the system counts as stiff, and
+number of consecutive other checks that reset the count."""
 
 
 class ExplicitMethod(Method):
-    """Writes the steps of an explicit tableau."""
+    """Emits the steps of an explicit tableau."""
 
     short_checks = 2048
 
@@ -39,11 +40,11 @@ class ExplicitMethod(Method):
 
     @property
     def has_extra_stages(self) -> bool:
-        """Whether the dense output needs stages of its own."""
+        """Whether the dense output needs extra stages."""
         return bool(self.butcher.extra_nodes)
 
     def extra_stages(self, time: Real, h: Real) -> None:
-        """The stages that only the dense output needs; y keeps its value."""
+        """The extra stages of the dense output; y keeps its value."""
         tableau = self.butcher
         for k, node in enumerate(tableau.extra_nodes):
             self.move(tableau.extra_matrix[k], h)
@@ -52,7 +53,7 @@ class ExplicitMethod(Method):
         self.move(tableau.weights, h)
 
     def error_norm(self, h: Real, error: Row) -> Real:
-        """Norm of the error estimate; of both joined as in DOP853 where the tableau has two."""
+        """Norm of the error estimate; for two estimates, their combination as in DOP853."""
         stretched = self.butcher.stretched_error
         if stretched is None:
             return self.norm(h, error)
@@ -64,17 +65,17 @@ class ExplicitMethod(Method):
     def change(self, h: Real) -> Real:
         """Norm of ``h`` times the change of the derivative: to the end, and to a stage in the middle.
 
-        A long step may span a whole period, at whose end all is as at its start.
+        A long step may span a whole period, at whose end the derivative equals that at its start.
         """
         nodes = self.butcher.nodes
         middle = min(range(1, self.butcher.stages), key=lambda stage: abs(nodes[stage] - 0.5))
         return maximum(super().change(h), self.norm(h, change_to(middle)))
 
     def watch(self, h: Real) -> None:
-        """Check whether stability bounds the step; if it has for long, pause at the next one.
+        """Check whether stability limits the step; if it has done so for long, pause before the next one.
 
-        A step counts as bound where ``h`` times the fastest rate is at the border of the stability region;
-        six calm checks in a row clear the count (Hairer, Wanner II, IV.2).
+        A step is stability-limited where ``h`` times the fastest rate reaches the border of the stability
+        region. Six consecutive other checks reset the count (Hairer, Wanner II, IV.2).
         """
         if not self.butcher.measures_stiffness:
             return
@@ -95,8 +96,8 @@ class ExplicitMethod(Method):
                     stiff.value = 0
 
     def stiffness(self) -> Real:
-        """The square of ``h`` times the fastest rate, as the last two evaluations show it (Hairer, Wanner II,
-        IV.2, equation (2.20)): both are at the step's end, so they differ by the Jacobian times the
+        """The square of ``h`` times the fastest rate, estimated from the last two evaluations (Hairer, Wanner
+        II, IV.2, equation (2.20)): both are at the step's end, so they differ by the Jacobian times the
         difference of their states."""
         tableau = self.butcher
         last = (*tableau.matrix[-1], 0.0)

@@ -1,4 +1,4 @@
-"""What all parts of a native loop share: the arrays of the run, variables in registers, ways to return."""
+"""The shared frame of a native loop: arrays of the run, variables in registers, return paths."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Arrays:
     ``reals`` and ``counts`` hold the state of the run, ``p`` the parameters. ``samples`` are the instants to
     record and ``out`` their states, ``(N, n)``; ``out_z``, ``out_w`` are likewise the discrete variables and
     the unknowns. ``ends`` are the ends of the segments between breakpoints and ``clamps`` the latest time at
-    which each segment may evaluate its derivative. Into ``saved_reals`` and ``saved_counts`` goes the state
-    from which a run that ends later would go on; ``scratch`` has room for the linear equations of a step. The
-    loop returns after ``max_steps`` accepted steps at the latest.
+    which each segment may evaluate its derivative. ``saved_reals`` and ``saved_counts`` receive the state
+    from which a run with a later end would continue; ``scratch`` has room for the linear equations of a step.
+    The loop returns after ``max_steps`` accepted steps at the latest.
     """
 
     reals: Reals
@@ -84,9 +84,9 @@ class Frame:
         self.segments = counts[Count.SEGMENTS]
         segment = self.count[Count.SEGMENT].value
         self.end = r.real(arrays.ends[segment])
-        """Where the steps that are taken now end: the next instant at which something happens."""
+        """The end of the present piece: the time of the next tick, event or breakpoint."""
         self.clamp = r.real(arrays.clamps[segment])
-        """The latest time at which the derivative may be evaluated on the way there."""
+        """The latest time at which the derivative may be evaluated in this piece."""
         self.last_end = arrays.ends[self.segments - 1]
         self.taken = r.integer(0)
         """Steps accepted in this call."""
@@ -96,7 +96,7 @@ class Frame:
         self.new_time = r.real(0.0)
         """Time at its end."""
         self.whole: Part | None = None
-        """All of the loop: leaving it returns the status."""
+        """The block of the whole loop: leaving it returns the status."""
 
     @property
     def time(self) -> RealVariable:
@@ -108,11 +108,11 @@ class Frame:
         return self.reals.after(place)
 
     def copy(self, source: int, target: int, count: int) -> None:
-        """One vector of the workspace to another place."""
+        """Copy a vector of the workspace."""
         copy(self.r, self.vector(source), self.vector(target), count)
 
     def increase(self, place: Count) -> None:
-        """One more of what is counted."""
+        """Increment a counter."""
         counter = self.count[place]
         counter.value = counter.value + 1
 
@@ -136,6 +136,6 @@ class Frame:
 
 
 def copy(r: Routine, source: Reals, target: Reals, count: int) -> None:
-    """So many numbers from one place to another."""
+    """Copy a number of values."""
     for i in r.each(count):
         target[i] = source[i]

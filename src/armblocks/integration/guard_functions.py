@@ -1,4 +1,4 @@
-"""Functions of a loop for guards: which ones fire, their signs, and whether events ever end."""
+"""Functions of a loop for guards: fired guards, signs, and detection of endless events."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from armblocks.routines.routine import Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 MOST_AT_ONCE = 1000
-"""Events that may follow one another closely, at distances that do not shrink."""
+"""Maximum number of close events at distances that do not shrink."""
 CLOSE = 1e-12
-"""Events nearer than this, beside the time, follow one another closely."""
+"""Relative distance below which events count as close."""
 MOST_CROWDED, CROWD = 100_000, 1e-8
-"""So many events in a row, each nearer than this to the one before, beside the time, are taken for endless
-at any distances: a run goes on by less than a thousandth of its time meanwhile."""
+"""Number of consecutive events within this relative distance that count as endless: the run advances by less
+than a thousandth of its time meanwhile."""
 SHRINKING, SHRUNK = 10, 2.0**-46
-"""So many events of a guard in a row, each sooner than the one before, down to this distance beside the
-time, some 100 units in its last place, are taken for the first of infinitely many."""
+"""Number of consecutive events of a guard with shrinking distances, down to this relative distance (about 100
+units in the last place), that count as the start of infinitely many events (Zeno behaviour)."""
 SHORT = 0.01
-"""The first step after an event, beside the time since the guard's event before it."""
+"""The first step after an event, relative to the time since the previous event of the guard."""
 
 UNDECIDED, NEXT_TO_ZERO = 2, 1
-"""Why an event is doubtful: a guard that fires had no sign at the start of the step, or was next to zero."""
+"""Reasons for a doubtful event: the fired guard had no sign at the start of the step, or was near zero."""
 NEAR = 2.0**-3
-"""Next to zero: less than this part of its value at the end of the step."""
+"""Near zero: less than this fraction of its value at the end of the step."""
 
 
 class GuardFunctions:
@@ -58,7 +58,7 @@ class GuardFunctions:
         self.hold_modes = program.define(self._hold_modes, "hold_modes")
 
     def evaluate(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> None:
-        """Evaluate the guards and the contradictions of modes at a point whose unknowns are solved."""
+        """Evaluate the guards and the inconsistencies of modes at a point whose unknowns are solved."""
         places = self.places
         z, unknowns, values = (reals.after(place) for place in (places.z, places.trial_w, places.guards))
         if self.modes:
@@ -69,7 +69,7 @@ class GuardFunctions:
 
     def _watch(self, r: Routine, t: Reals, x: Reals, reals: Reals, p: Reals) -> Integer:
         """Evaluate the guards with ``trial_w`` and mark in ``fired`` which ones fire and whether upwards;
-        gives their count and that of the modes that contradict their conditions."""
+        returns their number and the number of inconsistent modes."""
         places = self.places
         self.evaluate(r, t, x, reals, p)
         values, signs, fired, contradictions = (
@@ -88,8 +88,8 @@ class GuardFunctions:
         return total.value
 
     def _doubt(self, r: Routine, reals: Reals) -> Integer:
-        """Whether a guard that is marked had no sign at the start of the step, or was next to zero there; the
-        guards are those at its end."""
+        """Whether a marked guard had no sign at the start of the step, or was near zero there; the guards are
+        those at its end."""
         places, found = self.places, r.integer(0)
         for i in r.each(self.count):
             fired, known, before, after = (
@@ -103,7 +103,7 @@ class GuardFunctions:
         return found.value
 
     def _any_returned(self, r: Routine, reals: Reals) -> Boolean:
-        """Whether a guard without a sign at the start of the step has taken one, and is zero at its end."""
+        """Whether a guard without a sign at the start of the step has got one, and is zero at its end."""
         places, found = self.places, r.boolean(False)
         for i in r.each(self.count):
             before, now, value = (
@@ -113,8 +113,8 @@ class GuardFunctions:
         return found.value
 
     def _any_fired(self, r: Routine, reals: Reals, locating: Boolean) -> Boolean:
-        """Whether a guard is marked that only locates changes of modes, or another one; the marks of the
-        other kind are taken away. Guards of derivatives go along with both kinds."""
+        """Whether a guard of one kind is marked (those that only locate mode changes, or all others); clears
+        the marks of the other kind. Guards of derivatives belong to both kinds."""
         found, fired = r.boolean(False), reals.after(self.places.fired)
         locates = r.integers("guard.locates", self.locating)
         for i in r.each(self.count):
@@ -126,7 +126,7 @@ class GuardFunctions:
         return found.value
 
     def _any_contradicts(self, r: Routine, reals: Reals, follows: Boolean) -> Boolean:
-        """Whether a mode that follows the signals, or another one, contradicts its condition."""
+        """Whether a mode of one kind (those that follow the signals, or all others) is inconsistent."""
         found, contradictions = r.boolean(False), reals.after(self.places.contradictions)
         followers = r.integers("mode.follows", self.followers)
         for i in r.each(len(self.modes)):
@@ -135,8 +135,8 @@ class GuardFunctions:
         return found.value
 
     def _hold_modes(self, r: Routine, reals: Reals, follows: Boolean, only_first: Boolean) -> None:
-        """Of the modes that follow the signals, or of the others, those that contradict their conditions take
-        the values of the reset, all or the first of them. All other modes keep theirs."""
+        """Inconsistent modes of one kind (those that follow the signals, or all others) take the values of
+        the reset, all of them or only the first. All other modes are unchanged."""
         z, new_z, contradictions = (
             reals.after(place) for place in (self.places.z, self.places.new_z, self.places.contradictions)
         )
@@ -150,7 +150,7 @@ class GuardFunctions:
             held.value = kept | (contradicts & only_first)
 
     def _take_followers(self, r: Routine, reals: Reals) -> None:
-        """The modes that follow the signals become what the reset gives, and so do derivatives."""
+        """Modes that follow the signals, and derivatives, take the values of the reset."""
         places = self.places
         x, new_x, z, new_z = (
             reals.after(place) for place in (places.x, places.new_x, places.z, places.new_z)
@@ -169,7 +169,7 @@ class GuardFunctions:
         r.copy(new_z.after(first_z), z.after(first_z), self.discrete - first_z)
 
     def _take_tangent_signs(self, r: Routine, reals: Reals) -> None:
-        """The guards of derivatives that fired take their signs, whatever else is left to happen."""
+        """Update the signs of the fired guards of derivatives."""
         places = self.places
         values, signs, fired = (reals.after(place) for place in (places.guards, places.signs, places.fired))
         first = self.count if self.tangents is None else self.tangents[2]
@@ -177,8 +177,8 @@ class GuardFunctions:
             signs[i] = select(fired[i] != 0.0, sign(values[i]), signs[i])
 
     def _dips(self, r: Routine, reals: Reals, half: Real) -> Integer:
-        """Count the guards that may have gone to zero and come back between three values of one sign, which
-        are ``half`` apart.
+        """Count the guards that may have touched zero and returned between three values of equal sign,
+        ``half`` apart.
 
         With A, M, B the values at the beginning, in the middle and at the end, as distances from zero, the
         parabola through them is M + (B - A) s / 2 + C s^2 / 2, C = A - 2 M + B, for s from -1 to 1. It is
@@ -212,7 +212,8 @@ class GuardFunctions:
     def _turns(
         self, reals: Reals, half: Real, i: Integer | int, side: Real, distances: tuple[Real, Real, Real]
     ) -> Boolean:
-        """Whether a guard does not go on as the window before this one ended; false where that is NaN."""
+        """Whether a guard's slope differs from that at the end of the previous window; false where that is
+        NaN."""
         A, M, B = distances
         known = side * reals.after(self.places.guard_slopes)[i]
         now = fma(-1.5, A, fma(2.0, M, -0.5 * B))
@@ -222,14 +223,14 @@ class GuardFunctions:
         return (least > 0.0) & doubtful
 
     def _note_slopes(self, r: Routine, reals: Reals, half: Real) -> None:
-        """Keep the slope at the end of the parabola through the last three values of each guard."""
+        """Store the slope at the end of the parabola through the last three values of each guard."""
         for i in r.each(self.count):
             A, M, B = self._window(reals, i)
             rise = fma(1.5, B, fma(-2.0, M, 0.5 * A))
             reals.after(self.places.guard_slopes)[i] = rise / half
 
     def _take_signs(self, r: Routine, reals: Reals, only_fired: Boolean) -> None:
-        """Note the sides on which the guards are, or only those that fired."""
+        """Store the signs of all guards, or of the fired ones only."""
         places = self.places
         values, signs, fired = (reals.after(place) for place in (places.guards, places.signs, places.fired))
         directions = r.reals("guard.directions", self.directions)
@@ -237,24 +238,23 @@ class GuardFunctions:
             now, known, mark = sign(values[i]), signs[i], fired[i]
             has_fired, nonzero = mark != 0.0, now != 0.0
             side = select(nonzero, now, known)
-            # A guard of one direction that is put onto its zero comes from the other side: a ball on the
-            # floor that falls on bounces again.
+            # A guard with one direction that is reset to its zero gets the opposite sign: a ball on the floor
+            # that still falls bounces again.
             directed = directions[i] != 0.0
             back = select(directed & has_fired, -1.0 * mark, now)
             after = select(has_fired, select(nonzero, now, back), known)
             signs[i] = select(only_fired, after, side)
 
     def _note_events(self, r: Routine, t: Real, reals: Reals, counts: Integers, first: Boolean) -> Real:
-        """Count the events of an instant, and those in a row that follow one another without an end; gives a
-        bound for the next step, negative where there is no end.
+        """Count the events of an event time, and the consecutive close ones; returns a bound for the next
+        step, negative for endless events.
 
-        ``first`` is false for further turns in which modes follow the signals of one instant: only guards
-        that were not counted there count.
+        ``first`` is false for further mode iterations at the same time: only guards that were not yet counted
+        count.
 
-        Events follow closely where less than ``CLOSE`` of the time lies between them. A series whose
-        distances shrink, as those of a bouncing ball, may come to an end by itself: it has none only where
-        the distances become as short as the rounding of the time, or where ``MOST_CROWDED`` events come in a
-        row.
+        Events follow closely where less than ``CLOSE`` of the time lies between them. A series with shrinking
+        distances, such as a bouncing ball, may end by itself. It counts as endless only where the distances
+        reach the rounding error of time, or after ``MOST_CROWDED`` consecutive events.
         """
         places = self.places
         bound = r.real(float("inf"))
@@ -298,5 +298,5 @@ class GuardFunctions:
 
 
 def _same(one: Boolean, other: Boolean) -> Boolean:
-    """Whether both hold or neither does."""
+    """Whether both are true or both are false."""
     return (one & other) | (~one & ~other)

@@ -26,9 +26,10 @@ class RosenbrockTableau:
     This is the form in which no product with ``J`` is left (Hairer, Wanner II, IV.7, equation (7.25), with
     ``u = h k``); :func:`from_textbook` makes it from ``alpha``, ``Gamma``, ``b``. The estimate of the error
     is ``h * sum_j error[j] k[j]``, of order ``error_order``; without ``error`` the step is fixed. An adaptive
-    step is also judged by its values in between, whose defect ``r = f - x'`` in its middle is what a stiff
-    system shows of their error: ``(I / gamma - h J)^-1 h r`` has to be below the tolerance as well. Otherwise
-    steps would grow without bound where fast dynamics follow slow inputs, right at their ends only.
+    step also checks its dense output: the defect ``r = f - x'`` in the middle of the step gives the error
+    ``(I / gamma - h J)^-1 h r`` of a stiff system, which has to be below the tolerance as well. Otherwise
+    steps would grow without bound where fast dynamics follow slow inputs, with an accurate result at their
+    ends only.
 
     Where implicit equations ``0 = g(t, x, w)`` belong to the system, ``J`` and ``T`` are those along their
     solution ``w(t, x)``: the matrix gets the rows of ``g`` below it and is eliminated as a whole.
@@ -91,7 +92,7 @@ class RosenbrockTableau:
 
     @property
     def adaptive(self) -> bool:
-        """Whether the method estimates its error and chooses its steps."""
+        """Whether the method has an error estimate and adapts its steps."""
         return self.error is not None
 
     @property
@@ -148,7 +149,7 @@ class RosenbrockTableau:
 
     @property
     def content(self) -> str:
-        """All numbers of the method as text, exactly: the part of a cache key that stands for it."""
+        """All numbers of the method as text, exactly: the part of a cache key that identifies it."""
         numbers = (
             self.gamma,
             self.nodes,

@@ -28,7 +28,7 @@ export function JointsPanel() {
           data={KINDS}
           value={kind}
           onChange={(value) => setKind(value as keyof Joints)}
-          aria-label="What the sliders set"
+          aria-label="Quantity of the sliders"
         />
         <Button size="compact-xs" variant="default" onClick={() => setJoints(atRest(shown))}>
           Home

@@ -51,7 +51,7 @@ function Tab({ api }: IDockviewPanelHeaderProps) {
   return <span className="tab">{api.title}</span>
 }
 
-/** The first arrangement: arm, joints and read-outs above, the tables below. */
+/** The default layout: arm, joints and read-outs above, the tables below. */
 function arrange({ api }: DockviewReadyEvent): void {
   const tall = innerHeight > TALL
   api.addPanel({ id: 'arm', component: 'arm', title: 'Arm' })

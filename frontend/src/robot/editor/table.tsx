@@ -305,10 +305,12 @@ function RowMenu({ link, row, shown }: { link: LinkRow; row: number; shown: Robo
       </Menu.Target>
       <Menu.Dropdown>
         <Menu.Item onClick={() => void edit({ kind: 'add', after: link.name })}>
-          Add a joint behind it
+          Insert a joint after it
         </Menu.Item>
         {row === 0 && (
-          <Menu.Item onClick={() => void edit({ kind: 'add', after: '' })}>Add a joint before it</Menu.Item>
+          <Menu.Item onClick={() => void edit({ kind: 'add', after: '' })}>
+            Insert a joint before it
+          </Menu.Item>
         )}
         <Menu.Item
           disabled={!shown.chain || row === 0}
@@ -327,7 +329,7 @@ function RowMenu({ link, row, shown }: { link: LinkRow; row: number; shown: Robo
           disabled={shown.links.length === 1}
           onClick={() => void edit({ kind: 'remove', link: link.name })}
         >
-          Take it out
+          Remove the joint
         </Menu.Item>
       </Menu.Dropdown>
     </Menu>
