@@ -441,6 +441,22 @@ def test_a_relay_that_resets_what_it_watches_stays_on() -> None:
     np.testing.assert_allclose(result["integral/y"], result.time % 1.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("frequency", [4.0, 1.7, 0.9])
+@pytest.mark.parametrize("settings", [{}, {"solver": "rodas5p"}, {"solver": "rk4", "step": 0.3}], ids=str)
+def test_an_edge_after_an_unwanted_one_in_the_same_step_is_seen(
+    frequency: float, settings: Mapping[str, object]
+) -> None:
+    """A sawtooth falls through 0 within a step, and rises through 0 where it jumps at the end of the step."""
+    builder = DiagramBuilder("saw")
+    saw = builder.add("saw", SignalGenerator(waveform="sawtooth", frequency=frequency))
+    total = builder.add("total", ResettableIntegrator(), builder.add("one", Constant()), saw)
+    builder.add("seen", ZeroOrderHold(sample_time=0.3), total)
+    result = ab.simulate(builder.build(), stop_time=4.0, sample_time=0.01, **settings)  # pyright: ignore
+    since = np.mod(result.time, 1.0 / frequency)
+    apart = np.minimum(since, 1.0 / frequency - since) > 1e-9
+    np.testing.assert_allclose(result["total/y"][apart], since[apart], atol=1e-9)
+
+
 def test_a_touch_at_a_corner_is_sampled_as_it_is_at_the_tick() -> None:
     """At 0.25 s and 1 s later the course touches 1 at a corner, and a tick samples the comparison there."""
     builder = DiagramBuilder("touch")

@@ -46,6 +46,7 @@ class EventSearch:
         """
         f, r = self.frame, self.frame.r
         low, high, doubt = r.real(time), r.real(time), r.integer(0)
+        before = r.real(time)
         self._keep_start()
         with r.part() as search:
             with r.part() as attempt:
@@ -60,14 +61,17 @@ class EventSearch:
                         doubt.value = UNDECIDED
                         judged.leave()
                     self._bisect(low, high, time, h)
+                    before.value = low.value
                     doubt.value = 0
                     with r.when(high.value < end):
                         self._judge(doubt, high.value, time, h)
                 with r.when((doubt.value != 0) & divisible):
                     self._take_shorter(high.value, doubt.value == UNDECIDED, time, h, attempt)
+                    before.value = (f.new_time.value.bits() - 1).from_bits()
                 with r.otherwise(), r.when(high.value < end):
                     self.method.interpolate(high.value, time, h, self.y)
                     f.new_time.value = high.value
+            self._take_signs_before(before.value, time)
             self.happened.value = 1
             # An event that coincides with a tick or breakpoint gets its time.
             known, new_time = f.end.value, f.new_time.value
@@ -122,6 +126,17 @@ class EventSearch:
         """The number of guards that have fired at a time within the step."""
         self.method.interpolate(instant, time, h, self.new_x)
         return self.events.watch(minimum(instant, self.frame.clamp.value), self.new_x)
+
+    def _take_signs_before(self, instant: Real, time: Real) -> None:
+        """Just before the event, all guards take their signs: one may have passed zero against its direction.
+
+        That is no event, but it is the side from which the guard comes at this instant.
+        """
+        f, r = self.frame, self.frame.r
+        h = f.h.value
+        self.records.extra_stages_once(time, h)
+        with r.when(self.watch_inside(maximum(instant, time), time, h) == 0):
+            r.call(self.functions.take_signs, f.reals, r.constant_boolean(False))
 
     def _judge(self, doubt: IntegerVariable, instant: Real, time: Real, h: Real) -> None:
         """Whether an event on the dense output is doubtful, and why.
