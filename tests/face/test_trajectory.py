@@ -31,8 +31,8 @@ def test_a_count_of_samples_means_normalised_time() -> None:
         (([0, np.nan], [1, 1], 10), r"q0 = .*nan.*a vector of finite joint values"),
         (([0, 0], [1, 1, 1], 10), "qf has 3 joints.*Allowed: 2, as q0"),
         (([0], [1], 1), "t = 1 samples.*2 or more"),
-        (([0], [1], [0.0, 0.0]), "rising finite instants that start at 0"),
-        (([0], [1], [1.0, 2.0]), "rising finite instants that start at 0"),
+        (([0], [1], [0.0, 0.0]), "finite ascending times that start at 0"),
+        (([0], [1], [1.0, 2.0]), "finite ascending times that start at 0"),
     ],
 )
 def test_jtraj_refuses_in_words(arguments: tuple, message: str) -> None:
