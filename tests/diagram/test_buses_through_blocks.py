@@ -222,7 +222,7 @@ def test_a_block_that_calculates_takes_no_bus() -> None:
     builder = DiagramBuilder("gain")
     one = builder.add("one", Constant())
     builder.add("gain", Gain(), builder.add("bus", BusCreator(names="p, q"), one, one))
-    with pytest.raises(DiagramError, match="is given a bus with the elements p, q"):
+    with pytest.raises(DiagramError, match="receives a bus with the elements p, q"):
         builder.build()
 
 

@@ -153,7 +153,7 @@ def test_a_nonlinear_loop_that_is_moved_and_sampled_by_one_tick_is_refused() -> 
     total = builder.add("sum", Sum(), hold)
     builder.connect(builder.add("cos", Trigonometry(function="cos"), total), total["u2"])
     builder.add("again", ZeroOrderHold(), total)
-    with pytest.raises(DiagramError, match="is not linear, follows what is sampled, and is sampled itself"):
+    with pytest.raises(DiagramError, match="is not linear, depends on a sampled signal, and is sampled"):
         trace_diagram(builder.build())
 
 

@@ -201,5 +201,5 @@ def test_subsystems_may_be_a_hundred_deep_and_no_deeper() -> None:
     diagram = Diagram(name="innermost", blocks={"one": Constant()})
     for _ in range(101):
         diagram = Diagram(name="around", blocks={"inside": Subsystem(diagram=diagram)})
-    with pytest.raises(DiagramError, match="subsystems are more than 100 deep inside each other"):
+    with pytest.raises(DiagramError, match="subsystems are nested more than 100 levels deep"):
         ab.simulate(diagram)

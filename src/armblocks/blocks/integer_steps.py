@@ -1,4 +1,4 @@
-"""An integer that follows a signal, as a mode: the instants at which it changes are events."""
+"""Integers that follow a signal, as modes whose changes are events."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armblocks.diagram import Block, Guard, Shapes, Signals, State
 
 
 def nearest(u: SX) -> SX:
-    """The nearest integer, halves away from zero, exact for every double."""
+    """Round to the nearest integer, halves away from zero, exactly for every double."""
     whole = floor(fabs(u))
     return sign(u) * (whole + (fabs(u) - whole >= 0.5))
 
@@ -41,9 +41,9 @@ def rounding_edges(function: str, n: SX, mirrored: bool = False) -> tuple[SX, SX
 
 
 def step_after(now: SX, before: SX, e: Signals, up: str = "up", down: str = "down") -> SX:
-    """An integer after the events at both ends of its interval; ``now``: by the values of the moment.
+    """An integer after the events at both ends of its interval; ``now``: computed from the present values.
 
-    A jump may pass several integers at once; at a border, rounding must not undo the step.
+    A jump may pass several integers at once; at a border, rounding errors must not undo the step.
     """
     lower = if_else(e[down] < 0.0, fmin(now, before - 1.0), before)
     return if_else(e[up] > 0.0, fmax(now, before + 1.0), lower)
@@ -53,8 +53,8 @@ def step_after(now: SX, before: SX, e: Signals, up: str = "up", down: str = "dow
 class IntegerSteps:
     """Rounding of the input ``signal`` to the mode ``mode``, element by element.
 
-    A block gives these modes, guards and values as its own. ``count``: the integer is held from 0 to
-    ``count - 1``; without it, it has no bounds. ``mark`` stands before the names of the guards.
+    A block returns these modes, guards and values from its methods. ``count``: the integer is held from 0 to
+    ``count - 1``; without it, it has no bounds. ``mark`` is the prefix of the guard names.
     """
 
     signal: str
@@ -98,7 +98,7 @@ class IntegerSteps:
 
 
 class BlockWithSteps(Block):
-    """A block with integers that follow its inputs: those of :meth:`_steps`."""
+    """Base class of blocks with integers that follow inputs, given by :meth:`_steps`."""
 
     memoryless: ClassVar[bool] = True
 

@@ -1,10 +1,9 @@
-"""The equations of a block inside a conditional subsystem: the block's own, gated by what controls it.
+"""The equations of a block inside a conditional subsystem: those of the block, gated by its control.
 
-While the control is off, continuous states stand still and sampled ones keep their values. At a restart all
-states take their start values. When the control goes on, modes settle by the values of that instant, as they
-do at the start of a run, and guards are looked at from then on. A triggered block works when the trigger
-fires, as a sampled one does at a tick. The block is asked for its equations as always; only what becomes of
-them is changed here.
+While the control is off, continuous and sampled states keep their values. At a restart all states are reset
+to their initial values. When the control turns on, modes become consistent with the present values, as at the
+start of a run, and guards are evaluated from then on. A triggered block executes when the trigger fires, as a
+sampled block does at a tick. The equations of the block are unchanged; only their use is changed here.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ from armblocks.diagram.block import Block, Shapes, Signals
 from armblocks.diagram.port import Condition, DelayLine, Guard, Port, State, name_before
 
 ON, RESTART, FIRE, ELAPSED = "?on", "?restart", "?fire", "?elapsed"
-"""Hidden inputs: whether the block works; whether its states start anew now; whether the trigger fires now;
-and the time since it fired before, s."""
+"""Hidden inputs: whether the block is active; whether its states are reset now; whether the trigger fires
+now; and the time since it fired before, s."""
 _DONE, _WORKS, _TURNED = "?done", "?works", "?turned"
 """Kept and guarded beside the block's own: whether this tick has restarted it; whether its modes have settled
 since the control is on; and the guard of the control itself."""
@@ -43,7 +42,7 @@ class ConditionalBlock(Block):
     ticking: bool
 
     def __post_init__(self) -> None:
-        """Nothing to check: the block inside is checked."""
+        """No check: the inner block is already checked."""
 
     def _plain(self, values: Mapping[str, SX]) -> dict[str, SX]:
         return {name: value for name, value in values.items() if name not in (*self.hidden, _DONE, _WORKS)}
@@ -60,7 +59,7 @@ class ConditionalBlock(Block):
         return self._restarted and self.clocked
 
     def _arguments(self, t: SX, x: Signals, u: Signals, p: Signals) -> tuple[SX, Signals, Signals, Signals]:
-        """What the block's own equations are given."""
+        """The arguments of the inner block's equations."""
         own = self._plain(x)
         if self._restarted and self.ticking:
             own |= {
@@ -95,13 +94,17 @@ class ConditionalBlock(Block):
         return self.block.states(self._shapes(inputs))
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        noted = (State(_DONE, (), "whether this tick has restarted the block"),)
+        noted = (State(_DONE, (), "whether this tick has reset the block"),)
         own = self.block.discrete_states(self._shapes(inputs))
         return (*own, *noted) if self._notes_restarts else own
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         own = self.block.all_modes(self._shapes(inputs))
-        return (*own, State(_WORKS, (), "whether the modes follow")) if own and ON in self.hidden else own
+        return (
+            (*own, State(_WORKS, (), "whether the modes are consistent"))
+            if own and ON in self.hidden
+            else own
+        )
 
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         own = self.block.all_guards(self._shapes(inputs))
@@ -189,7 +192,7 @@ class ConditionalBlock(Block):
         return after
 
     def _while_on(self, u: Signals, values: Signals, otherwise: Signals | None = None) -> Signals:
-        """Values where the control is on; else what ``otherwise`` has under their names, or 0."""
+        """Values while the control is on; else those of ``otherwise`` by name, or 0."""
         if ON not in self.hidden:
             return values
         return {

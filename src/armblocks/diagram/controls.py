@@ -1,8 +1,8 @@
-"""What a flat diagram has in the place of conditional subsystems: controls, held outputs, merged outputs.
+"""Blocks that replace conditional subsystems in a flat diagram: controls, held outputs, merged outputs.
 
-They are in no library and no file. At an event things happen in two turns: first the control's mode follows
-its signal, so that ``restart`` or ``fire`` are 1; then the guard ``acts`` fires, the blocks inside start anew
-or do their work, and the control has seen it. At a tick modes follow at once, and both happen together.
+They are in no library and no file. An event has two iterations: first the control's mode follows its signal,
+so that ``restart`` or ``fire`` becomes 1; then the guard ``acts`` triggers, the blocks inside are reset or
+executed, and the control stores that it has acted. At a tick modes follow at once, and both happen together.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from armblocks.diagram.port import Guard, Port, State
 from armblocks.diagram.shape_rules import broadcast
 
 JUST = 1e-300
-"""Beside zero by less than any signal can tell: it gives zero itself a side."""
+"""An offset below any signal resolution: it assigns zero itself to one side."""
 _STATES = ("held", "reset")
 _EDGES = ("rising", "falling", "either")
 
 
 def _inside(block: EnableControl | TriggerControl) -> tuple[Port, ...]:
     ports = (
-        (block.outer, Port("outer", "whether the subsystem around works", "", ())),
-        (block.anew, Port("anew", "whether the subsystem around starts anew", "", ())),
+        (block.outer, Port("outer", "whether the enclosing subsystem is active", "", ())),
+        (block.anew, Port("anew", "whether the enclosing subsystem is reset", "", ())),
     )
     return tuple(port for there, port in ports if there)
 
@@ -48,7 +48,7 @@ def _begins(on: SX, x: Signals) -> SX:
 
 @dataclass(frozen=True, kw_only=True)
 class EnableControl(Block):
-    """Whether an enabled subsystem is on, and whether its states start anew just now: on = u > 0.
+    """Whether an enabled subsystem is active, and whether its states are reset at this time: on = u > 0.
 
     ``works`` follows ``on`` once the blocks inside have found their modes and started their states anew, so
     that no event outside of the subsystem acts on the outputs of old modes and states.
@@ -56,9 +56,9 @@ class EnableControl(Block):
 
     title: ClassVar[str] = "Enable"
 
-    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be off")
-    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can start anew")
-    restarts: bool = parameter(False, doc="whether states start anew when it is switched on")
+    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be inactive")
+    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
+    restarts: bool = parameter(False, doc="whether states are reset when it is enabled")
 
     def input_ports(self) -> tuple[Port, ...]:
         return (Port("u", "the control signal", "", ()), *_inside(self))
@@ -67,11 +67,11 @@ class EnableControl(Block):
         return (
             Port("on", "1 while it is on", "", ()),
             Port("works", "1 while it is on and the blocks inside have started", "", ()),
-            Port("restart", "1 where states start anew", "", ()),
+            Port("restart", "1 where states are reset", "", ()),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("seen", (), "what on was when it was last acted on; -1 before that"),)
+        return (State("seen", (), "value of on at the last action; -1 before the first"),)
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
         works = State("works", (), "1 while it is on and the blocks inside have started", follows=True)
@@ -114,12 +114,12 @@ class EnableControl(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class TriggerControl(Block):
-    """Whether a trigger fires just now, and how long after it fired before."""
+    """Whether a trigger fires at this time, and the time since it fired before."""
 
     title: ClassVar[str] = "Trigger"
 
-    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be off")
-    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can start anew")
+    outer: bool = parameter(False, doc="whether it is inside a subsystem that can be inactive")
+    anew: bool = parameter(False, doc="whether it is inside a subsystem whose states can be reset")
     edge: str = parameter("rising", choices=_EDGES, doc="when it fires")
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -127,15 +127,17 @@ class TriggerControl(Block):
 
     def output_ports(self) -> tuple[Port, ...]:
         return (
-            Port("fire", "1 at the instant at which it fires", "", ()),
-            Port("restart", "1 where states start anew, by this trigger or from around", "", ()),
-            Port("elapsed", "time since it fired before; since the start at first", "s", ()),
+            Port("fire", "1 at the time at which it fires", "", ()),
+            Port(
+                "restart", "1 where states are reset, by this trigger or by the enclosing subsystem", "", ()
+            ),
+            Port("elapsed", "time since it fired before, or since the start", "s", ()),
         )
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
         return (
-            State("seen", (), "the side of u that was acted on last; -1 before that"),
-            State("last", (), "when it fired last", "s"),
+            State("seen", (), "sign of u at the last action; -1 before the first"),
+            State("last", (), "time at which it fired last", "s"),
         )
 
     def modes(self, inputs: Shapes) -> tuple[State, ...]:
@@ -144,7 +146,7 @@ class TriggerControl(Block):
     def guards(self, inputs: Shapes) -> tuple[Guard, ...]:
         return (
             Guard("side", (), "u passes zero", locates=True),
-            Guard("acts", (), "the side has changed", 1),
+            Guard("acts", (), "the sign has changed", 1),
         )
 
     def initial_states(self, p: Signals) -> Signals:
@@ -180,22 +182,24 @@ class TriggerControl(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOutput(Block):
-    """An output of a conditional subsystem: y = u while it works, else what y was, or ``initial``."""
+    """An output of a conditional subsystem: y = u while active, else its previous value or ``initial``."""
 
     title: ClassVar[str] = "Out"
 
-    fires: bool = parameter(False, doc="whether works is 1 at instants only")
-    when_off: str = parameter("held", choices=_STATES, doc="whether y is held or goes back")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before it has worked")
+    fires: bool = parameter(False, doc="whether works is 1 at single times only")
+    when_off: str = parameter("held", choices=_STATES, doc="whether y is held or reset to initial")
+    initial: ArrayLike = parameter(
+        0.0, kind=ParameterKind.ARRAY, doc="y before the subsystem has been active"
+    )
 
     def input_ports(self) -> tuple[Port, ...]:
-        return (Port("u", "what leaves"), Port("works", "1 while or when the subsystem works", "", ()))
+        return (Port("u", "what leaves"), Port("works", "1 while or when the subsystem is active", "", ()))
 
     def bus_inputs(self) -> tuple[str, ...]:
         return ("u",)
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "what is held"),)
+        return (Port("y", "signal to hold"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         return {"y": broadcast({"u": inputs["u"], "initial": shape_of(self.initial)})}
@@ -207,7 +211,7 @@ class HeldOutput(Block):
         return {"y": inputs["u"]}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("held", self.output_shapes(inputs)["y"], "what y was"),)
+        return (State("held", self.output_shapes(inputs)["y"], "previous value of y"),)
 
     def initial_states(self, p: Signals) -> Signals:
         return {"held": p["initial"]}
@@ -225,25 +229,28 @@ class HeldOutput(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class MergedOutput(Block):
-    """Several outputs of conditional subsystems on one wire: y = that of the one that works, or did last."""
+    """Merged outputs of conditional subsystems: y is the output of the one that is or was active last."""
 
     title: ClassVar[str] = "Merge"
 
-    inputs: int = parameter(2, minimum=1, doc="how many inputs")
-    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before any of them has worked")
+    inputs: int = parameter(2, minimum=1, doc="number of inputs")
+    initial: ArrayLike = parameter(0.0, kind=ParameterKind.ARRAY, doc="y before any of them has been active")
 
     def input_ports(self) -> tuple[Port, ...]:
         numbers = range(1, self.inputs + 1)
         return (
             *(Port(f"u{number}", "an output") for number in numbers),
-            *(Port(f"works{number}", "1 while or when its subsystem works", "", ()) for number in numbers),
+            *(
+                Port(f"works{number}", "1 while or when its subsystem is active", "", ())
+                for number in numbers
+            ),
         )
 
     def bus_inputs(self) -> tuple[str, ...]:
         return tuple(f"u{number}" for number in range(1, self.inputs + 1))
 
     def output_ports(self) -> tuple[Port, ...]:
-        return (Port("y", "the output of the one that worked last"),)
+        return (Port("y", "the output of the subsystem that was active last"),)
 
     def output_shapes(self, inputs: Shapes) -> Shapes:
         wide = {name: shape for name, shape in inputs.items() if name.startswith("u")}
@@ -253,7 +260,7 @@ class MergedOutput(Block):
         return {"y": shape_of(self.initial)}
 
     def discrete_states(self, inputs: Shapes) -> tuple[State, ...]:
-        return (State("held", self.output_shapes(inputs)["y"], "what y was"),)
+        return (State("held", self.output_shapes(inputs)["y"], "previous value of y"),)
 
     def initial_states(self, p: Signals) -> Signals:
         return {"held": p["initial"]}

@@ -1,8 +1,8 @@
-"""From a diagram with subsystems, tags and buses to a flat one: blocks named by their paths, real wires only.
+"""Flattening of diagrams with subsystems, tags and buses: blocks named by paths, direct connections only.
 
 Flattening changes no signal. A block ``pid`` inside the subsystem ``controller`` becomes the block
-``controller/pid``; what virtual blocks mean is followed back to the output of a real block. A diagram without
-virtual blocks is its own flat form.
+``controller/pid``; each input is traced back through virtual blocks to the output of a real block. A diagram
+without virtual blocks is its own flat form.
 """
 
 from __future__ import annotations
@@ -47,20 +47,19 @@ CONDITIONAL = (
     ActionSubsystem,
 )
 DEEPEST = 100
-"""Subsystems inside each other."""
+"""Maximum nesting depth of subsystems."""
 MOST_LISTED = 20
-"""How many offenders one message lists."""
+"""Maximum number of inputs that one message lists."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlatForm:
-    """A flat diagram, and how the hierarchy is found in it again. Names are paths from the top.
+    """A flat diagram, and its relation to the hierarchy. Names are paths from the top level.
 
-    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``carried``: what the
-    output ports of the hierarchy carry, where that is not their own signal. ``aliases``: other names of
-    signals, such as a subsystem's ports. ``views``: the pictures that are asked for, by block.
-    ``stated``: ports whose wires have to have a certain shape. All but ``levels`` are empty for a diagram
-    that is flat already.
+    ``levels``: the diagram of every subsystem by its path, with ``""`` for the top. ``carried``: the signal
+    or bus at output ports of the hierarchy, where it is not their own signal. ``aliases``: other names of
+    signals, such as a subsystem's ports. ``views``: the views, by block. ``stated``: ports with a declared
+    shape. All except ``levels`` are empty for a diagram that is already flat.
     """
 
     diagram: Diagram
@@ -74,10 +73,10 @@ class FlatForm:
 
 
 def flatten_hierarchy(diagram: Diagram) -> FlatForm:
-    """The flat form of a diagram, worked out once for each diagram object.
+    """The flat form of a diagram, cached for each diagram object.
 
-    Raises ``DiagramError`` for unconnected inputs, tags and buses that lead nowhere, wires that lead in a
-    circle without a block, and subsystems too deep inside each other; ``where`` names the path.
+    Raises ``DiagramError`` for unconnected inputs, unmatched tags and bus elements, connections in a cycle
+    without a block, and too deeply nested subsystems; ``where`` names the path.
     """
     return diagram.keep("flat form", lambda: _flat_form(diagram))
 
@@ -88,9 +87,9 @@ def flat_diagram(diagram: Diagram) -> Diagram:
 
 
 def diagram_views(diagram: Diagram) -> tuple[tuple[str, View], ...]:
-    """Every picture that a diagram and its subsystems ask for, with the path of the block that asks.
+    """All views of a diagram and its subsystems, with the path of the block that defines each.
 
-    Logged outputs come last: each is a picture of traces, named after the output.
+    Logged outputs come last: each is a view with traces, named after the output.
     """
     form = flatten_hierarchy(diagram)
     views = form.views
@@ -123,9 +122,9 @@ def joined(level: str, name: str) -> str:
 
 
 def levels_of(diagram: Diagram) -> dict[str, Diagram]:
-    """All diagrams of a hierarchy by path, those outside first.
+    """All diagrams of a hierarchy by path, outer ones first.
 
-    Raises ``DiagramError`` where there is no end of subsystems inside each other.
+    Raises ``DiagramError`` for too deeply nested subsystems.
     """
     levels: dict[str, Diagram] = {}
     pending = [("", diagram, 0)]
@@ -133,10 +132,10 @@ def levels_of(diagram: Diagram) -> dict[str, Diagram]:
         path, level, depth = pending.pop()
         if depth > DEEPEST:
             raise DiagramError(
-                f"subsystems are more than {DEEPEST} deep inside each other",
+                f"subsystems are nested more than {DEEPEST} levels deep",
                 where=f"block '{'/'.join(path.split('/')[:3])}/…'",
                 allowed=f"at most {DEEPEST}",
-                fix="put some of them side by side",
+                fix="reduce the nesting",
             )
         levels[path] = level
         for name, block in level.blocks.items():
@@ -161,7 +160,7 @@ def check_connected(levels: Mapping[str, Diagram]) -> None:
             f"{len(open_inputs)} unconnected input{'s' * (len(open_inputs) > 1)}: {shown}"
             + (f" and {rest} more" if rest > 0 else ""),
             where=f"diagram '{next(iter(levels.values())).name}'",
-            allowed="every input has a driver",
+            allowed="each input has a driver",
             fix="connect an output or a Constant to each",
         )
 
@@ -171,7 +170,7 @@ def _plain(block: Block) -> Block:
 
 
 class _Flattening:
-    """Follows the wires of one hierarchy back to real blocks; lives only while it is flattened."""
+    """Traces the connections of one hierarchy back to real blocks; used during flattening only."""
 
     def __init__(self, top: Diagram, levels: Mapping[str, Diagram]) -> None:
         self.top = top
@@ -225,7 +224,7 @@ class _Flattening:
         ]
         flat = dataclasses.replace(
             self.top,
-            # Numbers, without the masks that they followed from.
+            # Values without the masks from which they were computed.
             blocks={path: _plain(block) for path, block in real.items()},
             connections=tuple(connections),
             layout={},
@@ -249,14 +248,14 @@ class _Flattening:
         )
 
     def vanishes(self, path: str) -> bool:
-        """Whether a block is replaced by wires: virtual ones, and the ends of subsystems."""
+        """Whether a block is replaced by connections: virtual blocks, and the ends of subsystems."""
         block = self.blocks[path]
         return block.virtual or (bool(self.level_of[path]) and isinstance(block, Inport | Outport))
 
     # -- conditional subsystems ----------------------------------------------------------------------------
 
     def _control(self, level: str) -> None:
-        """The gate of the blocks of a level, and the blocks that work it out where it is conditional."""
+        """The gate of the blocks of a level, and the control blocks of a conditional level."""
         outer, block = self.gates[self.level_of[level]], self.blocks[level]
         self.gates[level] = outer
         if not isinstance(block, CONDITIONAL):
@@ -315,7 +314,7 @@ class _Flattening:
         return path
 
     def _hold(self, level: str, works: PortRef, *, fires: bool) -> None:
-        """Outputs that keep their values while the subsystem does not work."""
+        """Outputs that hold their values while the subsystem is inactive."""
         for name, block in self.levels[level].blocks.items():
             if isinstance(block, Outport):
                 path = joined(level, name)
@@ -329,10 +328,10 @@ class _Flattening:
             if not isinstance(carried, PortRef) or not isinstance(self.blocks[carried.block], HeldOutput):
                 source = f"'{carried}'" if isinstance(carried, PortRef) else "a bus"
                 raise DiagramError(
-                    f"input 'u{number}' is {source}, which no conditional subsystem gives",
+                    f"input 'u{number}' is {source}, which is not an output of a conditional subsystem",
                     where=f"block '{path}' (Merge)",
                     allowed="outputs of enabled, triggered and action subsystems",
-                    fix="take a Switch, or put the signal's block into a conditional subsystem",
+                    fix="use a Switch, or put the signal's block into a conditional subsystem",
                 )
             self.drivers[PortRef(path, f"works{number}")] = self.drivers[PortRef(carried.block, "works")]
 
@@ -343,10 +342,11 @@ class _Flattening:
             if path not in self.controls and (gate := self.gates[self.level_of[path]])
         }
 
-    # -- following wires -----------------------------------------------------------------------------------
+    # -- tracing connections
+    # -----------------------------------------------------------------------------------
 
     def carry(self, ref: PortRef) -> Carried:
-        """What an output port carries; with a stack of its own, so that ways may be long."""
+        """The signal or bus at an output port; uses an explicit stack, so that paths may be long."""
         way = {ref: None}
         while way:
             last = next(reversed(way))
@@ -360,9 +360,9 @@ class _Flattening:
             elif missing in way:
                 loop = [str(entry) for entry in way][list(way).index(missing) :][::-1]
                 raise DiagramError(
-                    f"wires lead in a circle without a block that works anything out: {' -> '.join(loop)}",
+                    f"connections form a cycle without a block that computes a signal: {' -> '.join(loop)}",
                     where=self.where,
-                    allowed="every wire begins at a block that gives a signal",
+                    allowed="each connection starts at a block that computes a signal",
                     fix="remove one of these connections",
                 )
             else:
@@ -370,7 +370,7 @@ class _Flattening:
         return self.carried[ref]
 
     def at(self, path: str, port: str) -> Carried:
-        """What an input port is given."""
+        """The signal or bus at an input port."""
         target = PortRef(path, port)
         carried = self.carry(self.drivers[target])
         if target in self.elements:
@@ -379,7 +379,7 @@ class _Flattening:
         return carried
 
     def _spread_over(self, found: SpreadBlock) -> None:
-        """Put a copy of a block for each signal of a bus into its place."""
+        """Replace a block by a copy for each signal of a bus."""
         path, block = found.path, self.blocks.pop(found.path)
         self.spread[path] = found
         alone = set(block.bus_inputs())
@@ -393,7 +393,7 @@ class _Flattening:
                 self.drivers[PortRef(copy, port)] = source
                 if port in alone:
                     self.elements[PortRef(copy, port)] = (found, element)
-        # What was followed before may have ended at the one block.
+        # Earlier results may refer to the original block.
         self.carried = {
             PortRef(entry.path, port.name): entry.carried(port.name)
             for entry in self.spread.values()
@@ -401,7 +401,7 @@ class _Flattening:
         }
 
     def _needed(self, ref: PortRef) -> list[PortRef]:
-        """The output ports that an output port of a virtual block takes its signal from."""
+        """The output ports that determine the signal of an output port of a virtual block."""
         path, block = ref.block, self.blocks[ref.block]
         if not self.vanishes(path):
             return []
@@ -460,16 +460,16 @@ class _Flattening:
         if isinstance(carried, PortRef):
             return carried
         raise DiagramError(
-            f"input '{target.port}' is given a bus with the elements {', '.join(carried.elements)}",
+            f"input '{target.port}' receives a bus with the elements {', '.join(carried.elements)}",
             where=f"block '{target.block}' ({self.blocks[target.block].title})",
             allowed="a single signal",
             fix="put a Bus Selector in between",
         )
 
-    # -- what else is to be known --------------------------------------------------------------------------
+    # -- views and aliases --------------------------------------------------------------------------
 
     def _sinks_of_buses(self) -> set[str]:
-        """Blocks that only show what they are given, and are given a bus: they show all its signals."""
+        """Display blocks with a bus input: they show all its signals."""
         return {
             path
             for path, block in self.blocks.items()
@@ -487,7 +487,7 @@ class _Flattening:
         )
 
     def _spread(self, path: str, view: View) -> View:
-        """A view with the signals of a bus in the place of the bus."""
+        """A view with a bus replaced by its signals."""
         signals: list[str] = []
         labels: list[str] = []
         given = view.labels or ("",) * len(view.signals)
@@ -513,7 +513,7 @@ class _Flattening:
         spread = {path: found.block for path, found in self.spread.items()}
         for path, block in (*self.blocks.items(), *spread.items()):
             for port in block.input_ports():
-                if PortRef(path, port.name) in self.drivers:  # some are of the copies of a spread block only
+                if PortRef(path, port.name) in self.drivers:  # some ports exist on copies only
                     add(f"{path}/{port.name}", self.at(path, port.name))
             outputs = block.output_ports()
             if path not in spread and not self.vanishes(path):
@@ -543,7 +543,7 @@ class _Flattening:
 
 
 class _Tags:
-    """Finds the Goto that a From means."""
+    """Finds the Goto of a From."""
 
     def __init__(self, blocks: Mapping[str, Block], level_of: Mapping[str, str], where: str) -> None:
         self._known: dict[tuple[str, str, str], str] = {}
@@ -552,7 +552,7 @@ class _Tags:
             if not isinstance(block, Goto):
                 continue
             level = "" if block.visibility == "global" else level_of[path]
-            # Local and scoped tags of one diagram are told apart by nothing that a reader sees.
+            # Local and scoped tags of one diagram look the same to a reader.
             places = [(level, block.tag, block.visibility)]
             if block.visibility != "global":
                 places.append((level, block.tag, "scoped" if block.visibility == "local" else "local"))
@@ -562,13 +562,13 @@ class _Tags:
                     raise DiagramError(
                         f"the Goto blocks '{other}' and '{path}' both send '{block.tag}'",
                         where=where,
-                        allowed="one Goto for each tag, wherever the tag is known",
+                        allowed="one Goto for each tag in its scope",
                         fix="rename the tag of one of them, or make its visibility local",
                     )
             self._known[places[0]] = path
 
     def goto(self, path: str, block: From) -> str:
-        """The path of the Goto that sends to a From: the nearest one that it can see."""
+        """The path of the Goto of a From: the nearest visible one."""
         level = self._level_of[path]
         found = self._known.get((level, block.tag, "local"))
         outer = level
@@ -582,7 +582,7 @@ class _Tags:
             visible = sorted({tag for place, tag, sight in self._known if self._sees(level, place, sight)})
             hidden = [goto for (_, tag, _), goto in self._known.items() if tag == block.tag]
             raise DiagramError(
-                f"no Goto that it can see sends '{block.tag}'",
+                f"no visible Goto sends '{block.tag}'",
                 where=f"block '{path}' (From)",
                 allowed="one of " + ", ".join(visible) if visible else "a tag that a Goto sends",
                 fix=f"make the visibility of '{hidden[0]}' scoped or global" if hidden else "add a Goto",

@@ -1,4 +1,4 @@
-"""Implicit equations: those that are linear in their unknowns are solved here, in symbols."""
+"""Implicit equations: those that are linear in their unknowns are solved here symbolically."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from armblocks.errors import AlgebraicLoopError
 
 
 def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[int], SX]]]:
-    """The unknowns ``w (n,)`` of ``residual(w) = 0`` as far as elimination gets.
+    """Eliminate the unknowns ``w (n,)`` of ``residual(w) = 0`` that can be solved symbolically.
 
-    Returns all of them over the ones that remain, the places of those, and the circles that are solved: the
-    places of their unknowns, and the derivative of their residual by them. Unknowns that depend on each other
-    in circles are solved together, each circle by itself, in the order in which they need each other; a
-    circle whose residual is not linear in its unknowns remains.
+    Returns all unknowns as functions of the remaining ones, the indices of the remaining ones, and the solved
+    subsystems: the indices of their unknowns and the Jacobian of their residual. The subsystems are the
+    strongly connected components of the dependency graph, in dependency order. A component whose residual is
+    not linear in its unknowns remains.
     """
     solution, remaining = SX(w), list[int]()
     circles: list[tuple[list[int], SX]] = []
@@ -35,7 +35,7 @@ def solve_affine(w: SX, residual: SX) -> tuple[SX, list[int], list[tuple[list[in
         circles.append((circle, densify(slope)))
         constant = substitute(residual[circle], unknowns, SX.zeros(len(circle)))
         solved = -_divided(densify(constant), slope)
-        # What was solved before is put in last, into a small expression, so that work grows with the count.
+        # Earlier solutions are substituted last, into a small expression, so that the work grows linearly.
         before = sorted({place for row in circle for place in needs[row]} - set(circle))
         solution[circle] = substituted(solved, w[before], solution[before]) if before else solved
     return solution, sorted(remaining), circles
@@ -61,11 +61,11 @@ _STEPS = frozenset(
         *("OP_FLOOR", "OP_CEIL", "OP_SIGN", "OP_FMOD", "OP_REMAINDER"),
     )
 )
-"""Operations that jump: where an unknown goes through one, no derivative tells that an equation has it."""
+"""Discontinuous operations: the derivative does not show a dependence through one of them."""
 
 
 def steps_with(expression: SX, unknowns: SX) -> bool:
-    """Whether some operation that jumps depends on the unknowns, as in ``if(u > 0, -1, 1)``."""
+    """Whether a discontinuous operation depends on the unknowns, as in ``if(u > 0, -1, 1)``."""
     function = _function_of(expression, unknowns)
     depends = [False] * function.sz_w()
     for k in range(function.n_instructions()):
@@ -83,14 +83,14 @@ def steps_with(expression: SX, unknowns: SX) -> bool:
 
 
 def _function_of(expression: SX, unknowns: SX) -> Function:
-    """The expression over the unknowns, then over everything else in it."""
+    """The expression as a function of the unknowns, then of all its other symbols."""
     own = _symbols_in(unknowns)
     others = [entry for entry in symvar(expression) if entry.element_hash() not in own]
     return Function("f", [unknowns, vertcat(*others, SX(0, 1))], [expression])
 
 
 def _needs(residual: SX, w: SX) -> list[list[int]]:
-    """The unknowns in each residual, also those that only a comparison depends on."""
+    """The unknowns in each residual, including those that occur in comparisons only."""
     sparsity = _function_of(residual, w).jac_sparsity(0, 0)
     needs: list[list[int]] = [[] for _ in range(residual.shape[0])]
     for row, column in zip(sparsity.row(), sparsity.get_col()):
@@ -101,10 +101,10 @@ def _needs(residual: SX, w: SX) -> list[list[int]]:
 def check_solvable(
     w: SX, residual: SX, p: SX, values: NDArray[np.float64], loops: Sequence[tuple[str, ...]], where: str
 ) -> None:
-    """Raise ``AlgebraicLoopError`` for equations that are singular with the parameters as they are.
+    """Raise ``AlgebraicLoopError`` for equations that are singular for the present parameter values.
 
-    ``loops[i]``: the signals around the loop of unknown ``i``. Only what follows from the parameters alone is
-    found here; what depends on states or the time is noticed when it happens.
+    ``loops[i]``: the signals around the loop of unknown ``i``. Only equations that depend on parameters alone
+    are checked here; those that depend on states or time are checked during the run.
     """
     slopes = jacobian(residual, w)
     parameters = _symbols_in(p)
@@ -122,8 +122,9 @@ def check_solvable(
                 loops[circle[0]],
                 where=where,
                 why="with an equation that does not contain its unknown (its index is above 1)",
-                allowed="equations in which the unknown stands itself",
-                fix="differentiate the equation in time until it does: twice for a rod and the force in it",
+                allowed="equations that contain their unknown",
+                fix="differentiate the equation with respect to time until it does: twice for a rod and its "
+                "force",
             )
         why = "with no solution or infinitely many"
         if others <= parameters:
@@ -141,14 +142,14 @@ def check_solvable(
 
 
 def _symbols_in(expression: SX) -> set[int]:
-    """What identifies the symbols of an expression."""
+    """The identities of the symbols of an expression."""
     return {entry.element_hash() for entry in symvar(expression)}
 
 
 def _equilibrated(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix with the largest entry of every row, then of every column, near 1.
 
-    Its numerical rank does not depend on units. Powers of two leave all digits as they are.
+    Its numerical rank does not depend on units. Powers of two cause no rounding.
     """
     for axis in (1, 0):
         largest = np.abs(matrix).max(axis=axis, keepdims=True, initial=0.0)

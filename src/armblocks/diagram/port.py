@@ -1,4 +1,4 @@
-"""The ends of a block: ports, states, and how a sink shows what it receives."""
+"""Descriptions of a block's ports, states, guards, conditions and views."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from armblocks.equations import Shape
 class Port:
     """One input or output of a block.
 
-    ``shape`` is the only shape that the port takes or gives, or ``None`` where it follows from what is
-    connected. ``unit`` is SI, ``""`` where the port has none or takes that of its signal. ``names`` are
-    those of the entries of a vector, such as joints, where the block knows them.
+    ``shape`` is the only allowed shape, or ``None`` if it follows from the connections. ``unit`` is SI, or
+    ``""`` if the port has no unit or that of its signal. ``names`` are the names of the entries of a vector,
+    such as joints, where the block knows them.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Port:
 
 @dataclass(frozen=True)
 class State:
-    """One state or mode of a block; the numerics hold its value, the block never does.
+    """One state or mode of a block; the integrator stores its value, the block does not.
 
     ``follows``: whether a mode is a function of the signals of the moment alone. Such modes are made
     consistent before any event (an edge, a trigger, a reset) acts on the signals. ``remembers``: such a
@@ -54,11 +54,11 @@ def name_before(mode: str) -> str:
 
 @dataclass(frozen=True)
 class Guard:
-    """A quantity of a block at whose zero something happens; each entry of a vector is a guard by itself.
+    """A quantity of a block whose zero crossings are events; each entry of a vector is a separate guard.
 
-    ``direction``: +1 where it fires on its way upwards, -1 downwards, 0 both. ``action``: what it does to the
-    run where it is positive: ``stop`` ends it, ``fail`` fails it, ``warn`` is told at its end. ``locates``:
-    whether its zero only tells when a mode that follows the signals changes.
+    ``direction``: +1 for upward crossings, -1 for downward, 0 for both. ``action``: effect on the run where
+    it is positive: ``stop`` ends the run, ``fail`` is an error, ``warn`` is reported at the end. ``locates``:
+    whether its zero only locates a change of a mode that follows the signals.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Guard:
 
 @dataclass(frozen=True)
 class DelayLine:
-    """The value that an ``input`` of a block had some time ago, of the input's ``shape``."""
+    """The delayed value of an ``input`` of a block, with the input's ``shape``."""
 
     name: str
     shape: Shape
@@ -81,10 +81,10 @@ class DelayLine:
 
 @dataclass(frozen=True)
 class Condition:
-    """A yes or no that a block asks of its values, by element: 1 where a quantity is positive, else 0.
+    """A boolean function of a block's values, by element: 1 where a quantity is positive, else 0.
 
-    ``closed``: whether 0 itself counts as positive. ``located``: whether the instant at which the answer
-    changes is an event; if not, the answer follows the values at which the equations happen to be evaluated.
+    ``closed``: whether 0 itself counts as positive. ``located``: whether a change of the condition is an
+    event; if not, the condition is evaluated with the equations, at the times at which these are evaluated.
     """
 
     name: str
@@ -106,27 +106,27 @@ class PortRef:
 
 
 class ViewKind(Enum):
-    """What a sink wants to be seen as."""
+    """The kinds of views of sinks."""
 
     TRACES = "traces"
     """Every signal over time (Scope)."""
     PATH = "path"
     """The second signal over the first, equal axes where the units agree (XY Graph)."""
     VALUE = "value"
-    """The number itself, as it stands at the end or at the moment looked at (Display)."""
+    """The value at the end or at the selected time (Display)."""
     ROBOT = "robot"
     """A moving robot: the one signal holds the poses of its links, shape (L+2, 4, 4)."""
     SPECTRUM = "spectrum"
     """Every signal over the frequency (Spectrum); ``subject`` is a ``SpectrumSettings``."""
     DATA = "data"
-    """Kept for export only (To Workspace)."""
+    """Stored for export only (To Workspace)."""
     FILE = "file"
-    """Kept in a file of its own (To File); ``subject`` is a ``FileSettings``."""
+    """Stored in a separate file (To File); ``subject`` is a ``FileSettings``."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpectrumSettings:
-    """How a spectrum is worked out and drawn; see the block Spectrum, whose parameters these are."""
+    """Settings of a spectrum; see the block Spectrum, whose parameters these are."""
 
     quantity: str
     window: str
@@ -140,7 +140,7 @@ class SpectrumSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class FileSettings:
-    """Which rows go to which file; see the block ToFile, whose parameters these are."""
+    """Settings of a file output; see the block ToFile, whose parameters these are."""
 
     file: str
     decimation: int
@@ -149,7 +149,7 @@ class FileSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """One picture that a block asks for; report and studio draw it without knowing the block's class.
+    """One view of a block; report and studio draw it without knowledge of the block's class.
 
     ``signals`` names ports or records of the block itself, so that ``f"{block}/{signal}"`` is a name that a
     simulation result knows. ``labels`` gives a text for each (``""``: the signal's own name). ``subject`` is

@@ -1,4 +1,4 @@
-"""A checked diagram as one set of equations: the only thing that passes on to the numerics."""
+"""Tracing: a checked diagram becomes one set of equations, the only input of the numerics."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ from armblocks.errors import DiagramError
 def trace_diagram(diagram: Diagram) -> HybridSystem:
     """All equations of a diagram: see :class:`armblocks.equations.HybridSystem`.
 
-    Two passes in evaluation order, one for the flow and one for the ticks: each group of each block is worked
-    out once, from values that are there already. A Derivative block's output is the exact time derivative of
-    what feeds it, built up group by group by the chain rule (the derivative of a state being its equation);
-    where its input jumps, the jump is ignored. An algebraic loop is cut at one signal: linear ones are
+    Two passes in evaluation order, one for the flow and one for the ticks: each group of each block is
+    evaluated once, from values that are already available. A Derivative block's output is the exact time
+    derivative of its input, computed group by group by the chain rule (the derivative of a state is given by
+    its equation). Jumps of the input are ignored. An algebraic loop is cut at one signal: linear ones are
     solved here, the others leave an unknown and a residual.
 
-    Raises ``DiagramError`` or ``AlgebraicLoopError``; of a diagram that a builder built, only for loops that
-    have no solution, or no single one.
+    Raises ``DiagramError`` or ``AlgebraicLoopError``; for a diagram from a builder, only for loops without a
+    unique solution.
     """
     model = diagram_model(diagram)
     diagram = (form := flatten_hierarchy(diagram)).diagram
@@ -130,7 +130,7 @@ def trace_diagram(diagram: Diagram) -> HybridSystem:
 
 
 def _linear_loops(loops: Implicit, ends: Mapping[str, SX]) -> LinearLoops | None:
-    """What is known of the loops that are solved."""
+    """Information about the solved loops."""
     if not loops.linear:
         return None
     matrices = loops.solved([flatten(matrix, matrix.shape) for _, matrix in loops.linear])
@@ -143,7 +143,7 @@ def _linear_loops(loops: Implicit, ends: Mapping[str, SX]) -> LinearLoops | None
 def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> tuple[SX, SX]:
     """All discrete variables after a tick, and the signals that are products.
 
-    Raises ``DiagramError`` where a loop that is not linear hangs on what is sampled at the same instant.
+    Raises ``DiagramError`` where a nonlinear loop depends on a signal that is sampled at the same tick.
     """
     tick = Tracing(model.tick, symbols, model.tick_order.sums, model.sampling.clock_of)
     for node in model.tick_order.order:
@@ -165,14 +165,14 @@ def _updated(model: Model, symbols: Symbols, flow: Tracing, loops: Implicit) -> 
     if remaining and depends_on(residual[remaining], symbols.m):
         value = next(iter(tick.unknowns))
         raise DiagramError(
-            f"the loop {' -> '.join(model.tick_order.loops[value.node])} is not linear, follows what is "
-            "sampled, and is sampled itself at the same instant",
+            f"the loop {' -> '.join(model.tick_order.loops[value.node])} is not linear, depends on a sampled "
+            "signal, and is sampled itself at the same tick",
             where=f"diagram '{model.tick.diagram.name}'",
-            allowed="loops that are linear, or that no sampled block looks at in the tick that moves them",
+            allowed="linear loops, or loops that no sampled block reads at the tick that changes them",
             fix="put a Unit Delay between the loop and one of the sampled blocks",
         )
     if remaining:
-        # The same equations as those of the flow, perhaps cut elsewhere: their values are known from there.
+        # The same equations as between ticks, possibly with other cuts: their values are known.
         known = loops.solved([flow.value(_same(model.flow, value)) for value in tick.unknowns])
         solution = substitute(solution, cuts[remaining], known[remaining])
     return substituted(updated, cuts, solution), substituted(products, cuts, solution)
@@ -184,7 +184,7 @@ def _keeps_left_limits(model: Model) -> bool:
 
 
 def _captured(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, SX]:
-    """What keeps how things were just before an instant: taken when the update is asked for with no tick."""
+    """Updates of states that store left limits: evaluated by an update without a tick."""
     ticking = dot(symbols.m, symbols.m) if symbols.m.numel() else SX(0.0)
     return {
         f"{name}/{slot}": if_else(
@@ -199,7 +199,7 @@ def _captured(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, SX]:
 
 
 def _breakpoints(diagram: Diagram, symbols: Symbols) -> list[SX]:
-    """The times at which sources jump."""
+    """The breakpoints: times at which sources jump."""
     return [
         SX(time)
         for name, block in diagram.blocks.items()
@@ -208,7 +208,7 @@ def _breakpoints(diagram: Diagram, symbols: Symbols) -> list[SX]:
 
 
 def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
-    """A signal as it is recorded: what is not finite in a subsystem that is off disturbs nobody, and is 0."""
+    """The recorded value of a signal: a non-finite value in an inactive subsystem is replaced by 0."""
     worked_out = flow.value(value)
     if ON not in diagram.gates.get(value.node.block, {}):
         return worked_out
@@ -252,7 +252,7 @@ def _guards(model: Model, flow: Tracing) -> list[tuple[str, Guard, SX]]:
 def _contradictions(
     model: Model, symbols: Symbols, flow: Tracing
 ) -> tuple[tuple[int, ...], tuple[bool, ...], list[SX]]:
-    """The places of all modes in ``z``; which follow the signals; which contradict their conditions."""
+    """The indices of all modes in ``z``; which ones follow the signals; which ones are inconsistent."""
     ranges = signature(*symbols.discrete_slots).ranges
     places: list[int] = []
     follows: list[bool] = []
@@ -267,7 +267,7 @@ def _contradictions(
 
 
 def _remembered(model: Model, symbols: Symbols) -> tuple[tuple[int, int], ...]:
-    """The places in ``z`` of all modes that remember what they were, each with the place of that."""
+    """The indices in ``z`` of all modes with memory, each with the index of the remembered value."""
     ranges = signature(*symbols.discrete_slots).ranges
     return tuple(
         place
@@ -301,7 +301,7 @@ def _value(network: Network, block: str, kind: SlotKind, name: str) -> Value:
 def _delays(
     model: Model, symbols: Symbols, flow: Tracing, loops: Implicit, ends: Mapping[str, SX], products: SX
 ) -> Delays | None:
-    """What is delayed, and how long. Raises ``DiagramError`` where a delay hangs on what it decides."""
+    """The delayed signals and their delays. Raises ``DiagramError`` where a delay depends on itself."""
     places = signature(*symbols.discrete_slots).ranges
     values: list[int] = []
     slopes: list[int] = []
@@ -330,9 +330,9 @@ def _delays(
     taus = loops.solved(columns["tau"])
     if depends_on(taus, vertcat(*looked_up)):
         raise DiagramError(
-            "how long a delay is depends on a delayed signal, or on a loop that is not linear",
+            "the delay time depends on a delayed signal, or on a nonlinear loop",
             where=f"diagram '{model.flow.diagram.name}'",
-            allowed="delays that follow from the time, states and sampled signals",
+            allowed="delay times that depend on time, states and sampled signals",
             fix="pass the delay time through a lag or a sampled block first",
         )
 
@@ -352,7 +352,7 @@ def _delays(
 
 
 def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]:
-    """States and discrete variables after events; without any event the modes settle."""
+    """States and discrete variables after events; without events, the consistent modes."""
     states, discrete = dict(symbols.states), dict(symbols.discrete)
     quiet = dot(symbols.e, symbols.e) == 0.0 if symbols.e.numel() else SX(1.0)
     for name, equations in model.flow.equations.items():
@@ -365,7 +365,7 @@ def _reset(model: Model, symbols: Symbols, flow: Tracing) -> dict[str, list[SX]]
             path = f"{name}/{mode.name}"
             settled = flow.value(_value(model.flow, name, SlotKind.MODE, mode.name))
             asked = quiet
-            if mode.follows:  # it needs no event to tell what it is
+            if mode.follows:  # its value needs no event
                 wrong = flow.value(_value(model.flow, name, SlotKind.CONTRADICTION, mode.name))
                 asked = logic_or(quiet, wrong)
             discrete[path] = if_else(asked, settled, discrete[path])
@@ -386,7 +386,7 @@ def _flat_function(
 def _signal_values(
     network: Network, order: Sequence[Node], shapes: DiagramShapes
 ) -> list[tuple[str, tuple[int, ...], Value]]:
-    """Path, shape and place of every recorded signal, in evaluation order."""
+    """Path, shape and index of every recorded signal, in evaluation order."""
     derived: dict[Node, list[PortRef]] = {}
     for name, block in network.diagram.blocks.items():
         for port in block.time_derivatives:

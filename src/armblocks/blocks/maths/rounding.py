@@ -1,4 +1,4 @@
-"""Integers and what they leave: rounding, remainders, and the events at which the integer changes."""
+"""Rounding and remainders, and the events at which the integer part changes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from armblocks.equations import Shape
 
 @dataclass(frozen=True, kw_only=True)
 class Rounding(BlockWithSteps):
-    """Every element to an integer: down, up, to the nearest (halves away from zero) or towards zero."""
+    """Rounds every element: down, up, to the nearest integer (halves away from zero) or towards zero."""
 
     title: ClassVar[str] = "Rounding Function"
     example: ClassVar[WorkedExample] = WorkedExample(
@@ -68,20 +68,22 @@ class Rounding(BlockWithSteps):
 
 @dataclass(frozen=True, kw_only=True)
 class Modulo(Block):
-    """What a division leaves: mod(u, v) has the sign of v and mod(u, 0) = u; rem(u, v) has the sign of u.
+    """The remainder: mod(u, v) has the sign of v, and mod(u, 0) = u; rem(u, v) has the sign of u.
 
-    Both are exact. ``rem(u, 0)`` is not a number. In Simulink these are choices of the Math Function block.
+    Both are exact. ``rem(u, 0)`` is NaN. In Simulink they are options of the Math Function block.
     """
 
     memoryless: ClassVar[bool] = True
     title: ClassVar[str] = "Modulo"
     sign: ClassVar[FaceSign] = Words("mod")
     example: ClassVar[WorkedExample] = WorkedExample(
-        shows="A straight rise modulo 3: it starts again from 0 each time it reaches 3.",
+        shows="A ramp modulo 3: it restarts from 0 each time it reaches 3.",
         inputs={"u": made("Ramp"), "v": made("Constant", value=3.0)},
     )
 
-    function: str = parameter("mod", choices=("mod", "rem"), doc="whose sign the result has")
+    function: str = parameter(
+        "mod", choices=("mod", "rem"), doc="mod or rem, which determines the sign of the result"
+    )
     zero_crossing: bool = zero_crossing_parameter()
 
     def input_ports(self) -> tuple[Port, ...]:
@@ -122,14 +124,14 @@ class Modulo(Block):
         return {"turns": step_after(turns_of(self.function, u["u"], u["v"]), x["turns"], e)}
 
 
-# A remainder u - n v, with the count n of turns as a mode: the flow between two jumps is one straight line.
+# The remainder is u - n v; the integer n is a mode, so that the remainder is smooth between two events.
 
 _QUOTIENTS = {"mod": "floor", "rem": "fix"}
-"""How u / v becomes the count of turns."""
+"""The rounding that makes the integer n out of u / v."""
 
 
 def remainder(function: str, u: SX, v: SX) -> SX:
-    """Exactly ``mod``, with the sign of the divisor and u itself where that is zero, or ``rem``."""
+    """The exact ``mod`` (sign of the divisor; u where the divisor is zero) or ``rem``."""
     rest = fmod(u, v)
     if function == "rem":
         return rest
@@ -138,28 +140,28 @@ def remainder(function: str, u: SX, v: SX) -> SX:
 
 
 def turns_of(function: str, u: SX, v: SX) -> SX:
-    """How often v is taken from u, in agreement with :func:`remainder`."""
+    """The integer n in u - n v, consistent with :func:`remainder`."""
     return if_else(v == 0.0, 0.0, nearest((u - remainder(function, u, v)) / v))
 
 
 def remainder_of_turn(function: str, u: SX, v: SX, turns: SX) -> SX:
-    """The remainder while so many turns are taken, also a little beyond where that ends."""
+    """The remainder for a given n, valid also slightly beyond the end of its interval."""
     return if_else(turns_of(function, u, v) == turns, remainder(function, u, v), u - turns * v)
 
 
 def turn_modes(shape: Shape) -> tuple[State, ...]:
-    """The count of turns."""
-    return (State("turns", shape, "how often the divisor is taken away"),)
+    """The integer n of the remainder u - n v."""
+    return (State("turns", shape, "the integer n in u - n v"),)
 
 
 def turn_guards(shape: Shape) -> tuple[Guard, ...]:
-    """Both ends of a turn."""
-    up = Guard("up", shape, "one turn more is taken away", 1)
-    return (up, Guard("down", shape, "one turn less is taken away", -1))
+    """The events at both ends of an interval with constant n."""
+    up = Guard("up", shape, "n increases", 1)
+    return (up, Guard("down", shape, "n decreases", -1))
 
 
 def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
-    """How far u is beyond both ends, in the direction of v."""
+    """The distance of u beyond both ends of the interval, in the direction of v."""
     rule = _QUOTIENTS[function]
     edge, owned = rounding_edges(rule, turns)
     below, below_owned = rounding_edges(rule, -turns, mirrored=True)
@@ -167,5 +169,5 @@ def turn_guard_values(function: str, u: SX, v: SX, turns: SX) -> Signals:
         "up": (u - edge * v) * sign(v) + if_else(owned, JUST, -JUST),
         "down": (u + below * v) * sign(v) - if_else(below_owned, JUST, -JUST),
     }
-    # Nothing is taken away by a divisor of zero, and no turn ends.
+    # With a divisor of zero, n is 0 and no event occurs.
     return {name: if_else(v == 0.0, 0.0, value) for name, value in found.items()}
