@@ -286,11 +286,12 @@ def style_sheet() -> str:
 RULES = """
 article figure{margin:1.2rem 0}article figure svg,.symbol svg{display:block;max-width:100%;height:auto}
 article figure.wide svg{width:100%}article figure.narrow svg{max-width:400px;width:100%}
-article table.docutils{margin-left:0}article table.docutils code{overflow-wrap:anywhere}
+article table.docutils{margin-left:0}
 .symbol.alone{float:right;margin:0 0 1rem 1.5rem}
 .block-list{display:grid;grid-template-columns:repeat(auto-fill,minmax(320px,1fr));gap:.4rem 1.6rem}
 .block-entry{display:grid;grid-template-columns:112px 1fr;gap:.8rem;align-items:center}
 .block-entry p{margin:.2rem 0;line-height:1.35;font-size:.92em}
 .block-entry .symbol{justify-self:center}
+@media(max-width:46em){article table.docutils td:not(:first-child) code{overflow-wrap:anywhere}}
 @media(max-width:46em){article figure.wide{overflow-x:auto}article figure.wide svg{min-width:560px}}
 """

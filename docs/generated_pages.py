@@ -9,6 +9,7 @@ from pathlib import Path
 
 from block_pages import block_pages, prose, style_sheet
 from reference_signatures import arm_page
+from robot_pages import robots_page
 
 import armblocks as ab
 from armblocks.integration.butcher_tableau import ButcherTableau
@@ -16,9 +17,10 @@ from armblocks.simulation.tableaux import TABLEAUX
 
 
 def write_generated_pages(folder: Path) -> None:
-    """Write the pages into ``folder``; a page whose text is unchanged is left alone."""
+    """Write the pages into ``folder``; a page whose text is unchanged is left alone, others are removed."""
     pages = {
-        "shipped.md": shipped_page(),
+        "examples.md": examples_page(),
+        "robots.md": robots_page(),
         "solver-table.txt": solver_table(),
         "arm.txt": arm_page(),
         "public-names.txt": public_names(),
@@ -30,29 +32,28 @@ def write_generated_pages(folder: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")
+    for path in folder.rglob("*"):
+        if path.is_file() and path.relative_to(folder).as_posix() not in pages:
+            path.unlink()
 
 
-def shipped_page() -> str:
-    """The shipped robots and examples, one line each."""
+def examples_page() -> str:
+    """The shipped examples, one line each."""
     lines = [
-        "# Shipped robots and examples",
+        "# Shipped examples",
         "",
-        "## Robots",
+        "`armblocks run NAME` runs an example and writes its report, `armblocks studio NAME` opens it.",
         "",
-        "| name | joints | what it is |",
-        "|---|---|---|",
+        "| name | what it shows | stop time | blocks |",
+        "|---|---|---|---|",
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ab.errors.InertiaWarning)
-        for name in ab.list_robots():
-            robot = ab.load_robot(name).robot
-            about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
-            lines.append(f"| `{name}` | {robot.joint_letters} | {about} |")
-        lines += ["", "## Examples", "", "| name | what it shows | stop time | blocks |", "|---|---|---|---|"]
         for name in ab.list_examples():
             diagram = ab.load_diagram(name)
             kinds = sorted({block.type_name() for block in diagram.blocks.values()})
-            cells = (f"`{name}`", diagram.description, f"{diagram.settings.stop_time:g} s", ", ".join(kinds))
+            links = ", ".join(f"[{kind}](blocks/{kind}.md)" for kind in kinds)
+            cells = (f"`{name}`", diagram.description, f"{diagram.settings.stop_time:g} s", links)
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -47,7 +47,7 @@ def test_the_wheel_brings_a_page_of_every_document_and_no_more_than_pages(wheel:
     names = set(zipfile.ZipFile(wheel).namelist())
     documents = [path.stem for path in (ROOT / "docs").glob("*.md")]
     blocks = [f"reference/blocks/{name}" for name in BLOCKS]
-    for page in ("index", "reference/blocks", "reference/shipped", *documents, *blocks):
+    for page in ("index", "reference/blocks", "reference/robots", "reference/examples", *documents, *blocks):
         assert f"armblocks/shipped/docs/{page}.html" in names
     for left_out in ("_sources", ".doctrees", "_modules"):
         assert not [name for name in names if f"docs/{left_out}" in name]

@@ -1,0 +1,69 @@
+"""A page of the shipped robots: each with its picture, its D-H table and the limits of its joints."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+from block_pages import prose, table
+
+import armblocks as ab
+from armblocks.pictures.svg import svg_inline
+from armblocks.rendering import arm_picture
+from armblocks.robot.dh_table import dh_table
+
+POSES = {
+    "kr180": (0.5, 0.2, 0.3, 0.0),
+    "kr180_cell": (0.5, 0.2, 0.3, 0.0),
+    "planar3r": (0.4, 0.7, 0.6),
+    "puma560": (0.5, 0.9, -2.6, 0.0, 0.6, 0.0),
+    "twolink": (0.6, 0.7),
+}
+"""Joint coordinates (rad) at which the arm can be seen well; all 0 for a robot that is not here."""
+SIZE = (420.0, 340.0)
+"""px."""
+
+
+def robots_page() -> str:
+    """The page of all shipped robots."""
+    lines = [
+        "# Shipped robots",
+        "",
+        '`ab.load_robot("kr180")` loads a robot by its name. In a terminal, `armblocks show kr180` prints',
+        "all its numbers; the robot editor of `armblocks studio` shows it, and makes changed copies.",
+        "",
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ab.errors.InertiaWarning)
+        for name in ab.list_robots():
+            lines += _robot(name)
+    return "\n".join(lines)
+
+
+def _robot(name: str) -> Iterator[str]:
+    arm = ab.load_robot(name)
+    robot = arm.robot
+    q = POSES.get(name, (0.0,) * robot.n)
+    about = "; ".join(text for text in (robot.manufacturer, robot.comment) if text)
+    picture = svg_inline(arm_picture(robot, q, width=SIZE[0], height=SIZE[1]), f"robot-{name}")
+    yield from (f"## {name}", "", f'<figure class="narrow">{picture}</figure>', "")
+    yield from (f"{prose(robot.name)}: {prose(about)}. {robot.n} joints, {robot.joint_letters}.", "")
+    if lines := dh_table(robot):
+        yield from ("```text", *lines, "```", "")
+    letters = {"rad": "°", "m": " m"}
+    rows: list[tuple[str, ...]] = []
+    for k, (joint, unit) in enumerate(zip(robot.joint_names, robot.joint_units)):
+        scale = 180 / np.pi if unit == "rad" else 1.0
+        low, high = robot.qlim[k] * scale
+        speed, torque = robot.speed_limits[k] * scale, robot.torque_limits[k]
+        rows.append(
+            (
+                f"`{joint}`",
+                f"{low:g} … {high:g}{letters[unit]}" if np.isfinite([low, high]).all() else "",
+                f"{speed:g}{letters[unit]}/s" if np.isfinite(speed) else "",
+                f"{torque:g} {'N m' if unit == 'rad' else 'N'}" if np.isfinite(torque) else "",
+            )
+        )
+    if any(any(row[1:]) for row in rows):
+        yield from table(("joint", "range", "greatest speed", "greatest torque"), rows)
