@@ -12,7 +12,9 @@ from reference_signatures import arm_page
 from robot_pages import robots_page
 
 import armblocks as ab
+from armblocks.drawing import diagram_picture
 from armblocks.integration.butcher_tableau import ButcherTableau
+from armblocks.pictures.svg import svg_inline
 from armblocks.simulation.tableaux import TABLEAUX
 
 
@@ -38,23 +40,30 @@ def write_generated_pages(folder: Path) -> None:
 
 
 def examples_page() -> str:
-    """The shipped examples, one line each."""
+    """The shipped examples, each with its drawing and links to the pages of its blocks."""
     lines = [
         "# Shipped examples",
         "",
         "`armblocks run NAME` runs an example and writes its report, `armblocks studio NAME` opens it.",
         "",
-        "| name | what it shows | stop time | blocks |",
-        "|---|---|---|---|",
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ab.errors.InertiaWarning)
         for name in ab.list_examples():
             diagram = ab.load_diagram(name)
+            drawing = diagram_picture(diagram)
+            size = f' style="width:{drawing.width:.0f}px"'
+            drawn = svg_inline(drawing, f"example-{name}").replace("<svg ", f"<svg{size} ", 1)
             kinds = sorted({block.type_name() for block in diagram.blocks.values()})
             links = ", ".join(f"[{kind}](blocks/{kind}.md)" for kind in kinds)
-            cells = (f"`{name}`", diagram.description, f"{diagram.settings.stop_time:g} s", links)
-            lines.append("| " + " | ".join(cells) + " |")
+            about = diagram.description[:1].upper() + diagram.description[1:]
+            lines += [
+                f"## {name}",
+                "",
+                f"{prose(about)}. The run ends at {diagram.settings.stop_time:g} s.",
+                "",
+            ]
+            lines += [f'<figure class="drawing">{drawn}</figure>', "", f"Blocks: {links}.", ""]
     return "\n".join(lines) + "\n"
 
 
