@@ -314,7 +314,7 @@ async def session(uri: str, cookie: str, origin: str, ended: list[str], waits: l
             return await asked[number][1]
 
         listening = asyncio.create_task(listen())
-        await ask({"kind": "open", "example": "van_der_pol_pid"})
+        await ask({"kind": "open_shipped", "document_kind": "diagram", "name": "van_der_pol_pid"})
         await ask({"kind": "run", "document": document["document"], "speed": 5.0})
         k = 0
         block = document.get("title")

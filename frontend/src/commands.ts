@@ -4,7 +4,7 @@ import { addNote, sheetView } from './canvas/sheet_actions'
 import { openConfiguration, openMask, openTour, save, show } from './dialogs'
 import { exportDrawing, openReport } from './documents/export'
 import { startOrResume } from './run/start'
-import { alter, ask, look, useStudio } from './store'
+import { alter, ask, change, look, useStudio } from './store'
 
 /** A command: in the command palette, in the list of keys, and by its key. */
 export interface Command {
@@ -42,7 +42,7 @@ const LIST: Command[] = [
   { title: 'Save', keys: 'Ctrl+S', run: () => void save() },
   { title: 'Save under another name', keys: 'Ctrl+Shift+S', run: () => show('save_as') },
   { title: 'Open', keys: 'Ctrl+O', run: () => show('open') },
-  { title: 'New diagram', run: () => void ask({ kind: 'new' }) },
+  { title: 'New diagram', run: () => void ask({ kind: 'new', document_kind: 'diagram' }) },
   { title: 'Group into a subsystem', keys: 'Ctrl+G', onSheet: true, possible: chosen, run: group },
   {
     title: 'Edit the mask: parameters of the subsystem or the model',
@@ -74,7 +74,7 @@ const LIST: Command[] = [
   { title: 'Align bottom edges', possible: several, run: () => align('bottom') },
   { title: 'Equal gaps from left to right', possible: several, run: () => distribute('x') },
   { title: 'Equal gaps from top to bottom', possible: several, run: () => distribute('y') },
-  { title: 'Arrange the sheet', run: () => alter('arrange') },
+  { title: 'Arrange the sheet', run: () => void change({ kind: 'arrange' }) },
   { title: 'Fit the sheet into the window', keys: 'Space', run: () => sheetView.fit?.() },
   {
     title: 'Out of the subsystem',

@@ -82,7 +82,6 @@ export class Connection {
       if (this.socket !== socket) return
       this.flowing = false
       this.forget('attach')
-      this.forget('robot_attach')
       void strange().then((stranger) => this.onLine(stranger ? 'stranger' : 'down'))
       setTimeout(() => this.connect(), this.delay)
       this.delay = Math.min(2 * this.delay, LONGEST_DELAY_MS)
@@ -117,8 +116,7 @@ export class Connection {
     return new Promise<ReplyTo<R>>((resolve, reject) => {
       this.waiting.set(number, { request, resolve: resolve as (value: unknown) => void, reject })
       this.keep()
-      if (this.flowing || request.kind === 'attach' || request.kind === 'robot_attach')
-        this.send(number, request)
+      if (this.flowing || request.kind === 'attach') this.send(number, request)
     })
   }
 

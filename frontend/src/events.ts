@@ -1,30 +1,31 @@
 import { lastShown, remember } from './documents/last_shown'
-import type { EventOf, ServerEvent } from './messages'
-import type { Checked, Wire } from './protocol'
-import { attachAgain, leaveEditor, robotOpened, robotShown } from './robot/editor/desk'
+import type { ChangeOf, ContentOf, DocumentKind, EventOf, ServerEvent } from './messages'
+import type { Checked, DocumentState, Wire } from './protocol'
+import { attachAgain, leaveEditor, robotChanged, robotOpened, toFront } from './robot/editor/desk'
 import { isFree } from './run/pace'
 import * as runs from './run/runs'
-import { ask, line, refuse, useStudio, type OpenDocument } from './store'
+import { ask, bringToFront, line, refuse, useStudio, type OpenDocument } from './store'
 
 const wireKey = (wire: Wire) => `${wire.source} -> ${wire.target}`
 
-function changed(document: OpenDocument, event: EventOf<'changed'>): OpenDocument {
-  const { change, state } = event
+function changed(document: OpenDocument, state: DocumentState, change: ChangeOf<'diagram'>): OpenDocument {
+  const { sheet, settings } = change
   const blocks = { ...document.blocks }
-  for (const [name, block] of Object.entries(change.blocks)) {
+  for (const [name, block] of Object.entries(sheet.blocks)) {
     if (block) blocks[name] = block
     else delete blocks[name]
   }
-  const removed = new Set(change.wires_removed.map(wireKey))
+  const removed = new Set(sheet.wires_removed.map(wireKey))
   return {
     ...document,
     state,
+    settings,
     blocks,
     name: document.inside.length ? document.name : state.title,
-    wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...change.wires_added],
-    notes: change.notes ?? document.notes,
-    description: change.description ?? document.description,
-    logged: change.logged ?? document.logged,
+    wires: [...document.wires.filter((wire) => !removed.has(wireKey(wire))), ...sheet.wires_added],
+    notes: sheet.notes ?? document.notes,
+    description: sheet.description ?? document.description,
+    logged: sheet.logged ?? document.logged,
   }
 }
 
@@ -39,16 +40,26 @@ function checked(document: OpenDocument, event: Checked): OpenDocument {
 const HEARD: { [Kind in ServerEvent['kind']]: (event: EventOf<Kind>) => void } = {
   welcome,
   documents: ({ documents, recoveries }) => useStudio.setState({ documents, recoveries }),
-  opened,
+  opened: (event) => opened(event, event.content),
   changed: documentChanged,
   checked: documentChecked,
   run_started: runStarted,
   run_tuned: runs.tuned,
   run_rewound: runs.rewound,
   run_progress: runProgressed,
-  robot: robotShown,
-  robot_opened: ({ opening }) => robotOpened(opening),
   reply: () => {},
+}
+
+/** What a document of each kind changes that a page shows from now on. */
+const OPENED: { [Kind in DocumentKind]: (event: EventOf<'opened'>, content: ContentOf<Kind>) => void } = {
+  diagram: diagramOpened,
+  robot: robotOpened,
+}
+
+/** What a change of a document of each kind changes on the page. */
+const CHANGED: { [Kind in DocumentKind]: (event: EventOf<'changed'>, change: ChangeOf<Kind>) => void } = {
+  diagram: diagramChanged,
+  robot: robotChanged,
 }
 
 /** What the page shows after the server has told something. */
@@ -65,18 +76,27 @@ function welcome(event: EventOf<'welcome'>): void {
   void showAgain(event).then(() => useStudio.setState({ recoveries: event.recoveries }))
 }
 
-function opened(event: EventOf<'opened'>): void {
+function opened<Kind extends DocumentKind>(
+  event: EventOf<'opened'>,
+  content: ContentOf<Kind> & { kind: Kind },
+): void {
+  OPENED[content.kind](event, content)
+}
+
+function diagramOpened({ state, in_front }: EventOf<'opened'>, content: ContentOf<'diagram'>): void {
   const { document, run } = useStudio.getState()
-  const { state, sheet, inside } = event
+  const { sheet, inside, settings } = content
   const same = document?.state.document === state.document
+  if (!same && !in_front) return
   const moved = same && document.inside.join('/') !== inside.join('/')
   if (moved) useStudio.setState({ selection: new Set<string>(), editing: null })
-  if (same && run && (run.state === 'running' || run.state === 'paused') && event.run !== run.run)
+  if (same && run && (run.state === 'running' || run.state === 'paused') && content.run !== run.run)
     useStudio.setState({ run: { ...run, state: 'failed', message: 'The studio ended during this run.' } })
   useStudio.setState({
     document: {
       state,
       inside,
+      settings,
       ...sheet,
       findings: same ? document.findings : [],
       wireKinds: same ? document.wireKinds : {},
@@ -91,12 +111,27 @@ function opened(event: EventOf<'opened'>): void {
 }
 
 function documentChanged(event: EventOf<'changed'>): void {
+  const { state, change } = event
+  useStudio.setState((s) => ({
+    documents: s.documents.map((known) => (known.document === state.document ? state : known)),
+  }))
+  contentChanged(event, change)
+}
+
+function contentChanged<Kind extends DocumentKind>(
+  event: EventOf<'changed'>,
+  change: ChangeOf<Kind> & { kind: Kind },
+): void {
+  CHANGED[change.kind](event, change)
+}
+
+function diagramChanged(event: EventOf<'changed'>, change: ChangeOf<'diagram'>): void {
   const { document } = useStudio.getState()
   if (document?.state.document !== event.state.document) return
   if (event.before !== document.state.version && event.state.version !== document.state.version)
     void ask({ kind: 'look', document: event.state.document, inside: document.inside })
   else {
-    useStudio.setState({ document: changed(document, event) })
+    useStudio.setState({ document: changed(document, event.state, change) })
     remember(event.state, document.inside)
   }
 }
@@ -155,17 +190,17 @@ function runProgressed(event: EventOf<'run_progress'>): void {
 /** Show the document that this page showed before, or else what its address names; then let requests flow. */
 async function showAgain(welcome: EventOf<'welcome'>): Promise<void> {
   const robot = await attachAgain()
-  await showDocumentAgain(welcome)
-  if (robot) robotOpened(robot)
+  await showDiagramAgain(welcome)
+  if (robot) toFront(robot)
 }
 
-async function showDocumentAgain(welcome: EventOf<'welcome'>): Promise<void> {
+async function showDiagramAgain(welcome: EventOf<'welcome'>): Promise<void> {
   const shown = useStudio.getState().document
   const last = shown ? { ...shown.state, inside: shown.inside } : lastShown()
   if (last) {
-    const { document, inside, path, example } = last
+    const { document, inside, path, origin } = last
     useStudio.setState({ returned: true })
-    const found = await ask({ kind: 'attach', document, inside, path, example })
+    const found = await ask({ kind: 'attach', document, document_kind: 'diagram', inside, path, origin })
     if (found !== undefined) {
       line.resend()
       return
@@ -180,10 +215,13 @@ async function openFromAddress(welcome: EventOf<'welcome'>): Promise<void> {
   const wanted = decodeURIComponent(location.hash.slice(1))
   if (wanted) {
     const found = await ask(
-      wanted in welcome.examples ? { kind: 'open', example: wanted } : { kind: 'open', path: wanted },
+      wanted in welcome.examples
+        ? { kind: 'open_shipped', document_kind: 'diagram', name: wanted }
+        : { kind: 'open', path: wanted },
     )
     if (found !== undefined) return
   }
-  const open = welcome.documents[0]
-  await ask(open ? { kind: 'attach', document: open.document } : { kind: 'open', example: 'kr180model' })
+  const open = welcome.documents.find(({ kind }) => kind === 'diagram')
+  if (open) await bringToFront(open)
+  else await ask({ kind: 'open_shipped', document_kind: 'diagram', name: 'kr180model' })
 }

@@ -11,7 +11,6 @@ export interface Messages {
 export interface Envelope {
   number: number;
   request:
-    | ArrangeBlocks
     | AskMask
     | Attach
     | Change
@@ -25,46 +24,26 @@ export interface Envelope {
     | Look
     | New
     | Open
+    | OpenShipped
     | AskOutline
+    | AskPicture
     | Ping
-    | Pose
+    | AskPose
+    | AskReadings
     | Recover
     | Redo
     | Reload
     | Rewind
-    | RobotAttach
-    | RobotBodies
-    | RobotChange
-    | RobotForm
-    | RobotKeepMine
     | RobotOfBlock
-    | RobotOpen
-    | RobotPicture
-    | RobotPose
-    | RobotRead
-    | RobotRedo
-    | RobotReload
-    | RobotSave
-    | RobotUndo
+    | AskRobotTables
     | Run
     | Save
-    | Scene
+    | AskScene
     | SetSpeed
     | Tune
     | TypedValue
     | TypedSettings
     | Undo;
-}
-/**
- * Lay the blocks out anew, from left to right.
- */
-export interface ArrangeBlocks {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  document: string;
-  kind: "arrange";
-  inside?: string[];
 }
 /**
  * Ask for the mask of a subsystem, or of the sheet itself: the :class:`SetMask` that would make it.
@@ -79,41 +58,55 @@ export interface AskMask {
  * Show a document again: after a reload, after the line was down, or in a second page.
  *
  * Where the server was started anew and does not know it, it comes from its journal, or else from the file
- * or the example of these names, under the same key: edits that wait to be sent again find it.
+ * or the shipped one of these names, under the same key: edits that wait to be sent again find it. Of a
+ * diagram the sheet at the path ``inside`` is shown.
  */
 export interface Attach {
   kind: "attach";
   document: string;
+  document_kind: "diagram" | "robot";
   inside?: string[];
   path?: string | null;
-  example?: string;
+  origin?: string;
+  in_front?: boolean;
 }
 /**
  * Carry out an edit.
+ *
+ * ``inside``: names of the subsystems on the way to the sheet of a diagram that is edited. Changes in a row
+ * of one ``gesture`` (the letters typed into one cell) are one step of undo.
  */
 export interface Change {
+  document: string;
   key?: string;
   base?: number | null;
   author?: string;
-  document: string;
   kind: "change";
   inside?: string[];
+  gesture?: string;
   edit:
     | AddBlocks
+    | AddJoint
+    | ArrangeBlocks
     | BendWires
     | BreakLink
+    | SetCell
     | Connect
+    | SetConvention
     | Describe
     | GroupBlocks
     | KeepTuned
     | LogSignal
     | SetMask
     | MoveBlocks
+    | MoveJoint
     | SetNotes
     | SetParameters
     | PasteBlocks
     | RemoveBlocks
+    | RemoveJoint
     | Rename
+    | RenameLink
     | SetSettings;
 }
 /**
@@ -160,6 +153,19 @@ export interface Wire {
   bends?: number[];
 }
 /**
+ * Put a new link behind another one, or at the base where ``after`` is empty.
+ */
+export interface AddJoint {
+  kind: "add_joint";
+  after: string;
+}
+/**
+ * Lay the blocks of a sheet out anew, from left to right.
+ */
+export interface ArrangeBlocks {
+  kind: "arrange";
+}
+/**
  * Lead wires along the bends that they have here; without any the way is chosen again.
  */
 export interface BendWires {
@@ -174,12 +180,30 @@ export interface BreakLink {
   block: string;
 }
 /**
+ * Type into one cell: of a link, or of the robot where ``link`` is empty.
+ */
+export interface SetCell {
+  kind: "cell";
+  link: string;
+  column: string;
+  text: string;
+  angles: "deg" | "rad";
+}
+/**
  * Draw a wire. With ``replace`` the input's present wire gives way.
  */
 export interface Connect {
   kind: "connect";
   wire: Wire;
   replace?: boolean;
+}
+/**
+ * Read the rows by the other convention, or write the same arm in it (``keep_arm``).
+ */
+export interface SetConvention {
+  kind: "convention";
+  convention: "standard" | "modified";
+  keep_arm: boolean;
 }
 /**
  * Change the model's one-line description.
@@ -273,6 +297,14 @@ export interface SheetNote {
   text: string;
 }
 /**
+ * Let a link of a chain change places with its neighbour.
+ */
+export interface MoveJoint {
+  kind: "move_joint";
+  link: string;
+  by: -1 | 1;
+}
+/**
  * Write notes, or change what they say.
  */
 export interface SetNotes {
@@ -315,11 +347,26 @@ export interface RemoveBlocks {
   notes?: string[];
 }
 /**
+ * Take a link out; what hangs on it hangs on its parent then.
+ */
+export interface RemoveJoint {
+  kind: "remove_joint";
+  link: string;
+}
+/**
  * Give a block another name; its wires and its place go with it.
  */
 export interface Rename {
   kind: "rename";
   block: string;
+  name: string;
+}
+/**
+ * Give a link another name.
+ */
+export interface RenameLink {
+  kind: "rename_link";
+  link: string;
   name: string;
 }
 /**
@@ -395,18 +442,28 @@ export interface Look {
   inside: string[];
 }
 /**
- * Begin an empty drawing.
+ * Begin a new document.
  */
 export interface New {
   kind: "new";
+  document_kind: "diagram" | "robot";
 }
 /**
- * Open a file of the project, or the shipped example of this name.
+ * Open a file of the project: a diagram, a robot, or a script of robots.
+ *
+ * The reply has the keys of the documents; the first comes to the front.
  */
 export interface Open {
   kind: "open";
-  path?: string;
-  example?: string;
+  path: string;
+}
+/**
+ * Open a copy of a shipped example or robot.
+ */
+export interface OpenShipped {
+  kind: "open_shipped";
+  document_kind: "diagram" | "robot";
+  name: string;
 }
 /**
  * Ask for the tree of sheets, an :class:`Outline`.
@@ -416,180 +473,13 @@ export interface AskOutline {
   document: string;
 }
 /**
- * Ask for nothing but an answer: the page thereby knows that the line is up.
+ * Ask for a drawing of a robot at ``q``, as SVG.
  */
-export interface Ping {
-  kind: "ping";
-}
-/**
- * Ask where the links of a block's robot are at joint coordinates ``q`` (rad, m).
- */
-export interface Pose {
-  kind: "pose";
+export interface AskPicture {
   document: string;
-  inside?: string[];
-  block: string;
-  q: number[];
-}
-/**
- * Say what becomes of a drawing or a robot that a journal gives back.
- *
- * ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
- * from and opens that; ``discard`` deletes the journal.
- */
-export interface Recover {
-  kind: "recover";
-  document: string;
-  action: "open" | "keep_both" | "discard";
-}
-/**
- * Do again what was undone.
- */
-export interface Redo {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  document: string;
-  kind: "redo";
-}
-/**
- * Take what the file holds now, as one step that can be undone.
- */
-export interface Reload {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  document: string;
-  kind: "reload";
-}
-/**
- * Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay.
- */
-export interface Rewind {
-  run: string;
-  kind: "rewind";
-  time: number;
-}
-/**
- * Show a robot that is open already: after a reload, after the line was down, or in a second page.
- *
- * Where the server was started anew and does not know it, it comes from its journal, or else from the file
- * or the shipped robot of these names, under the same key: edits that wait to be sent again find it.
- */
-export interface RobotAttach {
-  kind: "robot_attach";
-  robot: string;
-  path?: string | null;
-  shipped?: string;
-}
-/**
- * Ask for the bodies of an open robot.
- */
-export interface RobotBodies {
-  kind: "robot_bodies";
-  robot: string;
-}
-/**
- * Carry out an edit.
- *
- * Changes in a row of one ``gesture`` (the letters typed into one cell) are one step of undo.
- */
-export interface RobotChange {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  robot: string;
-  kind: "robot_change";
-  gesture?: string;
-  edit: AddJoint | SetCell | SetConvention | MoveJoint | RemoveJoint | RenameLink;
-}
-/**
- * Put a new link behind another one, or at the base where ``after`` is empty.
- */
-export interface AddJoint {
-  kind: "add";
-  after: string;
-}
-/**
- * Type into one cell: of a link, or of the robot where ``link`` is empty.
- */
-export interface SetCell {
-  kind: "cell";
-  link: string;
-  column: string;
-  text: string;
-  angles: "deg" | "rad";
-}
-/**
- * Read the rows by the other convention, or write the same arm in it (``keep_arm``).
- */
-export interface SetConvention {
-  kind: "convention";
-  convention: "standard" | "modified";
-  keep_arm: boolean;
-}
-/**
- * Let a link of a chain change places with its neighbour.
- */
-export interface MoveJoint {
-  kind: "move";
-  link: string;
-  by: -1 | 1;
-}
-/**
- * Take a link out; what hangs on it hangs on its parent then.
- */
-export interface RemoveJoint {
-  kind: "remove";
-  link: string;
-}
-/**
- * Give a link another name.
- */
-export interface RenameLink {
-  kind: "rename";
-  link: string;
-  name: string;
-}
-/**
- * Ask which tables a robot has and what stands in their columns.
- */
-export interface RobotForm {
-  kind: "robot_form";
-}
-/**
- * Leave the file that has changed on the disk until the next save, which overwrites it.
- */
-export interface RobotKeepMine {
-  kind: "robot_keep_mine";
-  robot: string;
-}
-/**
- * Open the robot that a block uses: its file, or a copy of it.
- */
-export interface RobotOfBlock {
-  kind: "robot_of_block";
-  document: string;
-  inside?: string[];
-  block: string;
-}
-/**
- * Open a robot: a file of the project, a shipped one, or a new one where both are empty.
- */
-export interface RobotOpen {
-  kind: "robot_open";
-  path?: string;
-  shipped?: string;
-}
-/**
- * Ask for a drawing, as SVG, of an open robot at ``q``, or of that of a block where ``block`` is said.
- */
-export interface RobotPicture {
-  kind: "robot_picture";
-  robot?: string;
-  document?: string;
   inside?: string[];
   block?: string;
+  kind: "picture";
   /**
    * @maxItems 1000
    */
@@ -597,22 +487,30 @@ export interface RobotPicture {
   theme: "light" | "dark";
 }
 /**
- * Ask where the links of an open robot are at ``q``.
+ * Ask for nothing but an answer: the page thereby knows that the line is up.
  */
-export interface RobotPose {
-  kind: "robot_pose";
-  robot: string;
+export interface Ping {
+  kind: "ping";
+}
+/**
+ * Ask where the base, the links and the tool of a robot are at ``q``: poses (L+2, 4, 4).
+ */
+export interface AskPose {
+  document: string;
+  inside?: string[];
+  block?: string;
+  kind: "pose";
   /**
    * @maxItems 1000
    */
   q: number[];
 }
 /**
- * Ask what an open robot does at ``q, qd, qdd``.
+ * Ask what the robot of a document does at ``q, qd, qdd``.
  */
-export interface RobotRead {
-  kind: "robot_read";
-  robot: string;
+export interface AskReadings {
+  kind: "readings";
+  document: string;
   /**
    * @maxItems 1000
    */
@@ -627,43 +525,58 @@ export interface RobotRead {
   qdd: number[];
 }
 /**
+ * Say what becomes of a document that a journal gives back.
+ *
+ * ``open`` opens it as it was, not yet saved; ``keep_both`` saves it as a new file beside the one it came
+ * from and opens that; ``discard`` deletes the journal.
+ */
+export interface Recover {
+  kind: "recover";
+  document: string;
+  action: "open" | "keep_both" | "discard";
+}
+/**
  * Do again what was undone.
  */
-export interface RobotRedo {
+export interface Redo {
+  document: string;
   key?: string;
   base?: number | null;
   author?: string;
-  robot: string;
-  kind: "robot_redo";
+  kind: "redo";
 }
 /**
  * Take what the file holds now, as one step that can be undone.
  */
-export interface RobotReload {
+export interface Reload {
+  document: string;
   key?: string;
   base?: number | null;
   author?: string;
-  robot: string;
-  kind: "robot_reload";
+  kind: "reload";
 }
 /**
- * Write the robot's file; ``path`` gives it another. ``overwrite``: also where the disk has changed.
+ * Pause a run and take it back to an instant (s): what came later is forgotten, tuned values stay.
  */
-export interface RobotSave {
-  kind: "robot_save";
-  robot: string;
-  path?: string;
-  overwrite?: boolean;
+export interface Rewind {
+  run: string;
+  kind: "rewind";
+  time: number;
 }
 /**
- * Take the last edit back.
+ * Open the robot that a block uses: its file, or a copy of it.
  */
-export interface RobotUndo {
-  key?: string;
-  base?: number | null;
-  author?: string;
-  robot: string;
-  kind: "robot_undo";
+export interface RobotOfBlock {
+  kind: "robot_of_block";
+  document: string;
+  inside?: string[];
+  block: string;
+}
+/**
+ * Ask which tables robots have and what stands in their columns.
+ */
+export interface AskRobotTables {
+  kind: "robot_tables";
 }
 /**
  * Start the model. ``speed`` is simulated seconds per second, ``None`` as fast as possible.
@@ -680,6 +593,8 @@ export interface Run {
 }
 /**
  * Write the file; ``path`` gives it another. ``overwrite``: also where the disk has changed meanwhile.
+ *
+ * The reply is the path.
  */
 export interface Save {
   kind: "save";
@@ -688,13 +603,13 @@ export interface Save {
   overwrite?: boolean;
 }
 /**
- * Ask for the bodies of the robot that a block shows.
+ * Ask for the bodies of a robot.
  */
-export interface Scene {
-  kind: "scene";
+export interface AskScene {
   document: string;
   inside?: string[];
-  block: string;
+  block?: string;
+  kind: "scene";
 }
 /**
  * Change the speed of a run; ``None``: as fast as possible.
@@ -739,56 +654,53 @@ export interface TypedSettings {
  * Take the last edit back.
  */
 export interface Undo {
+  document: string;
   key?: string;
   base?: number | null;
   author?: string;
-  document: string;
   kind: "undo";
 }
 /**
  * Only for the types of the front end: everything that the server sends as text.
  */
 export interface ServerMessage {
-  event:
-    | Changed
-    | Checked
-    | Documents
-    | Opened
-    | Reply
-    | RobotShown
-    | RobotOpened
-    | RunProgress
-    | RunRewound
-    | RunStarted
-    | RunTuned
-    | Welcome;
+  event: Changed | Checked | Documents | Opened | Reply | RunProgress | RunRewound | RunStarted | RunTuned | Welcome;
 }
 /**
- * A document went from one version to another.
+ * A document went from version ``before`` to that of its state, which may be the same.
  */
 export interface Changed {
   kind: "changed";
   state: DocumentState;
   before: number;
-  change: SheetChange;
+  change: DiagramChange | RobotChange;
 }
 /**
  * Where a document stands.
  *
- * ``disk`` says how the file is now, compared with what was opened or saved. ``journaled`` is false where
- * the journal cannot be written: then only a save keeps what is drawn.
+ * ``origin`` is the shipped example or robot that it began as. ``disk`` says how the file is now, compared
+ * with what was opened or saved. ``journaled`` is false where the journal cannot be written: then only a
+ * save keeps the edits.
  */
 export interface DocumentState {
   document: string;
+  kind: "diagram" | "robot";
   version: number;
   title: string;
   path: string | null;
-  example: string;
+  origin: string;
   dirty: boolean;
   undo: string;
   redo: string;
-  disk?: "same" | "changed" | "gone";
-  journaled?: boolean;
+  disk: "same" | "changed" | "gone";
+  journaled: boolean;
+}
+/**
+ * What changed on the sheet that a page looks at, and the settings of the diagram.
+ */
+export interface DiagramChange {
+  kind: "diagram";
+  sheet: SheetChange;
   settings: {
     [k: string]: number | string | null;
   };
@@ -858,6 +770,52 @@ export interface ParameterRule {
   allowed: string;
 }
 /**
+ * A robot after a change: all of it, since one cell may change many.
+ */
+export interface RobotChange {
+  kind: "robot";
+  content: RobotContent;
+}
+/**
+ * A robot as the tables of its editor show it.
+ */
+export interface RobotContent {
+  kind: "robot";
+  name: string;
+  convention: "standard" | "modified" | "";
+  chain: boolean;
+  links: LinkRow[];
+  fields: {
+    [k: string]: number | string | null;
+  };
+  findings: RobotFinding[];
+}
+/**
+ * A link as the tables show it: values by column in SI units, ``None`` where there is none.
+ */
+export interface LinkRow {
+  name: string;
+  parent: string | null;
+  turns: boolean;
+  moves: boolean;
+  variable: string;
+  cells: {
+    [k: string]: number | string | null;
+  };
+  locked: {
+    [k: string]: string;
+  };
+}
+/**
+ * What no real arm could have, at the columns of a link that say it.
+ */
+export interface RobotFinding {
+  link: string;
+  columns: string[];
+  what: string;
+  fix: string;
+}
+/**
  * What the background check found in one version of a document; ``wires`` by source port.
  */
 export interface Checked {
@@ -896,7 +854,7 @@ export interface Documents {
   recoveries: Recovery[];
 }
 /**
- * A drawing or a robot that was not saved when the studio ended, as its journal gives it back.
+ * A document that was not saved when the studio ended, as its journal gives it back.
  *
  * ``path`` is the file that it came from, ``None`` where it never had one. ``began`` and ``last`` are when
  * the first and the last edit since the save were made (s since 1970), ``edits`` how many there are,
@@ -904,8 +862,8 @@ export interface Documents {
  * edited. ``missing`` says what could not be read.
  */
 export interface Recovery {
-  holds: "diagram" | "robot";
   document: string;
+  kind: "diagram" | "robot";
   title: string;
   path: string | null;
   began: number;
@@ -916,14 +874,31 @@ export interface Recovery {
   missing: string;
 }
 /**
- * A whole document, for a page that shows it from now on, and the run that the server has of it.
+ * A whole document, for a page that shows it from now on.
+ *
+ * ``notes``: what was said when its file was read. ``in_front``: whether it comes to the front of the page.
  */
 export interface Opened {
   kind: "opened";
   state: DocumentState;
+  content: DiagramContent | RobotContent;
+  notes: string[];
+  in_front: boolean;
+}
+/**
+ * The sheet of a diagram that a page looks at, and how the diagram is run.
+ *
+ * ``inside``: names of the subsystems on the way to the sheet. ``settings`` go by the names of
+ * ``SimulationOptions``. ``run``: the key of the run that the server has of the diagram.
+ */
+export interface DiagramContent {
+  kind: "diagram";
   inside: string[];
   sheet: Sheet;
-  run?: string | null;
+  settings: {
+    [k: string]: number | string | null;
+  };
+  run: string | null;
 }
 /**
  * The whole drawing.
@@ -961,77 +936,6 @@ export interface Fault {
   where: string;
   allowed: string;
   fix: string;
-}
-/**
- * An open robot as it is now: sent to every page that shows it, after every change.
- */
-export interface RobotShown {
-  kind: "robot";
-  robot: string;
-  version: number;
-  path: string | null;
-  shipped: string;
-  dirty: boolean;
-  disk: "same" | "changed" | "gone";
-  journaled: boolean;
-  undo: string;
-  redo: string;
-  name: string;
-  convention: "standard" | "modified" | "";
-  chain: boolean;
-  links: LinkRow[];
-  fields: {
-    [k: string]: number | string | null;
-  };
-  findings: RobotFinding[];
-  notes: string[];
-}
-/**
- * A link as the tables show it: values by column in SI units, ``None`` where there is none.
- */
-export interface LinkRow {
-  name: string;
-  parent: string | null;
-  turns: boolean;
-  moves: boolean;
-  variable: string;
-  cells: {
-    [k: string]: number | string | null;
-  };
-  locked: {
-    [k: string]: string;
-  };
-}
-/**
- * What no real arm could have, at the columns of a link that say it.
- */
-export interface RobotFinding {
-  link: string;
-  columns: string[];
-  what: string;
-  fix: string;
-}
-/**
- * A page has opened robots: they come to its screen. It was told of each before.
- */
-export interface RobotOpened {
-  kind: "robot_opened";
-  opening: Opening;
-}
-/**
- * The answer to what opens: the robots or the diagram of a file, and what was said about it.
- */
-export interface Opening {
-  robots: RobotSpot[];
-  document: string;
-  notes: string[];
-}
-/**
- * Names of a robot that was opened.
- */
-export interface RobotSpot {
-  robot: string;
-  name: string;
 }
 /**
  * Where a run stands. ``solver`` and ``reason`` say at its end what worked it out, and why that.
@@ -1170,41 +1074,31 @@ export interface SettingRule {
   default: number | string | null;
 }
 export interface Replies {
-  arrange: number;
   ask_mask: SetMask;
   attach: string;
   change: number;
   close: null;
   control: null;
   copy: string;
-  drop: Opening;
+  drop: string[];
   files: FileList;
   find: Found[];
   keep_mine: null;
-  look: string;
+  look: null;
   new: string;
-  open: Opening | string;
+  open: string[];
+  open_shipped: string;
   outline: Outline;
+  picture: string;
   ping: null;
   pose: number[][][];
+  readings: Readings;
   recover: string | null;
   redo: number;
   reload: number;
   rewind: null;
-  robot_attach: Opening;
-  robot_bodies: RobotScene;
-  robot_change: number;
-  robot_form: RobotTables;
-  robot_keep_mine: null;
-  robot_of_block: Opening;
-  robot_open: Opening;
-  robot_picture: string;
-  robot_pose: number[][][];
-  robot_read: Readings;
-  robot_redo: number;
-  robot_reload: number;
-  robot_save: string;
-  robot_undo: number;
+  robot_of_block: string;
+  robot_tables: RobotTables;
   run: string;
   save: string;
   scene: RobotScene;
@@ -1239,6 +1133,41 @@ export interface Outline {
   name: string;
   blocks: number;
   subsystems: Outline[];
+}
+/**
+ * What an arm does in one configuration; m, rad, N m, world axes.
+ */
+export interface Readings {
+  pose: number[][];
+  position: number[];
+  rpy: number[];
+  jacobian: number[][];
+  manipulability: number;
+  gravload: number[];
+  torque: number[];
+  singular: string;
+  limits: string[];
+}
+/**
+ * Every column of the tables of robots.
+ */
+export interface RobotTables {
+  kinematics: CellColumn[];
+  dynamics: CellColumn[];
+  robot: CellColumn[];
+}
+/**
+ * A column of a table, or a field of the robot.
+ */
+export interface CellColumn {
+  name: string;
+  title: string;
+  doc: string;
+  quantity: "number" | "angle" | "coordinate" | "rate" | "text" | "choice";
+  unit: string;
+  optional: boolean;
+  choices: string[];
+  group: string;
 }
 /**
  * Bodies, joints and size of a robot.
@@ -1286,39 +1215,4 @@ export interface SceneJoint {
   offset: number;
   radius: number;
   [k: string]: unknown;
-}
-/**
- * The answer to ``robot_form``.
- */
-export interface RobotTables {
-  kinematics: CellColumn[];
-  dynamics: CellColumn[];
-  robot: CellColumn[];
-}
-/**
- * A column of a table, or a field of the robot.
- */
-export interface CellColumn {
-  name: string;
-  title: string;
-  doc: string;
-  quantity: "number" | "angle" | "coordinate" | "rate" | "text" | "choice";
-  unit: string;
-  optional: boolean;
-  choices: string[];
-  group: string;
-}
-/**
- * What an arm does in one configuration; m, rad, N m, world axes.
- */
-export interface Readings {
-  pose: number[][];
-  position: number[];
-  rpy: number[];
-  jacobian: number[][];
-  manipulability: number;
-  gravload: number[];
-  torque: number[];
-  singular: string;
-  limits: string[];
 }

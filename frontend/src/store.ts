@@ -2,12 +2,11 @@ import { create } from 'zustand'
 import { Connection, Refusal, type Line } from './connection'
 import { changed as viewsChanged } from './frames'
 import { newKey } from './keys'
-import type { EventOf, ReplyTo, Request } from './messages'
+import type { Edit, EventOf, ReplyTo, Request } from './messages'
 import type {
   BlockType,
   Channel,
   DocumentState,
-  Envelope,
   Fault,
   Finding,
   Recovery,
@@ -20,11 +19,11 @@ import type {
 } from './protocol'
 import { samples } from './samples'
 
-export type Edit = Extract<Envelope['request'], { kind: 'change' }>['edit']
-
-/** The document on the screen: what the server last said of it. */
+/** The diagram on the screen: what the server last said of it. */
 export interface OpenDocument {
   state: DocumentState
+  /** How it is run, by the names of `SimulationOptions`. */
+  settings: Record<string, number | string | null>
   /** Names of the subsystems on the way to the sheet on the screen. */
   inside: string[]
   name: string
@@ -135,19 +134,17 @@ export async function ask<R extends Request>(request: R): Promise<ReplyTo<R> | u
 /** By what the server tells the edits of this page from those of others. */
 export const author = newKey()
 
-/**
- * What goes with everything that changes a drawing: which, what of it this page saw, and a key to do it once.
- */
-function alteration(document: OpenDocument) {
-  return { document: document.state.document, key: newKey(), base: document.state.version, author }
+/** What goes with every change of a document: which, what this page saw of it, and a key to do it once. */
+export function alteration({ document, version }: DocumentState) {
+  return { document, key: newKey(), base: version, author }
 }
 
-/** Carry out an edit of the document on the screen; where it is refused the sheet is shown as it is. */
+/** Carry out an edit of the diagram on the screen; where it is refused the sheet is shown as it is. */
 export async function change(edit: Edit): Promise<number | undefined> {
   const { document } = useStudio.getState()
   if (!document) return undefined
-  const { inside } = document
-  const version = await ask({ kind: 'change', ...alteration(document), inside, edit })
+  const { inside, state } = document
+  const version = await ask({ kind: 'change', ...alteration(state), inside, edit })
   if (version === undefined) look(inside)
   return version
 }
@@ -155,15 +152,20 @@ export async function change(edit: Edit): Promise<number | undefined> {
 /** Carry out an edit of the sheet at a path of subsystems; a refusal is thrown to who asks. */
 export async function attempt(edit: Edit, inside: string[]): Promise<void> {
   const { document } = useStudio.getState()
-  if (document) await line.ask({ kind: 'change', ...alteration(document), inside, edit })
+  if (document) await line.ask({ kind: 'change', ...alteration(document.state), inside, edit })
 }
 
-/** Take the last step back, do it again, or lay the blocks of this sheet out anew. */
-export function alter(kind: 'undo' | 'redo' | 'arrange'): void {
-  const { document } = useStudio.getState()
-  if (!document) return
-  const common = alteration(document)
-  void ask(kind === 'arrange' ? { kind, ...common, inside: document.inside } : { kind, ...common })
+/** Take the last step of a document back, do it again, or take what its file holds now. */
+export function alter(
+  kind: 'undo' | 'redo' | 'reload',
+  of: DocumentState | undefined = useStudio.getState().document?.state,
+): void {
+  if (of) void ask({ kind, ...alteration(of) })
+}
+
+/** Bring a document that the server has open to the front of this page. */
+export function bringToFront({ document, kind, path, origin }: DocumentState): Promise<string | undefined> {
+  return ask({ kind: 'attach', document, document_kind: kind, path, origin })
 }
 
 /** Look at the sheet inside a subsystem; the empty path is the whole model. */

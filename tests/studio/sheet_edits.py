@@ -122,6 +122,7 @@ MAKERS: dict[type[do.DiagramEdit], Callable[[Sheet], do.DiagramEdit]] = {
     do.SetParameters: parameters,
     do.SetMask: mask,
     do.KeepTuned: keep_tuned,
+    do.ArrangeBlocks: lambda s: do.ArrangeBlocks(),
     do.LogSignal: lambda s: do.LogSignal(port=s.one(s.outputs), logged=s.chance.random() < 0.7),
     do.GroupBlocks: lambda s: do.GroupBlocks(blocks=s.some(s.blocks), name=s.one(NEW_NAMES)),
     do.BreakLink: lambda s: do.BreakLink(block=s.one(s.insides)),

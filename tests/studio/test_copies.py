@@ -107,7 +107,7 @@ def test_nothing_outside_of_the_project_is_read_by_pasting(tmp_path: Path) -> No
     assert '"joint_servos#JointServo"' in text
 
     async def talking(hub: Any, ask: Any, told: Told) -> None:
-        key = await ask("open", example="puma560_servos")
+        key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         same = await ask("copy", document=key, blocks=["servo 1"])
         assert same == text
         edit = {"kind": "paste", "names": {"servo 1": "another"}}

@@ -80,22 +80,34 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
         },
         {"kind": "paste", "text": diagram_to_bytes(Diagram(name="d", blocks={}), load_robot).decode()},
         {"kind": "settings", "values": {"stop_time": 1.0}},
+        {"kind": "arrange"},
     ]
     common = {"document": document, "base": None, "author": "me"}
-    of_robot = {"robot": robot, "base": None, "author": "me"}
+    of_robot = {**common, "document": robot, "gesture": "", "inside": []}
+    to_block = {"document": document, "inside": [], "block": "PID"}
     q = {"q": [0.0] * 6, "qd": [0.0] * 6, "qdd": [0.0] * 6}
     content = base64.b64encode(write_robot(load_robot("kr180"))).decode()
     cell = {"kind": "cell", "link": "link1", "column": "a", "text": "1", "angles": "deg"}
     return [
-        {"kind": "open", "path": "", "example": "van_der_pol_pid"},
-        {"kind": "open", "path": "arm.json", "example": ""},
-        {"kind": "new"},
-        {"kind": "attach", "document": document, "inside": [], "path": None, "example": ""},
+        {"kind": "open", "path": "arm.json"},
+        {"kind": "open_shipped", "document_kind": "diagram", "name": "van_der_pol_pid"},
+        {"kind": "open_shipped", "document_kind": "robot", "name": "puma560"},
+        {"kind": "drop", "name": "arm.json", "content": content},
+        {"kind": "new", "document_kind": "diagram"},
+        {
+            "kind": "attach",
+            "document": document,
+            "document_kind": "diagram",
+            "inside": [],
+            "path": None,
+            "origin": "",
+            "in_front": True,
+        },
         {"kind": "look", "document": document, "inside": []},
         *({"kind": "change", **common, "inside": [], "edit": edit} for edit in edits),
+        {"kind": "change", **of_robot, "edit": cell},
         {"kind": "undo", **common},
         {"kind": "redo", **common},
-        {"kind": "arrange", **common, "inside": []},
         {"kind": "save", "document": document, "path": "saved.json", "overwrite": True},
         {"kind": "reload", **common},
         {"kind": "keep_mine", "document": document},
@@ -122,31 +134,13 @@ def requests(document: str, robot: str) -> list[dict[str, Any]]:
             "text": "1",
         },
         {"kind": "typed_settings", "document": document, "values": {"stop_time": 1.0}},
-        {"kind": "scene", "document": document, "inside": [], "block": "PID"},
-        {"kind": "pose", "document": document, "inside": [], "block": "PID", "q": [0.0]},
-        {"kind": "robot_open", "path": "", "shipped": "puma560"},
-        {"kind": "robot_of_block", "document": document, "inside": [], "block": "PID"},
-        {"kind": "robot_attach", "robot": robot, "path": None, "shipped": ""},
-        {"kind": "robot_change", **of_robot, "gesture": "", "edit": cell},
-        {"kind": "robot_undo", **of_robot},
-        {"kind": "robot_redo", **of_robot},
-        {"kind": "robot_reload", **of_robot},
-        {"kind": "robot_keep_mine", "robot": robot},
-        {"kind": "robot_save", "robot": robot, "path": "arm.json", "overwrite": True},
-        {"kind": "robot_form"},
-        {"kind": "robot_bodies", "robot": robot},
-        {"kind": "robot_pose", "robot": robot, "q": [0.0] * 6},
-        {"kind": "robot_read", "robot": robot, **q},
-        {
-            "kind": "robot_picture",
-            "robot": robot,
-            "document": "",
-            "inside": [],
-            "block": "",
-            "q": [0.0],  # a wrong count: a picture takes long
-            "theme": "light",
-        },
-        {"kind": "drop", "name": "arm.json", "content": content},
+        {"kind": "scene", **to_block},
+        {"kind": "pose", **to_block, "q": [0.0]},
+        {"kind": "pose", "document": robot, "q": [0.0] * 6},
+        {"kind": "picture", "document": robot, "q": [0.0], "theme": "light"},  # a picture takes long
+        {"kind": "readings", "document": robot, **q},
+        {"kind": "robot_of_block", **to_block},
+        {"kind": "robot_tables"},
     ]
 
 
@@ -214,10 +208,11 @@ def test_every_kind_of_message_answers_hostile_values_in_words(folder: Path) -> 
             assert told[-1]["number"] == number
             return told[-1]
 
-        robot = (await send({"kind": "robot_open", "path": "arm.json"}))["value"]["robots"][0]["robot"]
+        robot = (await send({"kind": "open", "path": "arm.json"}))["value"][0]
         assert {request["kind"] for request in requests("", "")} == set(messages_of(Request))
+        opening = {"kind": "open_shipped", "document_kind": "diagram", "name": "van_der_pol_pid"}
         for place in range(len(requests("", ""))):
-            document = (await send({"kind": "open", "example": "van_der_pol_pid"}))["value"]
+            document = (await send(opening))["value"]
             request = requests(document, robot)[place]
             await send({"kind": "save", "document": document, "path": f"{place}.json"})
             fault = (await send(request))["fault"]

@@ -218,13 +218,13 @@ def test_renaming_renames_the_names_and_nothing_else(text: str, order: list[str]
 
 def test_pages_ask_for_a_mask_and_declare_it(tmp_path: Path) -> None:
     async def talking(hub: Any, ask: Any, told: Told) -> None:
-        key = await ask("open", example="puma560_servos")
+        key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         found = await ask("ask_mask", document=key, block="servo 1")
         assert [rule["name"] for rule in found["parameters"]] == ["w", "G", "Jm", "B", "limit", "q0"]
         await ask("change", document=key, edit={"kind": "break_link", "block": "servo 1"})
         mask = {**found, "block": "servo 1", "name": "Servo"}
         await ask("change", document=key, edit=mask)
         change = [event for event in told if event["kind"] == "changed"][-1]["change"]
-        assert ">Servo<" in change["blocks"]["servo 1"]["face"]
+        assert ">Servo<" in change["sheet"]["blocks"]["servo 1"]["face"]
 
     talk(tmp_path, talking)

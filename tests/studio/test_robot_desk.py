@@ -18,7 +18,7 @@ import armblocks as ab
 from armblocks.errors import ArmblocksWarning, FormatError
 from armblocks.formats import DocumentKind, kind_of_data, load_robot, read_robots, write_robot
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.messages.robots import MOST_DROPPED
+from armblocks.studio.protocol.messages.documents import MOST_DROPPED
 from armblocks.studio.robots.readings import readings, singularity
 from armblocks.studio.server.hub import Hub, Page
 
@@ -60,7 +60,10 @@ class Talk:
         return f"{fault['where']}: {fault['what']}"
 
     def shown(self) -> dict[str, Any]:
-        return next(event for event in reversed(self.told) if event["kind"] == "robot")
+        """What the page shows of a robot: where it stands, and its latest content."""
+        events = [event for event in self.told if event.get("state", {}).get("kind") == "robot"]
+        contents = [event.get("content") or (event.get("change") or {}).get("content") for event in events]
+        return {**next(content for content in reversed(contents) if content), **events[-1]["state"]}
 
 
 def talk(folder: Path, talking: Callable[[Talk], Awaitable[None]]) -> None:
@@ -83,37 +86,37 @@ def cell(link: str, column: str, text: str) -> dict[str, str]:
 
 def test_the_paper_s_script_is_dropped_edited_undone_saved_and_opened_again(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
-        opening = await talk.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
-        assert [spot["name"] for spot in opening["robots"]] == ["KR180"]
-        assert any("broken as on a printed page" in note for note in opening["notes"])
-        key = opening["robots"][0]["robot"]
+        (key,) = await talk.ask("drop", name="kr180.m", content=packed(PRINTED.read_bytes()))
+        opened = next(event for event in talk.told if event["kind"] == "opened")
+        assert opened["content"]["name"] == "KR180"
+        assert any("broken as on a printed page" in note for note in opened["notes"])
         shown = talk.shown()
         assert (shown["path"], shown["dirty"], shown["convention"]) == (None, True, "standard")
         assert shown["links"][1]["cells"]["mass"] == 150
         assert {finding["link"] for finding in shown["findings"]} == {"link1", "link3"}
         for number, text in enumerate(("1", "1.", "1.5")):
             await talk.ask(
-                "robot_change", robot=key, key=str(number), gesture="g", edit=cell("link2", "d", text)
+                "change", document=key, key=str(number), gesture="g", edit=cell("link2", "d", text)
             )
-        await talk.ask("robot_change", robot=key, key="2", gesture="g", edit=cell("link2", "d", "9"))
+        await talk.ask("change", document=key, key="2", gesture="g", edit=cell("link2", "d", "9"))
         assert talk.shown()["links"][1]["cells"]["d"] == 1.5  # what has the key of another is not done again
         assert "the cell is empty" in await talk.refused(
-            "robot_change", robot=key, key="x", edit=cell("link2", "d", "")
+            "change", document=key, key="x", edit=cell("link2", "d", "")
         )
-        await talk.ask("robot_undo", robot=key)
+        await talk.ask("undo", document=key)
         assert talk.shown()["links"][1]["cells"]["d"] == 1.25  # the letters were one step
-        await talk.ask("robot_redo", robot=key)
-        assert "no file yet" in await talk.refused("robot_save", robot=key)
-        assert "studio does not open" in await talk.refused("robot_save", robot=key, path="x.txt")
-        await talk.ask("robot_save", robot=key, path="arms/mine.json")
+        await talk.ask("redo", document=key)
+        assert "no file yet" in await talk.refused("save", document=key)
+        assert "studio does not open" in await talk.refused("save", document=key, path="x.txt")
+        await talk.ask("save", document=key, path="arms/mine.json")
         assert not talk.shown()["dirty"]
         again = await talk.ask("open", path="arms/mine.json")
-        assert again["robots"] == [{"robot": key, "name": "KR180"}]  # open already
+        assert again == [key]  # open already
         (tmp_path / "arms" / "mine.json").write_bytes(write_robot(load_robot("puma560")))
-        assert "changed on the disk" in await talk.refused("robot_save", robot=key)
-        await talk.ask("robot_save", robot=key, overwrite=True)
+        assert "changed on the disk" in await talk.refused("save", document=key)
+        await talk.ask("save", document=key, overwrite=True)
         (tmp_path / "other.json").write_text("{}")
-        assert "such a file already" in await talk.refused("robot_save", robot=key, path="other.json")
+        assert "such a file already" in await talk.refused("save", document=key, path="other.json")
 
     talk(tmp_path, talking)
     (saved,) = read_robots((tmp_path / "arms" / "mine.json").read_bytes(), "mine.json").values()
@@ -136,14 +139,15 @@ def test_what_is_dropped_is_bounded_and_named_where_it_is_not_understood(tmp_pat
         assert "defines no robot" in await talk.refused("drop", name="a.m", content=packed(b"x = 1;"))
         assert "a.json" in await talk.refused("drop", name="a.json", content=packed(b"{"))
         model = (Path(ab.__file__).parents[2] / "examples" / "kr180model.json").read_bytes()
-        opening = await talk.ask("drop", name="model.json", content=packed(model))
-        assert opening["document"] in talk.hub.documents
+        (document,) = await talk.ask("drop", name="model.json", content=packed(model))
+        assert talk.hub.documents[document].state().kind == "diagram"
         robot = packed(write_robot(load_robot("puma560")))
-        opening = await talk.ask("drop", name="p.json", content=robot)
-        assert opening["robots"][0]["name"] == load_robot("puma560").name
+        await talk.ask("drop", name="p.json", content=robot)
+        assert talk.shown()["title"] == load_robot("puma560").name
         two = b"L{1} = link([0 1 0 0 0]); a = robot(L, 'one'); L{2} = link([0 2 0 0 0]); b = robot(L, 'two');"
-        opening = await talk.ask("drop", name="two.m", content=packed(two))
-        assert [spot["name"] for spot in opening["robots"]] == ["one", "two"]
+        keys = await talk.ask("drop", name="two.m", content=packed(two))
+        assert [talk.hub.documents[key].state().title for key in keys] == ["one", "two"]
+        assert talk.shown()["title"] == "one"
 
     talk(tmp_path, talking)
 
@@ -153,20 +157,20 @@ def test_diagrams_take_the_new_form_of_a_robot_file_when_it_is_saved(tmp_path: P
     ab.save_robot(load_robot("puma560"), tmp_path / "arms" / "mine.json")
 
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="kr180model")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="kr180model")
         blocks = talk.hub.documents[document].document.diagram.blocks
         name = next(name for name, block in blocks.items() if hasattr(block, "robot"))
         edit = {"kind": "parameters", "block": name, "values": {"robot": "arms/mine.json"}}
         await talk.ask("change", document=document, key="1", edit=edit)
-        opening = await talk.ask("robot_of_block", document=document, block=name)
-        key = opening["robots"][0]["robot"]
+        key = await talk.ask("robot_of_block", document=document, block=name)
         assert talk.shown()["path"] == "arms/mine.json"
         link = talk.shown()["links"][0]["name"]
-        await talk.ask("robot_change", robot=key, key="1", edit=cell(link, "mass", "7"))
-        await talk.ask("robot_save", robot=key)
+        await talk.ask("change", document=key, key="1", edit=cell(link, "mass", "7"))
+        await talk.ask("save", document=key)
         block = talk.hub.documents[document].document.diagram.block(name)
         assert block.robot.links[0].mass == 7
-        assert talk.told[-2]["kind"] == "changed"
+        assert talk.told[-3]["kind"] == "changed"
+        assert talk.told[-3]["state"]["document"] == document
         await talk.ask("undo", document=document)
         block = talk.hub.documents[document].document.diagram.block(name)
         assert block.robot.links[0].mass == 0
@@ -178,30 +182,38 @@ def test_diagrams_take_the_new_form_of_a_robot_file_when_it_is_saved(tmp_path: P
 
 def test_two_pages_see_each_other_s_edits(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
-        key = (await talk.ask("robot_open", shipped="puma560"))["robots"][0]["robot"]
-        assert talk.shown()["shipped"] == "puma560"
+        key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
+        assert talk.shown()["origin"] == "puma560"
         other_told: list[dict[str, Any]] = []
         other = talk.new_page(other_told)
-        request = {"number": 1, "request": {"kind": "robot_attach", "robot": key}}
+        await talk.hub.welcome(other)
+        request = {"number": 1, "request": {"kind": "attach", "document_kind": "robot", "document": key}}
         await talk.hub.answer(other, json.dumps(request))
-        tables = await talk.ask("robot_form")
+        tables = await talk.ask("robot_tables")
         assert [column["title"] for column in tables["kinematics"]][:4] == ["joint", "α", "a", "d"]
         for number in range(8):
             await talk.ask(
-                "robot_change", robot=key, key=str(number), edit=cell("link2", "a", f"0.{number + 1}")
+                "change", document=key, key=str(number), edit=cell("link2", "a", f"0.{number + 1}")
             )
-            pose = await talk.ask("robot_pose", robot=key, q=[0.0] * 6)
-            await talk.ask("robot_bodies", robot=key)
-        assert other_told[-1]["version"] == 8
-        assert_allclose(pose, ab.Arm(talk.hub.robots.robots[key].robot).link_poses([0.0] * 6), atol=1e-14)
+            pose = await talk.ask("pose", document=key, q=[0.0] * 6)
+            await talk.ask("scene", document=key)
+        assert other_told[-1]["state"]["version"] == 8
+        arm = ab.Arm(talk.hub.documents[key].document.value)
+        assert_allclose(pose, arm.link_poses([0.0] * 6), atol=1e-14)
         talk.hub.leave(other)
         late: list[dict[str, Any]] = []
         await talk.hub.welcome(talk.new_page(late))
-        told_of = [event for event in late if event["kind"] == "robot"]
-        assert [(event["robot"], event["version"]) for event in told_of] == [(key, 8)]
-        await talk.ask("robot_undo", robot=key)
-        assert other_told[-1]["version"] == 8
-        assert "open robot" in await talk.refused("robot_undo", robot="nobody")
+        assert [(state["document"], state["version"]) for state in late[0]["documents"]] == [(key, 8)]
+        await talk.ask("undo", document=key)
+        assert other_told[-1]["state"]["version"] == 8
+        assert "open document" in await talk.refused("undo", document="nobody")
+        rename = {"kind": "rename", "block": "a", "name": "b"}
+        assert "'rename' is no edit of a robot" in await talk.refused("change", document=key, edit=rename)
+        await talk.ask("redo", document=key)
+        await talk.ask("undo", document=key)
+        assert "has edits that no file holds" in await talk.refused("close", document=key)
+        await talk.ask("close", document=key, discard=True)
+        assert talk.told[-2]["documents"] == []
 
     talk(tmp_path, talking)
 
@@ -211,8 +223,8 @@ def test_readings_are_those_of_the_arm(tmp_path: Path) -> None:
     q, qd, qdd = [0.1, 0.4, -0.3, 0.5, 0.7, 0.2], [0.5] * 6, [1.0] * 6
 
     async def talking(talk: Talk) -> None:
-        key = (await talk.ask("robot_open", shipped="puma560"))["robots"][0]["robot"]
-        found = await talk.ask("robot_read", robot=key, q=q, qd=qd, qdd=qdd)
+        key = await talk.ask("open_shipped", document_kind="robot", name="puma560")
+        found = await talk.ask("readings", document=key, q=q, qd=qd, qdd=qdd)
         assert found["pose"] == arm.fkine(q).tolist()
         assert found["jacobian"] == arm.jacob0(q).tolist()
         assert found["torque"] == arm.rne(q, qd, qdd).tolist()
@@ -222,10 +234,10 @@ def test_readings_are_those_of_the_arm(tmp_path: Path) -> None:
         assert_allclose(math.cos(pitch) * math.cos(yaw), found["pose"][0][0], atol=1e-12)
         assert_allclose(math.cos(pitch) * math.sin(roll), found["pose"][2][1], atol=1e-12)
         assert "5 numbers were given for q" in await talk.refused(
-            "robot_read", robot=key, q=q[:5], qd=qd, qdd=qdd
+            "readings", document=key, q=q[:5], qd=qd, qdd=qdd
         )
-        assert "joint coordinates" in await talk.refused("robot_pose", robot=key, q=[0.0])
-        picture = await talk.ask("robot_picture", robot=key, q=q, theme="light")
+        assert "joint coordinates" in await talk.refused("pose", document=key, q=[0.0])
+        picture = await talk.ask("picture", document=key, q=q, theme="light")
         assert "<svg" in picture
 
     talk(tmp_path, talking)

@@ -24,7 +24,7 @@ from armblocks.studio.robots.columns import ROBOT_COLUMNS, Quantity
 from armblocks.studio.robots.edits import ROBOT_EDITS, angle_value
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
 from armblocks.studio.robots.robot_kind import RobotKind
-from armblocks.studio.robots.tables import robot_shown, robot_tables
+from armblocks.studio.robots.tables import robot_content, robot_tables
 
 PAPER_COLUMNS = (
     *("alpha", "a", "d", "mass", "rx", "ry", "rz", "Ixx", "Iyy", "Izz"),
@@ -65,7 +65,7 @@ def test_the_paper_s_tables_can_be_typed_in() -> None:
     wanted = load_robot("kr180")
     robot = KIND.new()
     for _ in range(2):
-        robot = edited(robot, "add", after=robot.links[-1].name)
+        robot = edited(robot, "add_joint", after=robot.links[-1].name)
     for link, text in zip(
         [link.name for link in robot.links],
         (
@@ -156,27 +156,27 @@ def test_what_no_robot_can_have_is_refused_with_the_place(
 def test_joints_are_added_taken_out_moved_and_renamed() -> None:
     robot = load_robot("puma560")
     names = [link.name for link in robot.links]
-    more = edited(robot, "add", after=names[2])
+    more = edited(robot, "add_joint", after=names[2])
     assert [link.name for link in more.links] == [*names[:3], "link7", *names[3:]]
     assert more.links[4].parent == "link7"
-    assert edited(more, "remove", link="link7") == robot
-    first = edited(robot, "add", after="")
+    assert edited(more, "remove_joint", link="link7") == robot
+    first = edited(robot, "add_joint", after="")
     assert (first.links[0].parent, first.links[1].parent) == (None, "link7")
-    swapped = edited(robot, "move", link=names[0], by=1)
+    swapped = edited(robot, "move_joint", link=names[0], by=1)
     assert [link.name for link in swapped.links[:3]] == [names[1], names[0], names[2]]
-    assert edited(swapped, "move", link=names[0], by=-1) == robot
+    assert edited(swapped, "move_joint", link=names[0], by=-1) == robot
     with pytest.raises(InputError, match="no neighbour on that side"):
-        edited(robot, "move", link=names[0], by=-1)
-    renamed = edited(robot, "rename", link=names[1], name=" elbow ")
+        edited(robot, "move_joint", link=names[0], by=-1)
+    renamed = edited(robot, "rename_link", link=names[1], name=" elbow ")
     assert renamed.links[2].parent == "elbow"
     with pytest.raises(RobotError, match=f"two links are named '{names[0]}'"):
-        edited(robot, "rename", link=names[1], name=names[0])
+        edited(robot, "rename_link", link=names[1], name=names[0])
     with pytest.raises(RobotError, match="one link at least"):
-        edited(replace(robot, links=robot.links[:1]), "remove", link=names[0])
+        edited(replace(robot, links=robot.links[:1]), "remove_joint", link=names[0])
     tree = replace(robot, links=(*robot.links, standard_dh("finger", parent=names[1])))
     with pytest.raises(RobotError, match="do not form a single chain"):
-        edited(tree, "move", link=names[0], by=1)
-    assert edited(tree, "add", after="").links[1].parent is None
+        edited(tree, "move_joint", link=names[0], by=1)
+    assert edited(tree, "add_joint", after="").links[1].parent is None
 
 
 def test_a_joint_that_begins_to_slide_forgets_its_angles() -> None:
@@ -190,7 +190,7 @@ def test_a_joint_that_begins_to_slide_forgets_its_angles() -> None:
 
 def test_links_that_stand_by_transforms_say_so_in_their_cells() -> None:
     robot = replace(KIND.new(), links=(Link(name="plain"), Link(name="next", parent="plain")))
-    shown = robot_shown("key", History(robot), None, "", [])
+    shown = robot_content(robot)
     assert "not by a D-H row" in shown.links[0].locked["alpha"]
     assert shown.convention == ""
     assert typed(robot, "plain", "offset", "10").links[0].joint.offset == math.radians(10)
@@ -198,19 +198,19 @@ def test_links_that_stand_by_transforms_say_so_in_their_cells() -> None:
 
 def test_what_no_body_can_have_is_marked_at_its_cells() -> None:
     robot = load_robot("kr180")
-    shown = robot_shown("key", History(robot), None, "", [])
+    shown = robot_content(robot)
     marked = {finding.link: finding for finding in shown.findings}
     assert set(marked) == {"link1", "link3"}  # as printed in the paper
     assert "Izz" in marked["link1"].columns
     assert "exceeds the sum of the other two" in marked["link3"].what
     mended = typed(typed(typed(robot, "link1", "Iyy", "0"), "link1", "mass", "1"), "link3", "Izz", "0.03")
-    assert robot_shown("key", History(mended), None, "", []).findings == []
+    assert robot_content(mended).findings == []
     with pytest.warns(UserWarning, match="friction drives"):
         bad = typed(robot, "link2", "Tc-", "0.1")
-    found = robot_shown("key", History(bad), None, "", []).findings
+    found = robot_content(bad).findings
     assert [(f.link, f.columns) for f in found if "Friction" in f.what] == [("link2", ["Tc-"])]
     bare = replace(KIND.new(), links=(standard_dh("link1", a=1.0),))
-    assert "Nothing resists" in robot_shown("key", History(bare), None, "", []).findings[0].what
+    assert "Nothing resists" in robot_content(bare).findings[0].what
 
 
 def test_every_column_is_declared_for_the_page() -> None:
@@ -238,10 +238,12 @@ EDITS = st.one_of(
         LETTERS,
         st.sampled_from(["deg", "rad"]),
     ),
-    st.builds(lambda name, new: {"kind": "rename", "link": name, "name": new}, NAMES, NAMES),
-    st.builds(lambda after: {"kind": "add", "after": after}, NAMES),
-    st.builds(lambda link: {"kind": "remove", "link": link}, NAMES),
-    st.builds(lambda link, by: {"kind": "move", "link": link, "by": by}, NAMES, st.sampled_from([-1, 1])),
+    st.builds(lambda name, new: {"kind": "rename_link", "link": name, "name": new}, NAMES, NAMES),
+    st.builds(lambda after: {"kind": "add_joint", "after": after}, NAMES),
+    st.builds(lambda link: {"kind": "remove_joint", "link": link}, NAMES),
+    st.builds(
+        lambda link, by: {"kind": "move_joint", "link": link, "by": by}, NAMES, st.sampled_from([-1, 1])
+    ),
     st.builds(
         lambda word, keep: {"kind": "convention", "convention": word, "keep_arm": keep},
         st.sampled_from(["standard", "modified"]),
@@ -266,7 +268,7 @@ def test_any_sequence_of_edits_undone_gives_the_same_file(edits: list[dict[str, 
         assert ROBOT_EDITS.title(edit)
         history.replace(ROBOT_EDITS.title(edit), after)
         forms.append(write_robot(history.value))
-        robot_shown("key", history, None, "", []).model_dump_json()
+        robot_content(history.value).model_dump_json()
     for form in forms[-2::-1]:
         history.undo()
         assert write_robot(history.value) == form
@@ -295,6 +297,6 @@ def test_letters_of_one_gesture_are_one_step() -> None:
 
 def test_the_tables_ask_about_units() -> None:
     upward = replace(load_robot("planar3r"), gravity=(0.0, 0.0, 9.81))
-    (found,) = robot_shown("key", History(upward), None, "", []).findings
+    (found,) = robot_content(upward).findings
     assert found.link == upward.name
     assert "bodies fall upwards" in found.what

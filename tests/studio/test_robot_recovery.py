@@ -12,9 +12,10 @@ from crashed_disk import Disk, going
 from armblocks.errors import ArmblocksError, FormatError, InputError
 from armblocks.formats import load_robot, write_robot
 from armblocks.studio.documents import open_files
+from armblocks.studio.documents.older_journals import as_of_today
 from armblocks.studio.protocol.messages import documents as say
-from armblocks.studio.protocol.messages import robots as say_robot
-from armblocks.studio.protocol.messages.robot_edits import SetCell
+from armblocks.studio.protocol.messages.robot_edits import AddJoint, RenameLink, SetCell
+from armblocks.studio.protocol.messages.sheet_edits import ArrangeBlocks, Rename
 from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
 
 
@@ -28,11 +29,32 @@ def content(found: OpenRobot) -> bytes:
     return write_robot(found.robot)
 
 
-def cell(
-    key: str, link: str, column: str, text: str, gesture: str = "", **more: Any
-) -> say_robot.RobotChange:
+def cell(key: str, link: str, column: str, text: str, gesture: str = "", **more: Any) -> say.Change:
     edit = SetCell(link=link, column=column, text=text, angles="deg")
-    return say_robot.RobotChange(robot="", key=key, gesture=gesture, edit=edit, **more)
+    return say.Change(document="", key=key, gesture=gesture, edit=edit, **more)
+
+
+JOURNAL_OF_0_2: list[tuple[dict[str, Any], say.Alteration]] = [
+    (
+        {"kind": "robot_change", "gesture": "g", "edit": {"kind": "rename", "link": "a", "name": "b"}},
+        say.Change(document="", gesture="g", edit=RenameLink(link="a", name="b")),
+    ),
+    (
+        {"kind": "robot_change", "gesture": "", "edit": {"kind": "add", "after": ""}},
+        say.Change(document="", edit=AddJoint(after="")),
+    ),
+    ({"kind": "robot_undo"}, say.Undo(document="")),
+    ({"kind": "arrange", "inside": ["a"]}, say.Change(document="", inside=["a"], edit=ArrangeBlocks())),
+    (
+        {"kind": "change", "inside": [], "edit": {"kind": "rename", "block": "a", "name": "b"}},
+        say.Change(document="", edit=Rename(block="a", name="b")),
+    ),
+]
+
+
+@pytest.mark.parametrize(("written", "meant"), JOURNAL_OF_0_2)
+def test_journals_of_version_0_2_0_are_understood(written: dict[str, Any], meant: say.Alteration) -> None:
+    assert type(meant).model_validate({**as_of_today(written), "document": ""}) == meant
 
 
 def requests(seed: int, count: int) -> list[Any]:
@@ -44,9 +66,9 @@ def requests(seed: int, count: int) -> list[Any]:
         link, column = f"link{random_.randrange(1, 8)}", random_.choice(["a", "d", "mass", "alpha", "Ixx"])
         for _ in range(random_.randrange(1, 5)):
             made.append(cell(f"{seed} {len(made)}", link, column, f"{random_.random():.3f}", gesture))
-        for kind in (say_robot.RobotUndo, say_robot.RobotRedo):
+        for kind in (say.Undo, say.Redo):
             for _ in range(random_.randrange(3)):
-                made.append(kind(robot="", key=f"{seed} {len(made)}"))
+                made.append(kind(document="", key=f"{seed} {len(made)}"))
     return made
 
 
@@ -119,20 +141,20 @@ def test_unsaved_robots_are_offered_and_never_put_over_a_newer_file(disk: Disk, 
         await robots.save(found, "arm.json", overwrite=False)
         robots.perform(found, cell("1", "link1", "mass", "7"))
         documents = disk.documents()
-        documents.perform(documents.new(), say.ArrangeBlocks(document="", key="1"))
+        documents.perform(documents.new(), say.Change(document="", key="1", edit=ArrangeBlocks()))
         second = disk.as_after_a_crash(tmp_path / "second")
         theirs = write_robot(load_robot("kr180"))
         second.project.path("arm.json").write_bytes(theirs)
         after = second.robots()
         (offer,) = after.left.offers()
-        assert (offer.holds, offer.path, offer.disk, offer.edits, offer.parts) == (
+        assert (offer.kind, offer.path, offer.disk, offer.edits, offer.parts) == (
             "robot",
             "arm.json",
             "changed",
             1,
             6,
         )
-        assert [offer.holds for offer in second.documents().left.offers()] == ["diagram"]
+        assert [offer.kind for offer in second.documents().left.offers()] == ["diagram"]
         back = await after.recover(say.Recover(document=found.key, action="keep_both"))
         assert back is not None
         assert back.path is not None
@@ -150,12 +172,12 @@ def test_a_robot_sent_again_after_the_crash_is_changed_once(disk: Disk, tmp_path
         robots = disk.robots()
         found = robots.new()
         robots.perform(found, cell("one", "link1", "a", "2"))
-        robots.perform(found, say_robot.RobotUndo(robot="", key="two"))
+        robots.perform(found, say.Undo(document="", key="two"))
         after = disk.as_after_a_crash(tmp_path / "second").robots()
         back = after.attach(found.key)
         assert not after.perform(back, cell("one", "link1", "a", "2"))
-        assert not after.perform(back, say_robot.RobotUndo(robot="", key="two"))
-        assert after.perform(back, say_robot.RobotRedo(robot="", key="three"))
+        assert not after.perform(back, say.Undo(document="", key="two"))
+        assert after.perform(back, say.Redo(document="", key="three"))
         assert back.robot.links[0].dh is not None
         assert back.robot.links[0].dh.a == 2
 
@@ -204,7 +226,7 @@ def test_a_robot_file_that_changed_on_the_disk_is_reloaded_as_a_step(disk: Disk,
         disk.project.write("arm.json", write_robot(load_robot("kr180")))
         with pytest.raises(FormatError, match="the file has changed on the disk since it was opened"):
             await robots.save(found, "", overwrite=False)
-        assert found.shown().disk == "changed"
+        assert found.state().disk == "changed"
         for _ in range(2):  # asked again after a broken line, it is done once
             robots.reload(found, "reload")
         assert found.robot == load_robot("kr180")
@@ -224,7 +246,7 @@ def test_two_pages_do_not_overwrite_each_other_s_cells(disk: Disk) -> None:
         robots.perform(found, cell("2", "link1", "d", "3", author="me", base=0))  # another cell
         for late in (
             cell("3", "link1", "a", "4", author="me", base=0),
-            say_robot.RobotUndo(robot="", key="4", author="me", base=0),
+            say.Undo(document="", key="4", author="me", base=0),
         ):
             with pytest.raises(InputError, match=r"was changed in another page meanwhile.*do it again"):
                 robots.perform(found, late)

@@ -78,13 +78,15 @@ def test_a_page_that_sleeps_during_a_run_keeps_nobody_waiting_and_hears_it_all_l
     monkeypatch.setattr(outbox_module, "BEHIND_BYTES", 20_000)
 
     async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
-        document = await lively.ask(hub, 1, "open", example="falling_pendulum")
-        attach = {"number": 1, "request": {"kind": "attach", "document": document}}
+        document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="falling_pendulum")
+        request = {"kind": "attach", "document": document, "document_kind": "diagram"}
+        attach = {"number": 1, "request": request}
         await hub.answer(frozen.page, json.dumps(attach))
         before = frozen.outbox._size  # pyright: ignore[reportPrivateUsage]
         run = await lively.ask(hub, 2, "run", document=document)
         await lively.until("run_progress", run=run, state="done")
-        await lively.ask(hub, 3, "arrange", document=document, key="1")  # and it can be edited
+        # And it can be edited:
+        await lively.ask(hub, 3, "change", document=document, key="1", edit={"kind": "arrange"})
         more = frozen.outbox._size - before  # pyright: ignore[reportPrivateUsage]
         assert sum(map(len, of_runs(lively))) > 200_000
         assert more < 50_000, "what is told of the run waits on the disk"
@@ -99,16 +101,17 @@ def test_a_page_that_never_listens_is_given_up(tmp_path: Path, monkeypatch: pyte
     monkeypatch.setattr(outbox_module, "MOST_BYTES", 1_000_000)
 
     async def going(hub: Hub, lively: Listener, frozen: Listener) -> None:
-        document = await lively.ask(hub, 1, "open", example="kr180model")
+        document = await lively.ask(hub, 1, "open_shipped", document_kind="diagram", name="kr180model")
+        attach = {"kind": "attach", "document": document, "document_kind": "diagram"}
         for number in range(100):
             await hub.answer(
                 frozen.page,
-                json.dumps({"number": number, "request": {"kind": "attach", "document": document}}),
+                json.dumps({"number": number, "request": attach}),
             )
             if frozen.outbox.given_up:
                 break
         assert frozen.outbox.given_up
         assert frozen.outbox._size == 0  # pyright: ignore[reportPrivateUsage]
-        await lively.ask(hub, 2, "arrange", document=document, key="1")
+        await lively.ask(hub, 2, "change", document=document, key="1", edit={"kind": "arrange"})
 
     with_pages(tmp_path, going)

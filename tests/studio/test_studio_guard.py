@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
 from collections.abc import Iterator, MutableMapping
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from starlette.routing import Mount, Route, WebSocketRoute
 
 from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.page import Page
 from armblocks.studio.server.guard import Guard, Keys
 from armblocks.studio.server.web_app import HubToCome, studio_app
 
@@ -156,8 +158,15 @@ def test_no_route_breaks_or_gives_away_a_file_whatever_it_is_asked(
     coming = HubToCome(ProjectFolder(tmp_path / "project"))
     app = studio_app(coming, keys, frozenset({HOST}), web)
 
+    told: list[dict[str, Any]] = []
+
+    async def hear(said: str | bytes) -> None:
+        told.append(json.loads(said))
+
     async def opened() -> str:
-        return (await coming.here()).documents.new().key
+        hub, page = await coming.here(), Page(hear, hear)
+        await hub.answer(page, '{"number": 1, "request": {"kind": "new", "document_kind": "diagram"}}')
+        return told[-1]["value"]
 
     document = asyncio.run(opened())
     assert call(app, f"/drawing/{document}.svg", cookie(keys))[0] == 200

@@ -70,7 +70,7 @@ GAIN = {"name": "gain", "type": "Gain", "place": {"x": 0, "y": 0}}
 
 def test_a_drawing_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
-        key = await ask("open", example="van_der_pol_pid")
+        key = await ask("open_shipped", document_kind="diagram", name="van_der_pol_pid")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         await ask(
             "change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]}
@@ -98,7 +98,7 @@ def test_a_drawing_is_opened_changed_checked_and_saved(tmp_path: Path) -> None:
 
 def test_a_file_that_changed_on_the_disk_is_not_overwritten_without_a_word(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
-        key = await ask("new")
+        key = await ask("new", document_kind="diagram")
         with pytest.raises(ArmblocksError, match="the drawing has no file yet"):
             await ask("save", document=key)
         await ask("save", document=key, path="a.json")
@@ -118,20 +118,20 @@ def test_a_file_that_changed_on_the_disk_is_not_overwritten_without_a_word(tmp_p
 
 def test_a_drawing_that_cannot_run_yet_is_saved_and_opened_again(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
-        key = await ask("new")
+        key = await ask("new", document_kind="diagram")
         await ask("change", document=key, key="1", edit={"kind": "add", "blocks": [GAIN]})
         await ask("save", document=key, path="open.json")
         await ask("close", document=key)
         await ask("open", path="open.json")
 
     told = talk(tmp_path, talking)
-    sheets = [event["sheet"]["blocks"] for event in told if event["kind"] == "opened"]
+    sheets = [event["content"]["sheet"]["blocks"] for event in told if event["kind"] == "opened"]
     assert list(sheets[-1]) == ["gain"]
 
 
 def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
-        key = await ask("open", example="van_der_pol_pid")
+        key = await ask("open_shipped", document_kind="diagram", name="van_der_pol_pid")
         with pytest.raises(ArmblocksError, match="no blocks were chosen"):
             await ask("change", document=key, key="1", edit={"kind": "group", "blocks": [], "name": "s"})
         group = {"kind": "group", "blocks": ["error"], "name": "pid"}
@@ -148,14 +148,15 @@ def test_a_group_needs_blocks_and_a_free_name(tmp_path: Path) -> None:
 
     told = talk(tmp_path, talking)
     opened = [event for event in told if event["kind"] == "opened"]
-    assert opened[1]["inside"] == ["part"]
-    assert opened[-1]["inside"] == []
-    assert opened[-1]["sheet"]["blocks"].keys() == opened[0]["sheet"]["blocks"].keys()
+    assert opened[1]["content"]["inside"] == ["part"]
+    assert opened[-1]["content"]["inside"] == []
+    blocks, at_first = (event["content"]["sheet"]["blocks"] for event in (opened[-1], opened[0]))
+    assert blocks.keys() == at_first.keys()
 
 
 def test_robots_are_shown_and_posed_by_the_server(tmp_path: Path) -> None:
     async def talking(hub: Hub, ask: Callable[..., Awaitable[Any]], told: Told) -> None:
-        key = await ask("open", example="kr180model")
+        key = await ask("open_shipped", document_kind="diagram", name="kr180model")
         scene = await ask("scene", document=key, block="plot")
         assert scene["rows"] == 6
         assert len(scene["joints"]) == 4

@@ -72,19 +72,19 @@ def test_a_library_is_read_only_until_the_link_is_broken(document: Document) -> 
 
 def test_pages_look_inside_and_try_formulas(tmp_path: Path) -> None:
     async def talking(hub: Any, ask: Any, told: Told) -> None:
-        key = await ask("open", example="puma560_servos")
+        key = await ask("open_shipped", document_kind="diagram", name="puma560_servos")
         where = {"document": key, "inside": [], "block": "servo 1", "type": "Subsystem"}
         assert await ask("typed", **where, parameter="w", text="w/2 + 1") == 11.0
         await ask("look", document=key, inside=["servo 1"])
         opened = [event for event in told if event["kind"] == "opened"][-1]
-        assert opened["sheet"]["linked"] == ["servo 1"]
-        assert opened["sheet"]["link"] == "joint_servos#JointServo"
+        assert opened["content"]["sheet"]["linked"] == ["servo 1"]
+        assert opened["content"]["sheet"]["link"] == "joint_servos#JointServo"
         with pytest.raises(InputError, match="belongs to the library block"):
-            await ask("arrange", document=key, inside=["servo 1"])
+            await ask("change", document=key, inside=["servo 1"], edit={"kind": "arrange"})
         await ask("save", document=key, path="mine.json")
         assert '"library": "joint_servos#JointServo"' in (tmp_path / "mine.json").read_text()
         again = await ask("open", path="mine.json")
-        assert again == key
+        assert again == [key]
 
     talk(tmp_path, talking)
 

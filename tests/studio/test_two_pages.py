@@ -26,6 +26,7 @@ from armblocks.studio.protocol.messages.sheet_edits import (
     SetParameters,
     Wire,
 )
+from armblocks.studio.protocol.messages.sheets import SheetChange
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.shown import sheet, sheet_change
 
@@ -141,7 +142,7 @@ class Page:
         self.version = document.version
         self.blocks: dict[str, Any] = dict(sheet(document.diagram).blocks)
         self.wires = set(sheet(document.diagram).wires)
-        self.coming: deque[tuple[int, say.SheetChange]] = deque()
+        self.coming: deque[tuple[int, SheetChange]] = deque()
 
     def hear(self) -> None:
         """Take the next message in."""

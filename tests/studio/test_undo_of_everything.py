@@ -17,7 +17,7 @@ from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.edits import EDITS
 
 BEGINNINGS = ("puma560_servos", "van_der_pol_pid", "kr180model", "puma560_payload_drop")
-SEEDS = 24
+SEEDS = 28
 LEAST = 3
 """How often each kind of edit must have been carried out, or this would say nothing of it."""
 

@@ -155,7 +155,7 @@ def test_a_worker_that_breaks_is_told_and_the_next_run_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, death: Callable[[Connection], None], words: str
 ) -> None:
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         with monkeypatch.context() as patch:
             in_worker(patch, death)
             talk.hub.runs.workers.prepare()
@@ -167,7 +167,7 @@ def test_a_worker_that_breaks_is_told_and_the_next_run_works(
             assert told["fault"]["fix"]
             talk.hub.runs.workers.end()  # the next one was made as the first
         assert await talk.ask("ping") is None
-        await talk.ask("arrange", document=document, key="1")
+        await talk.ask("change", document=document, key="1", edit={"kind": "arrange"})
         again = await talk.ask("run", document=document)
         assert (await talk.until(again, "done", "failed"))["state"] == "done"
 
@@ -181,7 +181,7 @@ def test_stop_answers_whatever_the_worker_is_busy_with(
     in_worker(monkeypatch, hang)
 
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         pid = talk.pid(run)
         for _ in range(3000):  # more than a pipe holds: nobody waits for one that does not listen
@@ -203,7 +203,7 @@ def test_a_worker_that_hangs_is_ended_when_nobody_stops_it(
     monkeypatch.setattr(run_process, "SILENT_SECONDS", 1.0)
 
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         assert (await talk.until(run, "failed"))["fault"]["what"] == "the run hangs: it was ended"
 
@@ -212,7 +212,7 @@ def test_a_worker_that_hangs_is_ended_when_nobody_stops_it(
 
 def test_no_run_lasts_for_ever_also_while_it_is_paused(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document, speed=0.1)
         await talk.until(run, "running")
         await talk.ask("control", run=run, action="pause")
@@ -229,7 +229,7 @@ def test_no_run_lasts_for_ever_also_while_it_is_paused(tmp_path: Path) -> None:
 
 def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) -> None:
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document, speed=1.0)
         await talk.until(run, "running")
         os.kill(talk.pid(run), signal.SIGKILL)
@@ -242,7 +242,8 @@ def test_a_worker_that_is_killed_is_told_and_its_samples_stay(tmp_path: Path) ->
 
         other = Page(hear, hear)
         await talk.hub.welcome(other)
-        attach = {"number": 1, "request": {"kind": "attach", "document": document}}
+        request = {"kind": "attach", "document": document, "document_kind": "diagram"}
+        attach = {"number": 1, "request": request}
         await talk.hub.answer(other, json.dumps(attach))
         assert any(isinstance(said, bytes) for said in late), "the samples are shown to who comes later"
 
@@ -257,7 +258,7 @@ def test_a_run_whose_samples_find_no_room_on_the_disk_is_told(
         return Path("/dev/full").open("r+b", buffering=0)
 
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         with monkeypatch.context() as patch:
             patch.setattr("armblocks.studio.runs.record.tempfile.TemporaryFile", full)
             run = await talk.ask("run", document=document)
@@ -301,7 +302,7 @@ def test_a_report_whose_process_breaks_is_refused_in_words(
     monkeypatch.setattr(run_report, "write", death)
 
     async def talking(talk: Talk) -> None:
-        document = await talk.ask("open", example="falling_pendulum")
+        document = await talk.ask("open_shipped", document_kind="diagram", name="falling_pendulum")
         run = await talk.ask("run", document=document)
         await talk.until(run, "done")
         with pytest.raises(SimulationError) as refused:

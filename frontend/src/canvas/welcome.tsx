@@ -20,7 +20,10 @@ export function Welcome() {
         <div className="gallery" role="list" aria-label="Examples">
           {Object.entries(examples).map(([name, description]) => (
             <div key={name} role="listitem" style={{ display: 'contents' }}>
-              <button type="button" onClick={() => void ask({ kind: 'open', example: name })}>
+              <button
+                type="button"
+                onClick={() => void ask({ kind: 'open_shipped', document_kind: 'diagram', name })}
+              >
                 <img src={`example/${name}.svg`} alt="" loading="lazy" />
                 <b>{name}</b>
                 <small>{description}</small>

@@ -1,27 +1,16 @@
 import { Alert, Button, Group } from '@mantine/core'
 import { IconAlertTriangle, IconFileAlert, IconHistory } from '@tabler/icons-react'
-import { reload, useDesk, type RobotShown } from '../robot/editor/desk'
-import { ask, useStudio } from '../store'
+import type { DocumentState } from '../protocol'
+import { useDesk } from '../robot/editor/desk'
+import { alter, ask, useStudio } from '../store'
 import { show } from '../dialogs'
 
-interface Standing {
-  path?: string | null
-  disk: 'same' | 'changed' | 'gone'
-  dirty: boolean
-  journaled: boolean
-}
-
 /**
- * That somebody else has written the file of a drawing or robot, or that nothing keeps its edits: with what
- * can be done.
+ * That somebody else has written the file of a document, or that nothing keeps its edits: with what can be
+ * done.
  */
-export function FileNotice({
-  path,
-  disk,
-  dirty,
-  journaled,
-  actions,
-}: Standing & { actions: { reload: () => void; keepMine: () => void; saveAs: () => void } }) {
+function FileNotice({ state, saveAs }: { state: DocumentState; saveAs: () => void }) {
+  const { document, path, disk, dirty, journaled } = state
   return (
     <>
       {disk === 'changed' && (
@@ -29,13 +18,17 @@ export function FileNotice({
           {dirty ? 'Your edits are here and in the journal.' : 'You have no unsaved edits.'} Reloading can be
           undone.
           <Group gap="xs" mt="xs">
-            <Button size="compact-sm" onClick={actions.reload}>
+            <Button size="compact-sm" onClick={() => alter('reload', state)}>
               Reload
             </Button>
-            <Button size="compact-sm" variant="default" onClick={actions.keepMine}>
+            <Button
+              size="compact-sm"
+              variant="default"
+              onClick={() => void ask({ kind: 'keep_mine', document })}
+            >
               Keep mine
             </Button>
-            <Button size="compact-sm" variant="default" onClick={actions.saveAs}>
+            <Button size="compact-sm" variant="default" onClick={saveAs}>
               Save as …
             </Button>
           </Group>
@@ -55,10 +48,16 @@ export function FileNotice({
   )
 }
 
-/** Notices about the visible diagram or robot, and about other unsaved documents. */
+/** Notices about the visible document, and about other unsaved documents. */
 export function DiskNotice() {
   const lost = useStudio((s) => (s.returned ? s.recoveries.length : 0))
   const robot = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
+  const diagram = useStudio((s) => s.document?.state)
+  const state = robot?.state ?? diagram
+  const saveAs = () => {
+    if (robot) void import('../robot/editor/save_dialog').then(({ saveRobotAs }) => saveRobotAs(robot))
+    else show('save_as')
+  }
   return (
     <>
       {lost > 0 && (
@@ -75,29 +74,7 @@ export function DiskNotice() {
           </Group>
         </Alert>
       )}
-      {robot ? <OfRobot shown={robot} /> : <OfDrawing />}
+      {state && <FileNotice state={state} saveAs={saveAs} />}
     </>
   )
-}
-
-function OfRobot({ shown }: { shown: RobotShown }) {
-  const { robot, path, disk, dirty, journaled } = shown
-  const actions = {
-    reload: () => reload(robot),
-    keepMine: () => void ask({ kind: 'robot_keep_mine', robot }),
-    saveAs: () => void import('../robot/editor/save_dialog').then(({ saveRobotAs }) => saveRobotAs(shown)),
-  }
-  return <FileNotice {...{ path, disk, dirty, journaled, actions }} />
-}
-
-function OfDrawing() {
-  const state = useStudio((s) => s.document?.state)
-  if (!state) return null
-  const { document, path, disk = 'same', dirty, journaled = true } = state
-  const actions = {
-    reload: () => void ask({ kind: 'reload', document }),
-    keepMine: () => void ask({ kind: 'keep_mine', document }),
-    saveAs: () => show('save_as'),
-  }
-  return <FileNotice {...{ path, disk, dirty, journaled, actions }} />
 }

@@ -9,8 +9,9 @@ import {
   IconRobot,
   IconX,
 } from '@tabler/icons-react'
-import { showRobot, useDesk } from '../robot/editor/desk'
-import { ask, useStudio } from '../store'
+import type { DocumentState } from '../protocol'
+import { closeRobot } from '../robot/editor/desk'
+import { ask, bringToFront, useStudio } from '../store'
 import { save, show } from '../dialogs'
 
 /** Maximum number of files in the menu; the dialog lists all. */
@@ -30,10 +31,16 @@ export function FileMenu() {
         </ActionIcon>
       </Menu.Target>
       <Menu.Dropdown mah="80vh" style={{ overflow: 'auto' }}>
-        <Menu.Item leftSection={<IconFilePlus size={15} />} onClick={() => void ask({ kind: 'new' })}>
+        <Menu.Item
+          leftSection={<IconFilePlus size={15} />}
+          onClick={() => void ask({ kind: 'new', document_kind: 'diagram' })}
+        >
           New diagram
         </Menu.Item>
-        <Menu.Item leftSection={<IconRobot size={15} />} onClick={() => void ask({ kind: 'robot_open' })}>
+        <Menu.Item
+          leftSection={<IconRobot size={15} />}
+          onClick={() => void ask({ kind: 'new', document_kind: 'robot' })}
+        >
           New robot
         </Menu.Item>
         <Menu.Item
@@ -69,80 +76,105 @@ export function FileMenu() {
           </Menu.Item>
         )}
         <OpenDocuments />
-        <OpenRobots />
         {files.length > 0 && <Menu.Label>Files of this folder</Menu.Label>}
         {files.map((path) => (
           <Menu.Item key={path} onClick={() => void ask({ kind: 'open', path })}>
             {path}
           </Menu.Item>
         ))}
-        <Menu.Label>Robots</Menu.Label>
-        {(welcome?.robots ?? []).map((shipped) => (
-          <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>
-            {shipped}
-          </Menu.Item>
-        ))}
-        <Menu.Label>Examples</Menu.Label>
-        {Object.entries(welcome?.examples ?? {}).map(([example, description]) => (
-          <Menu.Item key={example} onClick={() => void ask({ kind: 'open', example })}>
-            {example}
-            <Text size="xs" c="dimmed">
-              {description}
-            </Text>
-          </Menu.Item>
-        ))}
+        <Shipped />
       </Menu.Dropdown>
     </Menu>
   )
 }
 
-function OpenDocuments() {
-  const documents = useStudio((s) => s.documents)
-  const here = useStudio((s) => s.document?.state.document)
-  const others = documents.filter((entry) => entry.document !== here)
+/** Copies of shipped robots and examples. */
+function Shipped() {
+  const welcome = useStudio((s) => s.welcome)
   return (
     <>
-      {others.length > 0 && <Menu.Label>Open now</Menu.Label>}
-      {others.map((entry) => (
+      <Menu.Label>Robots</Menu.Label>
+      {(welcome?.robots ?? []).map((shipped) => (
         <Menu.Item
-          key={entry.document}
-          leftSection={<IconPencil size={15} />}
-          rightSection={
-            entry.dirty ? (
-              <Text size="xs" c="dimmed">
-                not saved
-              </Text>
-            ) : (
-              <IconX
-                size={14}
-                role="img"
-                aria-label={`Close ${entry.title}`}
-                onClick={(event) => {
-                  event.stopPropagation()
-                  void ask({ kind: 'close', document: entry.document })
-                }}
-              />
-            )
-          }
-          onClick={() => void ask({ kind: 'attach', document: entry.document })}
+          key={shipped}
+          onClick={() => void ask({ kind: 'open_shipped', document_kind: 'robot', name: shipped })}
         >
-          {entry.path ?? entry.title}
+          {shipped}
+        </Menu.Item>
+      ))}
+      <Menu.Label>Examples</Menu.Label>
+      {Object.entries(welcome?.examples ?? {}).map(([example, description]) => (
+        <Menu.Item
+          key={example}
+          onClick={() => void ask({ kind: 'open_shipped', document_kind: 'diagram', name: example })}
+        >
+          {example}
+          <Text size="xs" c="dimmed">
+            {description}
+          </Text>
         </Menu.Item>
       ))}
     </>
   )
 }
 
-function OpenRobots() {
-  const robots = Object.values(useDesk((s) => s.robots))
+/** The diagrams that are open besides the one on the screen, and the robots. */
+function OpenDocuments() {
+  const documents = useStudio((s) => s.documents)
+  const here = useStudio((s) => s.document?.state.document)
+  const others = documents.filter(({ document }) => document !== here)
+  const diagrams = others.filter(({ kind }) => kind === 'diagram')
+  const robots = others.filter(({ kind }) => kind === 'robot')
   return (
     <>
+      {diagrams.length > 0 && <Menu.Label>Open now</Menu.Label>}
+      {diagrams.map((state) => (
+        <OpenItem key={state.document} state={state} close={(document) => ask({ kind: 'close', document })}>
+          {state.path ?? state.title}
+        </OpenItem>
+      ))}
       {robots.length > 0 && <Menu.Label>Open robots</Menu.Label>}
-      {robots.map(({ robot, name, path }) => (
-        <Menu.Item key={robot} onClick={() => void showRobot(robot)}>
-          {name} <span className="unit">{path ?? 'not saved'}</span>
-        </Menu.Item>
+      {robots.map((state) => (
+        <OpenItem key={state.document} state={state} close={closeRobot}>
+          {state.title} {state.path && <span className="unit">{state.path}</span>}
+        </OpenItem>
       ))}
     </>
+  )
+}
+
+function OpenItem({
+  state,
+  close,
+  children,
+}: {
+  state: DocumentState
+  close: (document: string) => Promise<unknown>
+  children: React.ReactNode
+}) {
+  return (
+    <Menu.Item
+      leftSection={state.kind === 'robot' ? <IconRobot size={15} /> : <IconPencil size={15} />}
+      rightSection={
+        state.dirty ? (
+          <Text size="xs" c="dimmed">
+            not saved
+          </Text>
+        ) : (
+          <IconX
+            size={14}
+            role="img"
+            aria-label={`Close ${state.title}`}
+            onClick={(event) => {
+              event.stopPropagation()
+              void close(state.document)
+            }}
+          />
+        )
+      }
+      onClick={() => void bringToFront(state)}
+    >
+      {children}
+    </Menu.Item>
   )
 }

@@ -5,16 +5,16 @@ interface Shown {
   document: string
   inside: string[]
   path: string | null
-  example: string
+  origin: string
 }
 
 const PLACE = 'armblocks-shown'
 
 /** Note what this tab shows; a document that has a file gives the address its name. */
-export function remember({ document, path, example }: DocumentState, inside: string[]): void {
+export function remember({ document, path, origin }: DocumentState, inside: string[]): void {
   const address = path ? `#${encodeURI(path)}` : ''
   if (location.hash !== address) history.replaceState(null, '', address || location.pathname)
-  const shown: Shown = { document, inside, path, example }
+  const shown: Shown = { document, inside, path, origin }
   sessionStorage.setItem(PLACE, JSON.stringify({ address, shown }))
 }
 

@@ -1,8 +1,7 @@
 import { Badge, Modal, NavLink, Stack, Text, TextInput } from '@mantine/core'
-import { IconFile, IconHistory, IconPencil } from '@tabler/icons-react'
+import { IconFile, IconHistory, IconPencil, IconRobot } from '@tabler/icons-react'
 import { useEffect, useState } from 'react'
-import type { Request } from '../messages'
-import { ask, useStudio } from '../store'
+import { ask, bringToFront, useStudio } from '../store'
 import { projectFiles, show, useDialogs } from '../dialogs'
 
 /** Open: what is open now, what was used last, and every file of the project folder. */
@@ -23,18 +22,18 @@ function Choice() {
   const [typed, setTyped] = useState('')
   useEffect(() => void projectFiles().then(setFound), [])
   const fits = (name: string) => name.toLowerCase().includes(typed.trim().toLowerCase())
-  const go = (request: Request) => {
+  const go = (open: () => Promise<unknown>) => {
     show(null)
-    void ask(request)
+    void open()
   }
   const open = documents.filter((entry) => entry.document !== here && fits(entry.path ?? entry.title))
   const recent = found?.recent.filter(fits) ?? []
   const files = found?.files.filter((file) => fits(file) && !recent.includes(file)) ?? []
-  const first: Request | undefined = open[0]
-    ? { kind: 'attach', document: open[0].document }
-    : (recent[0] ?? files[0]) !== undefined
-      ? { kind: 'open', path: recent[0] ?? files[0] }
-      : undefined
+  const openFirst = () => {
+    const path = recent[0] ?? files[0]
+    if (open[0]) go(() => bringToFront(open[0]!))
+    else if (path !== undefined) go(() => ask({ kind: 'open', path }))
+  }
 
   return (
     <Stack gap="xs">
@@ -45,7 +44,7 @@ function Choice() {
         value={typed}
         onChange={(event) => setTyped(event.currentTarget.value)}
         onKeyDown={(event) => {
-          if (event.key === 'Enter' && first) go(first)
+          if (event.key === 'Enter') openFirst()
         }}
       />
       <div className="files">
@@ -54,7 +53,7 @@ function Choice() {
             <NavLink
               key={entry.document}
               component="button"
-              leftSection={<IconPencil size={15} />}
+              leftSection={entry.kind === 'robot' ? <IconRobot size={15} /> : <IconPencil size={15} />}
               label={entry.path ?? entry.title}
               rightSection={
                 entry.dirty && (
@@ -63,7 +62,7 @@ function Choice() {
                   </Badge>
                 )
               }
-              onClick={() => go({ kind: 'attach', document: entry.document })}
+              onClick={() => go(() => bringToFront(entry))}
             />
           ))}
         </Part>
@@ -96,14 +95,14 @@ function FileLink({
 }: {
   icon: typeof IconFile
   path: string
-  go: (request: Request) => void
+  go: (open: () => Promise<unknown>) => void
 }) {
   return (
     <NavLink
       component="button"
       leftSection={<Icon size={15} />}
       label={path}
-      onClick={() => go({ kind: 'open', path })}
+      onClick={() => go(() => ask({ kind: 'open', path }))}
     />
   )
 }

@@ -38,7 +38,7 @@ export function RecoveryDialog() {
 
 function Offer({ recovery }: { recovery: Recovery }) {
   const [sure, setSure] = useState(false)
-  const { holds, document, title, path, began, last, edits, parts, disk, missing } = recovery
+  const { kind, document, title, path, began, last, edits, parts, disk, missing } = recovery
   const act = (action: 'open' | 'keep_both' | 'discard') => {
     if (action !== 'discard' && useStudio.getState().recoveries.length === 1) show(null)
     void ask({ kind: 'recover', document, action })
@@ -50,7 +50,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
           <Text fw={600}>{path ?? `${title}, never saved`}</Text>
           <Text size="sm">
             {counted(edits, 'edit')} from {when(began)} to {when(last)};{' '}
-            {counted(parts, holds === 'robot' ? 'link' : 'block')}
+            {counted(parts, kind === 'robot' ? 'link' : 'block')}
           </Text>
         </div>
         {disk !== 'same' && (
@@ -62,7 +62,7 @@ function Offer({ recovery }: { recovery: Recovery }) {
       {disk === 'changed' && (
         <Text size="sm" mt={6}>
           Somebody has written {path} since. Keep both saves the recovered{' '}
-          {holds === 'robot' ? 'robot' : 'drawing'} as a file of its own beside it.
+          {kind === 'robot' ? 'robot' : 'drawing'} as a file of its own beside it.
         </Text>
       )}
       {missing && (

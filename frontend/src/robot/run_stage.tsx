@@ -21,7 +21,7 @@ export default function RunStage({ document, inside, block, scene, rest, q }: Ru
   const drawing = useCallback(
     () =>
       ask({
-        kind: 'robot_picture',
+        kind: 'picture',
         document,
         inside,
         block,

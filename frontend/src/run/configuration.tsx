@@ -71,7 +71,7 @@ function solverChoices(solvers: SolverChoice[]) {
 
 function Form({ onClose }: { onClose: () => void }) {
   const document = useStudio((s) => s.document?.state.document ?? '')
-  const settings = useStudio((s) => s.document?.state.settings)
+  const settings = useStudio((s) => s.document?.settings)
   const welcome = useStudio((s) => s.welcome)
   const run = useStudio((s) => s.run)
   const [start] = useState(() =>

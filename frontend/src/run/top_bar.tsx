@@ -59,7 +59,7 @@ export function TopBar() {
           label="Arrange the blocks"
           icon={IconLayoutDistributeHorizontal}
           disabled={!known}
-          onClick={() => alter('arrange')}
+          onClick={() => void change({ kind: 'arrange' })}
         />
       </Group>
       <RunControls known={known} />
@@ -160,7 +160,7 @@ function Redo() {
 /** When the model stops, s: what is typed counts when the field is left. */
 function StopTime() {
   const known = useStudio((s) => s.document !== null)
-  const value = Number(useStudio((s) => s.document?.state.settings['stop_time']) ?? 10)
+  const value = Number(useStudio((s) => s.document?.settings['stop_time']) ?? 10)
   const written = `${value} s`
   return (
     <TextInput

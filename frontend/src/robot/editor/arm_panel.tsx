@@ -13,7 +13,7 @@ export default function ArmPanel() {
   const [scene, setScene] = useState<RobotScene | null>(null)
   const poses = useRef<Poses | undefined>(undefined)
   const moves = useRef(0)
-  const version = shown?.version
+  const version = shown?.state.version
 
   useEffect(() => {
     if (!current || version === undefined) return
@@ -30,7 +30,7 @@ export default function ArmPanel() {
         const q = useDesk.getState().joints[current]?.q
         if (!q) break
         try {
-          const found = await line.ask({ kind: 'robot_pose', robot: current, q })
+          const found = await line.ask({ kind: 'pose', document: current, q })
           if (!alive) break
           poses.current = listed(found)
           moves.current++
@@ -42,7 +42,7 @@ export default function ArmPanel() {
       under = false
     }
     void move()
-    void ask({ kind: 'robot_bodies', robot: current }).then((found) => {
+    void ask({ kind: 'scene', document: current }).then((found) => {
       if (alive && found) setScene(found)
     })
     const leave = useDesk.subscribe((now, before) => {
@@ -60,7 +60,7 @@ export default function ArmPanel() {
     const { joints } = useDesk.getState()
     const theme = document.documentElement.dataset['mantineColorScheme'] === 'dark' ? 'dark' : 'light'
     return current
-      ? ask({ kind: 'robot_picture', robot: current, q: joints[current]?.q ?? [], theme })
+      ? ask({ kind: 'picture', document: current, q: joints[current]?.q ?? [], theme })
       : undefined
   }, [current])
   if (!scene) return <p className="empty">Loading the robot …</p>

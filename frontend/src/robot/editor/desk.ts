@@ -1,12 +1,13 @@
 import { create } from 'zustand'
 import { Refusal } from '../../connection'
-import { newKey } from '../../keys'
-import type { EventOf } from '../../messages'
-import type { CellColumn, Opening, Readings, RobotTables } from '../../protocol'
-import { ask, author, line } from '../../store'
+import type { ChangeOf, ContentOf, Edit, EventOf } from '../../messages'
+import type { CellColumn, DocumentState, Readings, RobotContent, RobotTables } from '../../protocol'
+import { alteration, ask, line } from '../../store'
 
-export type RobotShown = EventOf<'robot'>
-export type RobotEdit = Extract<Parameters<typeof line.ask>[0], { kind: 'robot_change' }>['edit']
+/** A robot that this page shows or has shown, as the server says it is now. */
+export interface OpenRobot extends RobotContent {
+  state: DocumentState
+}
 export type Angles = 'deg' | 'rad'
 
 /** How the joints of a robot stand and move on the page: rad, m and per second. */
@@ -17,7 +18,8 @@ export interface Joints {
 }
 
 interface Desk {
-  robots: Record<string, RobotShown>
+  /** By the keys of their documents. */
+  robots: Record<string, OpenRobot>
   /** The robot in the editor; null while the diagram is on the screen. */
   current: string | null
   tables: RobotTables | null
@@ -26,8 +28,8 @@ interface Desk {
   /** The latest readings are of another form or configuration than the one on the screen. */
   reading: boolean
   angles: Angles
-  /** What was said about the file that was opened last. */
-  opening: Opening | null
+  /** What was said when the file was read that was opened last. */
+  notes: string[]
 }
 
 /** The robots that are open, and the one in the editor. */
@@ -39,74 +41,85 @@ export const useDesk = create<Desk>(() => ({
   readings: null,
   reading: false,
   angles: 'deg',
-  opening: null,
+  notes: [],
 }))
 
-/** A robot as the server says it is now. */
-export function robotShown(shown: RobotShown): void {
+function put(state: DocumentState, content: RobotContent): void {
   const { robots, joints } = useDesk.getState()
-  const moving = shown.links.filter(({ moves }) => moves)
-  const before = joints[shown.robot]
+  const robot = { ...content, state }
+  const moving = content.links.filter(({ moves }) => moves)
+  const before = joints[state.document]
   const fits = before && before.q.length === moving.length
   useDesk.setState({
-    robots: { ...robots, [shown.robot]: shown },
-    joints: fits ? joints : { ...joints, [shown.robot]: atRest(shown) },
+    robots: { ...robots, [state.document]: robot },
+    joints: fits ? joints : { ...joints, [state.document]: atRest(content) },
   })
-  if (useDesk.getState().current === shown.robot) readSoon()
+  if (useDesk.getState().current === state.document) readSoon()
 }
 
-/** A file was opened: its first robot comes to the screen. */
-export function robotOpened(opening: Opening): void {
-  const first = opening.robots[0]
-  if (!first) return
-  useDesk.setState({ current: first.robot, opening, readings: null })
+/** The page shows a robot from now on. */
+export function robotOpened(event: EventOf<'opened'>, content: ContentOf<'robot'>): void {
+  put(event.state, content)
+  if (event.in_front) toFront(event.state.document, event.notes)
+}
+
+/** A robot has changed. */
+export function robotChanged({ state }: EventOf<'changed'>, change: ChangeOf<'robot'>): void {
+  put(state, change.content)
+}
+
+/** Bring a robot that this page knows to the screen. */
+export function toFront(robot: string, notes: string[] = []): void {
+  useDesk.setState({ current: robot, notes, readings: null })
   if (!useDesk.getState().tables)
-    void ask({ kind: 'robot_form' }).then((tables) => tables && useDesk.setState({ tables }))
+    void ask({ kind: 'robot_tables' }).then((tables) => tables && useDesk.setState({ tables }))
   readSoon()
 }
 
 /** Back to the diagram. */
 export function leaveEditor(): void {
-  useDesk.setState({ current: null, opening: null })
+  useDesk.setState({ current: null, notes: [] })
 }
 
-/** Bring a robot that is open to the screen. */
-export async function showRobot(robot: string): Promise<void> {
-  const opening = await ask({ kind: 'robot_attach', robot })
-  if (opening) robotOpened(opening)
+/** Put a robot away that needs no saving. */
+export async function closeRobot(robot: string): Promise<void> {
+  if ((await ask({ kind: 'close', document: robot })) === undefined) return
+  const { [robot]: _, ...robots } = useDesk.getState().robots
+  useDesk.setState({ robots })
 }
 
 const PLACE = 'armblocks-robot'
-type Name = Pick<RobotShown, 'robot' | 'path' | 'shipped'>
+type Name = Pick<DocumentState, 'document' | 'path' | 'origin'>
 
 /** Note which robot this tab shows: by it the same comes back after a reload. */
 useDesk.subscribe(({ robots, current }, before) => {
   if (robots === before.robots && current === before.current) return
   const shown = current ? robots[current] : undefined
   if (!shown) return sessionStorage.removeItem(PLACE)
-  const { robot, path, shipped } = shown
-  sessionStorage.setItem(PLACE, JSON.stringify({ robot, path, shipped }))
+  const { document, path, origin } = shown.state
+  sessionStorage.setItem(PLACE, JSON.stringify({ document, path, origin }))
 })
 
 /**
  * After the line was broken, or a reload: the server opens again what this page has open, under the same
- * keys. Gives what the tab showed before it was loaded anew.
+ * keys. Gives the key of what the tab showed before it was loaded anew.
  */
-export async function attachAgain(): Promise<Opening | undefined> {
+export async function attachAgain(): Promise<string | undefined> {
   const { robots, current } = useDesk.getState()
   const last = current ? null : (JSON.parse(sessionStorage.getItem(PLACE) ?? 'null') as Name | null)
-  const attach = async ({ robot, path, shipped }: Name) => {
-    const opening = await ask({ kind: 'robot_attach', robot, path, shipped })
-    if (!opening && robot === current) leaveEditor()
-    return opening
+  const attach = async ({ document, path, origin }: Name) => {
+    const name = { document, document_kind: 'robot' as const, path, origin }
+    const found = await ask({ kind: 'attach', ...name, in_front: false })
+    if (found === undefined && document === current) leaveEditor()
+    return found
   }
-  await Promise.all(Object.values(robots).map(attach))
+  await Promise.all(Object.values(robots).map(({ state }) => attach(state)))
   return last ? attach(last) : undefined
 }
 
 /** All joints at zero, or as near to it as their ranges allow. */
-export function atRest(shown: RobotShown): Joints {
-  const moving = shown.links.filter(({ moves }) => moves)
+export function atRest({ links }: RobotContent): Joints {
+  const moving = links.filter(({ moves }) => moves)
   const zero = moving.map(() => 0)
   const q = moving.map(({ cells }) => {
     const [low, high] = [cells['lowest'], cells['highest']]
@@ -123,33 +136,17 @@ export function setJoints(change: Partial<Joints>): void {
 }
 
 /** Carry out an edit; the refusal where there was one. Refusals belong to the cell, not to the notices. */
-export async function edit(change: RobotEdit, gesture = ''): Promise<Refusal | undefined> {
-  const { current } = useDesk.getState()
-  if (!current) return undefined
+export async function edit(change: Edit, gesture = ''): Promise<Refusal | undefined> {
+  const { current, robots } = useDesk.getState()
+  const robot = current ? robots[current] : undefined
+  if (!robot) return undefined
   try {
-    await line.ask({ kind: 'robot_change', ...alteration(current), gesture, edit: change })
+    await line.ask({ kind: 'change', ...alteration(robot.state), gesture, edit: change })
     return undefined
   } catch (error) {
     if (error instanceof Refusal) return error
     throw error
   }
-}
-
-/** Take the last step back, or do it again. */
-export function alter(kind: 'robot_undo' | 'robot_redo', robot: string): void {
-  void ask({ kind, ...alteration(robot) })
-}
-
-/** Take what the file holds now, as one step that can be undone. */
-export function reload(robot: string): void {
-  void ask({ kind: 'robot_reload', ...alteration(robot) })
-}
-
-/**
- * What goes with everything that changes a robot: which, what of it this page saw, and a key to do it once.
- */
-function alteration(robot: string) {
-  return { robot, key: newKey(), base: useDesk.getState().robots[robot]?.version ?? null, author }
 }
 
 let wanted = false
@@ -171,7 +168,7 @@ async function readOn(): Promise<void> {
     const now = current && joints[current]
     if (!now) break
     try {
-      const readings = await line.ask({ kind: 'robot_read', robot: current, ...now })
+      const readings = await line.ask({ kind: 'readings', document: current, ...now })
       if (useDesk.getState().current === current) useDesk.setState({ readings })
     } catch (error) {
       // A joint came or went meanwhile: the next form asks again. What cannot be read shows nothing.

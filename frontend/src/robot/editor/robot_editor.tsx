@@ -21,8 +21,8 @@ import {
 import { DockviewReact, type DockviewReadyEvent, type IDockviewPanelHeaderProps } from 'dockview-react'
 import { lazy, Suspense, useEffect } from 'react'
 import { show } from '../../dialogs'
-import { ask, useStudio } from '../../store'
-import { alter, edit, leaveEditor, showRobot, useDesk, type RobotShown } from './desk'
+import { alter, ask, bringToFront, useStudio } from '../../store'
+import { edit, leaveEditor, useDesk, type OpenRobot } from './desk'
 import { JointsPanel } from './joints_panel'
 import { ReadingsPanel } from './readings_panel'
 import { RobotFields } from './robot_fields'
@@ -113,7 +113,7 @@ function Table({ which }: { which: 'kinematics' | 'dynamics' | 'robot' }) {
 export default function RobotEditor() {
   const scheme = useComputedColorScheme('light')
   const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
-  const key = shown?.robot
+  const key = shown?.state.document
   useEffect(() => {
     if (!key) return
     // On the document, so that the keys of the sheet and of its toolbar (on the window) do not hear them too.
@@ -123,8 +123,8 @@ export default function RobotEditor() {
       if (event.key === '?' && !(event.target instanceof HTMLInputElement)) show('keys')
       if (!(event.ctrlKey || event.metaKey)) return
       if (pressed === 's') saveRobot()
-      else if (pressed === 'z' && !event.shiftKey) undo(key)
-      else if (pressed === 'y' || (pressed === 'z' && event.shiftKey)) redo(key)
+      else if (pressed === 'z' && !event.shiftKey) undo()
+      else if (pressed === 'y' || (pressed === 'z' && event.shiftKey)) redo()
       else return
       event.preventDefault()
     }
@@ -154,19 +154,19 @@ function leaveCell(): void {
   if (document.activeElement instanceof HTMLElement) document.activeElement.blur()
 }
 
-function undo(robot: string): void {
+function take(step: 'undo' | 'redo'): void {
   leaveCell()
-  alter('robot_undo', robot)
+  const { current, robots } = useDesk.getState()
+  if (current) alter(step, robots[current]?.state)
 }
 
-function redo(robot: string): void {
-  leaveCell()
-  alter('robot_redo', robot)
-}
+const undo = () => take('undo')
+const redo = () => take('redo')
 
-function Bar({ shown }: { shown: RobotShown }) {
+function Bar({ shown }: { shown: OpenRobot }) {
   const angles = useDesk((s) => s.angles)
-  const others = useDesk((s) => s.robots)
+  const robots = useStudio((s) => s.documents).filter(({ kind }) => kind === 'robot')
+  const { state } = shown
   const model = useStudio((s) => s.document?.state.title)
   const last = shown.links.at(-1)!
   return (
@@ -190,13 +190,13 @@ function Bar({ shown }: { shown: RobotShown }) {
             aria-label={`Robot ${shown.name}: other robots`}
           >
             {shown.name}
-            {shown.dirty && <span aria-label="changed">&nbsp;•</span>}
+            {state.dirty && <span aria-label="changed">&nbsp;•</span>}
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
-          {Object.values(others).map(({ robot, name, path }) => (
-            <Menu.Item key={robot} onClick={() => void showRobot(robot)}>
-              {name} <span className="unit">{path ?? 'not saved'}</span>
+          {robots.map((robot) => (
+            <Menu.Item key={robot.document} onClick={() => void bringToFront(robot)}>
+              {robot.title} <span className="unit">{robot.path ?? 'not saved'}</span>
             </Menu.Item>
           ))}
           <Menu.Divider />
@@ -204,25 +204,25 @@ function Bar({ shown }: { shown: RobotShown }) {
         </Menu.Dropdown>
       </Menu>
       <Text size="xs" c="dimmed" className="file">
-        {shown.path ?? (shown.shipped ? `a copy of ${shown.shipped}` : 'not saved yet')}
+        {state.path ?? (state.origin ? `a copy of ${state.origin}` : 'not saved yet')}
       </Text>
       <Tool
-        label={shown.undo ? `Undo ${shown.undo} (Ctrl+Z)` : 'Nothing to undo'}
+        label={state.undo ? `Undo ${state.undo} (Ctrl+Z)` : 'Nothing to undo'}
         icon={IconArrowBackUp}
-        disabled={!shown.undo}
-        onClick={() => undo(shown.robot)}
+        disabled={!state.undo}
+        onClick={undo}
       />
       <Tool
-        label={shown.redo ? `Redo ${shown.redo} (Ctrl+Y)` : 'Nothing to redo'}
+        label={state.redo ? `Redo ${state.redo} (Ctrl+Y)` : 'Nothing to redo'}
         icon={IconArrowForwardUp}
-        disabled={!shown.redo}
-        onClick={() => redo(shown.robot)}
+        disabled={!state.redo}
+        onClick={redo}
       />
       <Tool label="Save (Ctrl+S)" icon={IconDeviceFloppy} onClick={() => saveRobot()} />
       <Tool
         label="Add a joint at the end"
         icon={IconPlus}
-        onClick={() => void edit({ kind: 'add', after: last.name })}
+        onClick={() => void edit({ kind: 'add_joint', after: last.name })}
       />
       <span className="spring" />
       <Findings shown={shown} />
@@ -266,10 +266,13 @@ export function RobotItems() {
   const robots = useStudio((s) => s.welcome?.robots) ?? []
   return (
     <>
-      <Menu.Item onClick={() => void ask({ kind: 'robot_open' })}>New robot</Menu.Item>
+      <Menu.Item onClick={() => void ask({ kind: 'new', document_kind: 'robot' })}>New robot</Menu.Item>
       <Menu.Label>Shipped robots</Menu.Label>
       {robots.map((shipped) => (
-        <Menu.Item key={shipped} onClick={() => void ask({ kind: 'robot_open', shipped })}>
+        <Menu.Item
+          key={shipped}
+          onClick={() => void ask({ kind: 'open_shipped', document_kind: 'robot', name: shipped })}
+        >
           {shipped}
         </Menu.Item>
       ))}
@@ -277,7 +280,7 @@ export function RobotItems() {
   )
 }
 
-function Findings({ shown }: { shown: RobotShown }) {
+function Findings({ shown }: { shown: OpenRobot }) {
   if (!shown.findings.length) return null
   const count = shown.findings.length
   return (
@@ -306,7 +309,7 @@ function Findings({ shown }: { shown: RobotShown }) {
 }
 
 /** Standard or modified rows: the same numbers read the other way, or the same arm written the other way. */
-function Convention({ shown }: { shown: RobotShown }) {
+function Convention({ shown }: { shown: OpenRobot }) {
   if (!shown.convention) return null
   const other = shown.convention === 'standard' ? 'modified' : 'standard'
   const change = (keep_arm: boolean) => void edit({ kind: 'convention', convention: other, keep_arm })
@@ -342,8 +345,8 @@ function Convention({ shown }: { shown: RobotShown }) {
 
 /** What was said while the file was read. */
 function Notes() {
-  const opening = useDesk((s) => s.opening)
-  if (!opening?.notes.length) return null
+  const notes = useDesk((s) => s.notes)
+  if (!notes.length) return null
   return (
     <Alert
       color="yellow"
@@ -351,10 +354,10 @@ function Notes() {
       p="xs"
       withCloseButton
       closeButtonLabel="Close the notes"
-      onClose={() => useDesk.setState({ opening: null })}
+      onClose={() => useDesk.setState({ notes: [] })}
       icon={<IconAlertTriangle size={16} />}
     >
-      {opening.notes.map((note) => (
+      {notes.map((note) => (
         <Text size="xs" key={note}>
           {note}
         </Text>

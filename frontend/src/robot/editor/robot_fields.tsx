@@ -1,9 +1,9 @@
 import type { CellColumn } from '../../protocol'
-import { unitOf, useDesk, type RobotShown } from './desk'
+import { unitOf, useDesk, type OpenRobot } from './desk'
 import { Cell } from './table'
 
 /** What there is once of a robot: its name, base, tool, gravity and friction. */
-export function RobotFields({ shown, columns }: { shown: RobotShown; columns: CellColumn[] }) {
+export function RobotFields({ shown, columns }: { shown: OpenRobot; columns: CellColumn[] }) {
   const angles = useDesk((s) => s.angles)
   const groups = [...new Set(columns.map(({ group }) => group))]
   return (

@@ -2,7 +2,7 @@ import { Button, Group, Modal, Stack, Text, TextInput } from '@mantine/core'
 import { create } from 'zustand'
 import { Refusal } from '../../connection'
 import { line, useStudio } from '../../store'
-import { useDesk, type RobotShown } from './desk'
+import { useDesk, type OpenRobot } from './desk'
 
 interface Saving {
   robot: string | null
@@ -17,26 +17,26 @@ export function saveRobot(): void {
   const { current, robots } = useDesk.getState()
   const shown = current ? robots[current] : undefined
   if (!shown) return
-  if (shown.path) void write(shown.robot, '', false)
+  if (shown.state.path) void write(shown.state.document, '', false)
   else saveRobotAs(shown)
 }
 
 /** Ask for a name, and save under that. */
-export function saveRobotAs({ robot, name, path }: Pick<RobotShown, 'robot' | 'name' | 'path'>): void {
+export function saveRobotAs({ name, state }: OpenRobot): void {
   useSaving.setState({
-    robot,
-    path: path ?? `${name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`,
+    robot: state.document,
+    path: state.path ?? `${name.trim().replace(/[^\w.-]+/g, '_') || 'robot'}.json`,
     refused: '',
   })
 }
 
 async function write(robot: string, path: string, overwrite: boolean): Promise<void> {
   try {
-    await line.ask({ kind: 'robot_save', robot, path, overwrite })
+    await line.ask({ kind: 'save', document: robot, path, overwrite })
     useSaving.setState({ robot: null })
   } catch (error) {
     if (!(error instanceof Refusal)) throw error
-    const now = path || useDesk.getState().robots[robot]?.path || ''
+    const now = path || useDesk.getState().robots[robot]?.state.path || ''
     useSaving.setState({ robot, path: now, refused: error.what })
   }
 }

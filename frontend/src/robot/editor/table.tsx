@@ -3,7 +3,7 @@ import { IconAlertTriangle, IconDotsVertical } from '@tabler/icons-react'
 import { memo, useRef, useState } from 'react'
 import { newKey } from '../../keys'
 import type { CellColumn, LinkRow, RobotFinding } from '../../protocol'
-import { cellText, edit, isAngle, unitOf, useDesk, type Angles, type RobotShown } from './desk'
+import { cellText, edit, isAngle, unitOf, useDesk, type Angles, type OpenRobot } from './desk'
 
 interface Fault {
   what: string
@@ -16,7 +16,7 @@ export function LinkTable({
   columns,
   actions,
 }: {
-  shown: RobotShown
+  shown: OpenRobot
   columns: CellColumn[]
   actions: boolean
 }) {
@@ -140,7 +140,7 @@ function NameCell({ link, findings }: { link: LinkRow; findings: RobotFinding[] 
       <TextCell
         label={`name of ${link.name}`}
         text={link.name}
-        send={(name) => edit({ kind: 'rename', link: link.name, name })}
+        send={(name) => edit({ kind: 'rename_link', link: link.name, name })}
         onlyAtTheEnd
       />
       {words && (
@@ -295,7 +295,7 @@ function TextCell({ label, text, doc, send, marked, wide, onlyAtTheEnd }: TextCe
   )
 }
 
-function RowMenu({ link, row, shown }: { link: LinkRow; row: number; shown: RobotShown }) {
+function RowMenu({ link, row, shown }: { link: LinkRow; row: number; shown: OpenRobot }) {
   return (
     <Menu position="bottom-end" shadow="md">
       <Menu.Target>
@@ -304,30 +304,30 @@ function RowMenu({ link, row, shown }: { link: LinkRow; row: number; shown: Robo
         </button>
       </Menu.Target>
       <Menu.Dropdown>
-        <Menu.Item onClick={() => void edit({ kind: 'add', after: link.name })}>
+        <Menu.Item onClick={() => void edit({ kind: 'add_joint', after: link.name })}>
           Insert a joint after it
         </Menu.Item>
         {row === 0 && (
-          <Menu.Item onClick={() => void edit({ kind: 'add', after: '' })}>
+          <Menu.Item onClick={() => void edit({ kind: 'add_joint', after: '' })}>
             Insert a joint before it
           </Menu.Item>
         )}
         <Menu.Item
           disabled={!shown.chain || row === 0}
-          onClick={() => void edit({ kind: 'move', link: link.name, by: -1 })}
+          onClick={() => void edit({ kind: 'move_joint', link: link.name, by: -1 })}
         >
           Move towards the base
         </Menu.Item>
         <Menu.Item
           disabled={!shown.chain || row === shown.links.length - 1}
-          onClick={() => void edit({ kind: 'move', link: link.name, by: 1 })}
+          onClick={() => void edit({ kind: 'move_joint', link: link.name, by: 1 })}
         >
           Move towards the tool
         </Menu.Item>
         <Menu.Item
           color="red"
           disabled={shown.links.length === 1}
-          onClick={() => void edit({ kind: 'remove', link: link.name })}
+          onClick={() => void edit({ kind: 'remove_joint', link: link.name })}
         >
           Remove the joint
         </Menu.Item>

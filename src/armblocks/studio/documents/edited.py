@@ -6,12 +6,13 @@ from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, ClassVar, Generic, NamedTuple
+from typing import ClassVar, Generic, NamedTuple
 
 from armblocks.errors import InputError
 from armblocks.studio.documents.aspects import Aspect, clash
 from armblocks.studio.documents.history import History, Value
-from armblocks.studio.protocol.alteration import Alteration
+from armblocks.studio.protocol.message import Edit, kind_of, messages_of
+from armblocks.studio.protocol.messages.documents import Alteration, Change, DocumentKind
 
 MOST_VERSIONS = 1000
 """Versions that are remembered to find out what an edit of an older one runs into."""
@@ -37,6 +38,9 @@ class Outcome(NamedTuple, Generic[Value]):
 class Edited(History[Value], ABC):
     """A value that several pages may edit; see :class:`~armblocks.studio.documents.history.History`."""
 
+    kind: ClassVar[DocumentKind]
+    edits: ClassVar[type[Edit]]
+    """The class of its edits."""
     noun: ClassVar[str]
     """What people call it: "drawing", "robot"."""
 
@@ -55,7 +59,8 @@ class Edited(History[Value], ABC):
         others = self._changed_by_others(request)
         self._author = request.author
         try:
-            if request.does == "change":
+            if isinstance(request, Change):
+                self._check_kind(request.edit)
                 title, after, gesture = self.outcome(request)
                 if others and clash(self.aspects(self.value, after), others):
                     raise self._overtaken("what you changed was changed in another page meanwhile")
@@ -70,7 +75,7 @@ class Edited(History[Value], ABC):
             self._author = ""
 
     @abstractmethod
-    def outcome(self, request: Any) -> Outcome[Value]:
+    def outcome(self, request: Change) -> Outcome[Value]:
         """What a change would do to the value as it is now; raises ``ArmblocksError`` where it cannot be."""
 
     @abstractmethod
@@ -80,6 +85,15 @@ class Edited(History[Value], ABC):
     @abstractmethod
     def written(self, value: Value, name: str) -> None:
         """The file of this name holds ``value``, which this is or was: it is the saved one."""
+
+    def _check_kind(self, edit: Edit) -> None:
+        if not isinstance(edit, self.edits):
+            raise InputError(
+                f"'{kind_of(type(edit))}' is no edit of a {self.noun}",
+                where=f"the {self.noun}",
+                allowed=", ".join(messages_of(self.edits)),
+                fix="load the page again: it may be of another version",
+            )
 
     def _changed_by_others(self, request: Alteration) -> set[Aspect]:
         """What pages other than the one that asks have changed since the version that it saw."""

@@ -28,17 +28,20 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from time import time
-from typing import Any, Generic
+from typing import Annotated, Any, Generic
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from armblocks.errors import ArmblocksError, FormatError
 from armblocks.studio.documents.file_kind import EditedT, FileKind
 from armblocks.studio.documents.journal import Journal, Record, read_journal
+from armblocks.studio.documents.older_journals import as_of_today
 from armblocks.studio.documents.project_folder import Fingerprint
-from armblocks.studio.protocol.alteration import Alteration
+from armblocks.studio.protocol.message import AnyOf
+from armblocks.studio.protocol.messages.documents import Alteration
 
 SNAPSHOT_EVERY = 200
+_ALTERATIONS: TypeAdapter[Alteration] = TypeAdapter(Annotated[Alteration, AnyOf()])
 
 
 @dataclass(kw_only=True)
@@ -113,7 +116,7 @@ class FileJournal:
             self.begin_from(after, number, request.key)
             return
         self._past, self._future = past, future
-        said = request.model_dump(mode="json", exclude={"document", "robot", "base"})
+        said = request.model_dump(mode="json", exclude={"document", "base"})
         self._journal.append({"perform": said, "does": does, "version": number, "at": _now()})
         self.since_snapshot += 1
 
@@ -260,7 +263,7 @@ class _Replay(Generic[EditedT]):
     def _step(self, record: Record) -> None:
         document = self._found.document
         if "perform" in record:
-            document.perform(self._kind.request(record["perform"]))
+            document.perform(_ALTERATIONS.validate_python({**as_of_today(record["perform"]), "document": ""}))
             return
         document.replace(record["title"], self._kind.from_text(record["replace"], "journal"))
 

@@ -6,13 +6,12 @@ All else is the same for every kind: journal, recovery, saving, what is noticed 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Generic, Literal, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from armblocks.studio.documents.edited import Edited
 from armblocks.studio.documents.history import Value
-from armblocks.studio.protocol.alteration import Alteration
+from armblocks.studio.protocol.messages.documents import DocumentKind
 
 EditedT = TypeVar("EditedT", bound=Edited[Any])
 
@@ -20,7 +19,7 @@ EditedT = TypeVar("EditedT", bound=Edited[Any])
 class FileKind(ABC, Generic[Value, EditedT]):
     """How one kind of file is begun, read and written. What reads raises ``ArmblocksError``."""
 
-    name: ClassVar[Literal["diagram", "robot"]]
+    name: ClassVar[DocumentKind]
     """Also the suffix of its journals."""
 
     @abstractmethod
@@ -54,10 +53,6 @@ class FileKind(ABC, Generic[Value, EditedT]):
     @abstractmethod
     def to_text(self, value: Value) -> str:
         """All of it, for the journal; this is what takes long, and may be done in another thread."""
-
-    @abstractmethod
-    def request(self, said: Mapping[str, Any]) -> Alteration:
-        """A request of a page as the journal has it; raises ``ValidationError``."""
 
     @abstractmethod
     def parts(self, value: Value) -> int:

@@ -75,7 +75,7 @@ class LeftBehind:
     def _offer(self, found: JournaledFile[Any]) -> say.Recovery:
         disk = self._folder.compared(found.path, found.on_disk)[0] if found.path else "same"
         return say.Recovery(
-            holds=self._kind.name,
+            kind=self._kind.name,
             document=found.key,
             title=found.document.value.name,
             path=found.path,
@@ -91,7 +91,7 @@ class LeftBehind:
         """What is told of a journal that cannot be read."""
         last = path.stat().st_mtime if path.exists() else 0.0
         return say.Recovery(
-            holds=self._kind.name,
+            kind=self._kind.name,
             document=key,
             title=key,
             path=None,

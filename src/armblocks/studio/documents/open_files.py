@@ -25,7 +25,6 @@ from armblocks.studio.documents.journal import SYNC_SECONDS
 from armblocks.studio.documents.left_behind import LeftBehind
 from armblocks.studio.documents.project_folder import Disk, Fingerprint, ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol.alteration import Alteration
 from armblocks.studio.protocol.messages import documents as say
 
 MOST_OPEN = 100
@@ -54,6 +53,23 @@ class OpenFile(Generic[EditedT]):
     syncing: asyncio.Task[None] | None = None
     snapshot: asyncio.Task[None] | None = None
     saving: asyncio.Lock = dataclasses.field(default_factory=asyncio.Lock)
+
+    def state(self) -> say.DocumentState:
+        """Where it stands, for pages."""
+        document = self.document
+        return say.DocumentState(
+            document=self.key,
+            kind=document.kind,
+            version=document.version,
+            title=document.value.name,
+            path=self.path,
+            origin=self.origin,
+            dirty=document.dirty,
+            undo=document.undo_title,
+            redo=document.redo_title,
+            disk=self.disk,
+            journaled=self.journaled,
+        )
 
     def leave(self) -> None:
         """It is put away: what would be done about it later is not."""
@@ -199,7 +215,7 @@ class OpenFiles(ABC, Generic[OpenedT]):
 
     # -- changing --------------------------------------------------------------------------------------------
 
-    def perform(self, found: OpenedT, request: Alteration) -> bool:
+    def perform(self, found: OpenedT, request: say.Alteration) -> bool:
         """Carry a request out, once; ``False`` where it was carried out before. Raises ``ArmblocksError``."""
         if request.key and request.key in found.seen:
             return False

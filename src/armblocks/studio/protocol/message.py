@@ -52,9 +52,9 @@ class Fault(Message):
 def reply_type(request: type[Request[Any]]) -> Any:
     """The type of the value in the reply to a request."""
     for base in request.__mro__:
-        metadata = base.__pydantic_generic_metadata__ if issubclass(base, Request) else None
-        if metadata and metadata["origin"] is Request:
-            return metadata["args"][0]
+        given = base.__pydantic_generic_metadata__["args"] if issubclass(base, Request) else ()
+        if given and not isinstance(given[0], TypeVar):
+            return given[0]
     raise TypeError(f"{request.__name__} does not say which reply it has")
 
 

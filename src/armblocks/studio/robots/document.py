@@ -8,7 +8,8 @@ from armblocks.errors import ArmblocksWarning
 from armblocks.robot import Link, Robot
 from armblocks.studio.documents.aspects import Aspect
 from armblocks.studio.documents.edited import Edited, Outcome
-from armblocks.studio.protocol.messages import robots as say
+from armblocks.studio.protocol.messages.documents import Change
+from armblocks.studio.protocol.messages.robot_edits import RobotEdit
 from armblocks.studio.robots.columns import ROBOT_COLUMNS
 from armblocks.studio.robots.edits import ROBOT_EDITS
 from armblocks.studio.robots.link_columns import LINK_COLUMNS
@@ -17,9 +18,11 @@ from armblocks.studio.robots.link_columns import LINK_COLUMNS
 class RobotDocument(Edited[Robot]):
     """One open robot; see :class:`~armblocks.studio.documents.edited.Edited`."""
 
+    kind = "robot"
+    edits = RobotEdit
     noun = "robot"
 
-    def outcome(self, request: say.RobotChange) -> Outcome[Robot]:
+    def outcome(self, request: Change) -> Outcome[Robot]:
         """What the step is called, the robot after it, and the cell that is being typed into."""
         with warnings.catch_warnings():  # what it warns of stands among the findings
             warnings.simplefilter("ignore", ArmblocksWarning)

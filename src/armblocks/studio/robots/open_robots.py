@@ -10,10 +10,8 @@ from armblocks.robot import Robot
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.document import RobotDocument
 from armblocks.studio.robots.robot_kind import RobotKind
-from armblocks.studio.robots.tables import robot_shown
 
 
 @dataclasses.dataclass(eq=False, kw_only=True)
@@ -36,18 +34,6 @@ class OpenRobot(OpenFile[RobotDocument]):
         if self._arm is None or self._arm.robot is not self.robot:
             self._arm = Arm(self.robot)
         return self._arm
-
-    def shown(self) -> say.RobotShown:
-        """How it stands, for pages."""
-        return robot_shown(
-            self.key,
-            self.document,
-            self.path,
-            self.origin,
-            self.notes,
-            disk=self.disk,
-            journaled=self.journaled,
-        )
 
 
 class OpenRobots(OpenFiles[OpenRobot]):

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-from pydantic import TypeAdapter
 
 from armblocks import formats
 from armblocks.errors import ArmblocksWarning
 from armblocks.robot import Robot, standard_dh
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.document import RobotDocument
-
-RobotPerformed = say.RobotChange | say.RobotUndo | say.RobotRedo
-_PERFORMED: TypeAdapter[RobotPerformed] = TypeAdapter(RobotPerformed)
 
 
 class RobotKind(FileKind[Robot, RobotDocument]):
@@ -67,10 +59,6 @@ class RobotKind(FileKind[Robot, RobotDocument]):
     def to_text(self, value: Robot) -> str:
         """The canonical document."""
         return formats.write_robot(value).decode()
-
-    def request(self, said: Mapping[str, Any]) -> RobotPerformed:
-        """What a page asked of the robot."""
-        return _PERFORMED.validate_python({**said, "robot": ""})
 
     def parts(self, value: Robot) -> int:
         """Links."""

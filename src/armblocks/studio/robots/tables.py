@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from armblocks.robot import DhConvention, Link, Robot, doubts, inertia_findings, serial_chain
-from armblocks.studio.documents.history import History
-from armblocks.studio.documents.project_folder import Disk
 from armblocks.studio.protocol.messages import robots as say
 from armblocks.studio.robots.columns import ROBOT, ROBOT_COLUMNS, Column, Owner
 from armblocks.studio.robots.link_columns import (
@@ -28,28 +25,9 @@ def robot_tables() -> say.RobotTables:
     )
 
 
-def robot_shown(
-    key: str,
-    history: History[Robot],
-    path: str | None,
-    shipped: str,
-    notes: Sequence[str],
-    *,
-    disk: Disk = "same",
-    journaled: bool = True,
-) -> say.RobotShown:
-    """An open robot as a page shows it."""
-    robot = history.value
-    return say.RobotShown(
-        robot=key,
-        version=history.version,
-        path=path,
-        shipped=shipped,
-        dirty=history.dirty,
-        disk=disk,
-        journaled=journaled,
-        undo=history.undo_title,
-        redo=history.redo_title,
+def robot_content(robot: Robot) -> say.RobotContent:
+    """A robot as a page shows it."""
+    return say.RobotContent(
         name=robot.name,
         convention=_convention(robot),
         chain=robot.links == serial_chain(robot.links),
@@ -61,7 +39,6 @@ def robot_shown(
             *_weightless(robot),
             *_doubts(robot),
         ],
-        notes=list(notes),
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Callable
 
 from armblocks import formats
 from armblocks.errors import InputError, UnknownNameError
@@ -17,7 +16,7 @@ from armblocks.studio.runs.process import RunProcess
 from armblocks.studio.runs.record import RunRecord
 from armblocks.studio.runs.report import report_of
 from armblocks.studio.runs.workers import Workers
-from armblocks.studio.sheet.open_documents import OpenDocument
+from armblocks.studio.sheet.open_documents import OpenDocuments
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 
 PAGE_SECONDS = 1.5
@@ -31,14 +30,14 @@ class RunDesk:
         self,
         folder: ProjectFolder,
         pages: Pages,
-        drawing: Callable[[str], OpenDocument],
+        diagrams: OpenDocuments,
         resolve_robot: ResolveRobot,
     ) -> None:
         self.processes: dict[str, RunProcess] = {}
         self.workers = Workers()
         self._folder = folder
         self._pages = pages
-        self._drawing = drawing
+        self._diagrams = diagrams
         self._resolve_robot = resolve_robot
         self._records: dict[str, RunRecord] = {}
         self._telling: set[asyncio.Task[None]] = set()
@@ -61,7 +60,7 @@ class RunDesk:
 
     async def report(self, document: str) -> bytes:
         """The report of the last run of a diagram as an HTML page; raises ``ArmblocksError``."""
-        key = self._drawing(document).key
+        key = self._diagrams[document].key
         jobs = [run.job for run in self.processes.values() if run.document == key]
         if not jobs:
             raise InputError("there is no run to report", where="report", fix="run the model first")
@@ -80,7 +79,7 @@ class RunDesk:
     # -- requests --------------------------------------------------------------------------------------------
 
     async def _run(self, _: Page, request: say.Run) -> str:
-        found = self._drawing(request.document)
+        found = self._diagrams[request.document]
         key, record = secrets.token_hex(8), RunRecord()
 
         async def tell(event: Message | bytes) -> None:

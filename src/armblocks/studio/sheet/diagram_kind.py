@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-from pydantic import TypeAdapter
 
 from armblocks import formats
 from armblocks.blocks import BLOCKS
@@ -15,13 +11,9 @@ from armblocks.diagram import Diagram
 from armblocks.errors import UnknownNameError
 from armblocks.studio.documents.file_kind import FileKind
 from armblocks.studio.documents.project_folder import ProjectFolder
-from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.parameter_values import ResolveRobot
 from armblocks.studio.sheet.placing import placed
-
-Performed = say.Change | say.Undo | say.Redo | say.ArrangeBlocks
-_PERFORMED: TypeAdapter[Performed] = TypeAdapter(Performed)
 
 
 class DiagramKind(FileKind[Diagram, Document]):
@@ -88,10 +80,6 @@ class DiagramKind(FileKind[Diagram, Document]):
     def to_text(self, value: Diagram) -> str:
         """The canonical document."""
         return formats.diagram_to_bytes(value, self._resolve_robot, folder=self._folder.root).decode()
-
-    def request(self, said: Mapping[str, Any]) -> Performed:
-        """What a page asked of the drawing."""
-        return _PERFORMED.validate_python({**said, "document": ""})
 
     def parts(self, value: Diagram) -> int:
         """Blocks of the top sheet."""

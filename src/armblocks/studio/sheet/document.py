@@ -8,18 +8,19 @@ from dataclasses import replace
 from armblocks.diagram import Diagram
 from armblocks.studio.documents.aspects import Aspect, changed_aspects
 from armblocks.studio.documents.edited import Edited, Outcome
-from armblocks.studio.protocol.messages import documents as say
+from armblocks.studio.protocol.messages.documents import Change
 from armblocks.studio.protocol.messages.sheet_edits import DiagramEdit, ModelEdit
-from armblocks.studio.sheet.clipping import ReadDiagram
-from armblocks.studio.sheet.edits import EDITS, applied
+from armblocks.studio.sheet.clipping import ReadDiagram, reader
+from armblocks.studio.sheet.edits import EDITS, EditContext
 from armblocks.studio.sheet.nesting import check_own, inside, with_inside
 from armblocks.studio.sheet.parameter_values import ResolveRobot
-from armblocks.studio.sheet.placing import arranged
 
 
 class Document(Edited[Diagram]):
     """One open diagram; see :class:`~armblocks.studio.documents.edited.Edited`."""
 
+    kind = "diagram"
+    edits = DiagramEdit
     noun = "drawing"
 
     def __init__(
@@ -31,8 +32,7 @@ class Document(Edited[Diagram]):
         read_diagram: ReadDiagram | None = None,
     ) -> None:
         super().__init__(diagram, version=version)
-        self._resolve_robot = resolve_robot
-        self._read_diagram = read_diagram
+        self._context = EditContext(resolve_robot, read_diagram or reader(resolve_robot))
 
     @property
     def diagram(self) -> Diagram:
@@ -46,7 +46,7 @@ class Document(Edited[Diagram]):
         :func:`~armblocks.studio.sheet.nesting.inside` raise, and ``DiagramError`` for a sheet of a library;
         nothing is then changed.
         """
-        self.perform(say.Change(document="", inside=list(path), edit=edit))
+        self.perform(Change(document="", inside=list(path), edit=edit))
 
     def written(self, value: Diagram, name: str) -> None:
         """The file of this name holds ``value``, which this drawing is or was: it is the saved one.
@@ -57,21 +57,14 @@ class Document(Edited[Diagram]):
         if value.name != name:
             self.rewrite(lambda given: replace(given, name=name))
 
-    def outcome(self, request: say.Change | say.ArrangeBlocks) -> Outcome[Diagram]:
+    def outcome(self, request: Change) -> Outcome[Diagram]:
         """What the step is called, and the diagram after it."""
-        if isinstance(request, say.Change) and isinstance(request.edit, ModelEdit):
-            return Outcome(EDITS.title(request.edit), self._applied(request.edit, self.diagram))
+        edit, title = request.edit, EDITS.title(request.edit)
+        if isinstance(edit, ModelEdit):
+            return Outcome(title, EDITS.applied(edit, self.diagram, self._context), request.gesture)
         check_own(self.diagram, request.inside)
-        sheet = inside(self.diagram, request.inside)
-        if isinstance(request, say.Change):
-            title = EDITS.title(request.edit)
-            after = self._applied(request.edit, sheet)
-        else:
-            title, after = "arrange", arranged(sheet)
-        return Outcome(title, with_inside(self.diagram, request.inside, after))
-
-    def _applied(self, edit: DiagramEdit, sheet: Diagram) -> Diagram:
-        return applied(edit, sheet, self._resolve_robot, self._read_diagram)
+        after = EDITS.applied(edit, inside(self.diagram, request.inside), self._context)
+        return Outcome(title, with_inside(self.diagram, request.inside, after), request.gesture)
 
     def aspects(self, before: Diagram, after: Diagram) -> set[Aspect]:
         """All that is different between two diagrams."""

@@ -34,6 +34,7 @@ from armblocks.errors import DiagramError, UnknownNameError
 from armblocks.studio.documents.edit_table import EditTable
 from armblocks.studio.protocol.messages.sheet_edits import (
     AddBlocks,
+    ArrangeBlocks,
     BendWires,
     BreakLink,
     Connect,
@@ -59,7 +60,7 @@ from armblocks.studio.sheet.clipping import ReadDiagram, pasted, reader
 from armblocks.studio.sheet.mask_edits import with_mask
 from armblocks.studio.sheet.nesting import check_free, grouped, unlinked, with_block
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_value, tuned_value
-from armblocks.studio.sheet.placing import placed
+from armblocks.studio.sheet.placing import arranged, placed
 from armblocks.studio.sheet.typed_settings import with_settings
 
 DEFAULT_ROBOT = "puma560"
@@ -345,6 +346,11 @@ def _set_parameters(edit: SetParameters, diagram: Diagram, context: EditContext)
         values[name] = parameter_value(rules[name], value, where, context.resolve_robot, diagram.mask_values)
     changed = block_in_scope(edit.block, old.with_parameters(**values), diagram.mask_values)
     return with_block(diagram, edit.block, changed)
+
+
+@EDITS.on(ArrangeBlocks, lambda edit: "arrange")
+def _arrange(edit: ArrangeBlocks, diagram: Diagram, _: EditContext) -> Diagram:
+    return arranged(diagram)
 
 
 @EDITS.on(GroupBlocks, lambda edit: f"group {_counted(edit.blocks, 'block')}")

@@ -9,7 +9,6 @@ from pathlib import PurePath
 from armblocks.studio.documents.open_files import OpenFile, OpenFiles
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.documents.state_folder import StateFolder
-from armblocks.studio.protocol.messages import documents as say
 from armblocks.studio.sheet.diagram_kind import DiagramKind
 from armblocks.studio.sheet.document import Document
 from armblocks.studio.sheet.parameter_values import ResolveRobot
@@ -26,23 +25,6 @@ class OpenDocument(OpenFile[Document]):
         super().leave()
         if self.checking is not None:
             self.checking.cancel()
-
-    def state(self) -> say.DocumentState:
-        """Where it stands, for pages."""
-        document = self.document
-        return say.DocumentState(
-            document=self.key,
-            version=document.version,
-            title=document.diagram.name,
-            path=self.path,
-            example=self.origin,
-            dirty=document.dirty,
-            undo=document.undo_title,
-            redo=document.redo_title,
-            disk=self.disk,
-            journaled=self.journaled,
-            settings=dataclasses.asdict(document.diagram.settings),
-        )
 
 
 class OpenDocuments(OpenFiles[OpenDocument]):

@@ -1,8 +1,8 @@
-"""Questions about the sheets of open diagrams that change nothing."""
+"""Requests about the sheets of open diagrams that change nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from armblocks.blocks import BLOCKS
@@ -10,6 +10,7 @@ from armblocks.diagram import Diagram, ParameterFormula
 from armblocks.diagram.mask import formula_value
 from armblocks.diagram.parameter import Value
 from armblocks.errors import UnknownNameError
+from armblocks.studio.documents.desk import DocumentDesk
 from armblocks.studio.documents.project_folder import ProjectFolder
 from armblocks.studio.protocol.answers import Answers
 from armblocks.studio.protocol.messages import sheets as say
@@ -18,7 +19,7 @@ from armblocks.studio.protocol.page import Page
 from armblocks.studio.sheet.clipping import clipped
 from armblocks.studio.sheet.mask_edits import mask_of
 from armblocks.studio.sheet.nesting import inside
-from armblocks.studio.sheet.open_documents import OpenDocument
+from armblocks.studio.sheet.open_documents import OpenDocuments
 from armblocks.studio.sheet.outline import find, outline
 from armblocks.studio.sheet.parameter_values import ResolveRobot, parameter_json, parameter_value
 from armblocks.studio.sheet.typed_settings import setting_faults
@@ -28,14 +29,20 @@ class SheetQueries:
     """Answers what front ends ask about diagrams."""
 
     def __init__(
-        self, folder: ProjectFolder, drawing: Callable[[str], OpenDocument], resolve_robot: ResolveRobot
+        self,
+        folder: ProjectFolder,
+        documents: DocumentDesk,
+        diagrams: OpenDocuments,
+        resolve_robot: ResolveRobot,
     ) -> None:
         self._folder = folder
-        self._drawing = drawing
+        self._documents = documents
+        self._diagrams = diagrams
         self._resolve_robot = resolve_robot
 
     def register(self, answers: Answers) -> None:
         """Register what answers these requests."""
+        answers.on(say.Look, self._look)
         answers.on(say.AskOutline, self._outline)
         answers.on(say.AskMask, self._mask)
         answers.on(say.Copy, self._copy)
@@ -44,7 +51,10 @@ class SheetQueries:
         answers.on(say.TypedSettings, self._typed_settings)
 
     def _sheet(self, document: str, path: Sequence[str] = ()) -> Diagram:
-        return inside(self._drawing(document).document.diagram, path)
+        return inside(self._diagrams[document].document.diagram, path)
+
+    async def _look(self, page: Page, request: say.Look) -> None:
+        await self._documents.show(page, self._diagrams[request.document], tuple(request.inside))
 
     async def _outline(self, _: Page, request: say.AskOutline) -> say.Outline:
         return outline(self._sheet(request.document))

@@ -27,7 +27,7 @@ class SetCell(RobotEdit):
 class RenameLink(RobotEdit):
     """Give a link another name."""
 
-    kind: Literal["rename"] = "rename"
+    kind: Literal["rename_link"] = "rename_link"
     link: str
     name: str = Field(max_length=200)
 
@@ -35,21 +35,21 @@ class RenameLink(RobotEdit):
 class AddJoint(RobotEdit):
     """Put a new link behind another one, or at the base where ``after`` is empty."""
 
-    kind: Literal["add"] = "add"
+    kind: Literal["add_joint"] = "add_joint"
     after: str
 
 
 class RemoveJoint(RobotEdit):
     """Take a link out; what hangs on it hangs on its parent then."""
 
-    kind: Literal["remove"] = "remove"
+    kind: Literal["remove_joint"] = "remove_joint"
     link: str
 
 
 class MoveJoint(RobotEdit):
     """Let a link of a chain change places with its neighbour."""
 
-    kind: Literal["move"] = "move"
+    kind: Literal["move_joint"] = "move_joint"
     link: str
     by: Literal[-1, 1]
 

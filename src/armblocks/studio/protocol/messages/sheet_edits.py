@@ -173,6 +173,12 @@ class SetMask(DiagramEdit):
     parameters: Annotated[list[MaskParameter], Field(max_length=200)]
 
 
+class ArrangeBlocks(DiagramEdit):
+    """Lay the blocks of a sheet out anew, from left to right."""
+
+    kind: Literal["arrange"] = "arrange"
+
+
 class LogSignal(DiagramEdit):
     """Log an output ``block/port``, so that it is seen without a Scope; or log it no longer."""
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from armblocks.studio.protocol.message import Event, Message, Request
+from armblocks.studio.protocol.messages.documents import Content, ContentChange
 from armblocks.studio.protocol.messages.sheet_edits import Place, SetMask, SheetNote, Wire
 
 
@@ -139,6 +140,36 @@ class BlockType(Message):
     outputs: list[str]
     """Ports that it has with the default parameters."""
     parameters: list[ParameterRule]
+
+
+class DiagramContent(Content):
+    """The sheet of a diagram that a page looks at, and how the diagram is run.
+
+    ``inside``: names of the subsystems on the way to the sheet. ``settings`` go by the names of
+    ``SimulationOptions``. ``run``: the key of the run that the server has of the diagram.
+    """
+
+    kind: Literal["diagram"] = "diagram"
+    inside: list[str]
+    sheet: Sheet
+    settings: dict[str, float | str | None]
+    run: str | None
+
+
+class DiagramChange(ContentChange):
+    """What changed on the sheet that a page looks at, and the settings of the diagram."""
+
+    kind: Literal["diagram"] = "diagram"
+    sheet: SheetChange
+    settings: dict[str, float | str | None]
+
+
+class Look(Request[None]):
+    """Look at the sheet inside a subsystem; the empty path is the whole model."""
+
+    kind: Literal["look"] = "look"
+    document: str
+    inside: list[str]
 
 
 class AskOutline(Request[Outline]):

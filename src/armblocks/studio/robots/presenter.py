@@ -1,0 +1,91 @@
+"""How robots are opened and shown: whole, with what was said when their file was read."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from typing import TypeVar
+
+from armblocks import formats
+from armblocks.errors import ArmblocksWarning, FormatError
+from armblocks.robot import Robot
+from armblocks.studio.documents.presenter import Opening, Place, Presenter
+from armblocks.studio.documents.project_folder import ProjectFolder
+from armblocks.studio.protocol.messages.robots import RobotChange, RobotContent
+from armblocks.studio.robots.open_robots import OpenRobot, OpenRobots
+from armblocks.studio.robots.tables import robot_content
+
+Result = TypeVar("Result")
+
+
+class RobotPresenter(Presenter[OpenRobot]):
+    """Shows pages the tables of robots. ``robot_saved`` is called with a robot whose file was written."""
+
+    def __init__(
+        self,
+        files: OpenRobots,
+        folder: ProjectFolder,
+        robot_saved: Callable[[Robot], Awaitable[None]],
+    ) -> None:
+        super().__init__(files)
+        self._folder = folder
+        self._robot_saved = robot_saved
+
+    def open_file(self, path: str) -> Opening[OpenRobot]:
+        """The robot of a file, or the robots of a script: these are saved as files of the studio."""
+        if path.lower().endswith(".json"):
+            found, notes = _noted(lambda: self.files.open_path(path))
+            found.notes = notes or found.notes
+            return Opening([found], found.notes)
+        robots, notes = _read(self._folder.read(path), path)
+        source = str(self._folder.path(path))
+        return self._brought((dataclasses.replace(robot, source=source) for robot in robots.values()), notes)
+
+    def dropped(self, data: bytes, name: str) -> Opening[OpenRobot]:
+        """The robots of a file or a script from elsewhere."""
+        robots, notes = _read(data, name)
+        return self._brought(robots.values(), notes)
+
+    def content(self, found: OpenRobot, place: Place) -> RobotContent:
+        """The tables of a robot."""
+        return robot_content(found.robot)
+
+    def change(self, found: OpenRobot, before: Robot, place: Place) -> RobotChange:
+        """All of the robot."""
+        return RobotChange(content=robot_content(found.robot))
+
+    async def saved(self, found: OpenRobot) -> None:
+        """Diagrams that use the robot take its new form."""
+        if found.path is not None:
+            source = str(self._folder.path(found.path))
+            await self._robot_saved(dataclasses.replace(found.robot, source=source))
+
+    def _brought(self, robots: Iterable[Robot], notes: tuple[str, ...]) -> Opening[OpenRobot]:
+        """Robots that have no file."""
+        opened = [self.files.bring(robot) for robot in robots]
+        for found in opened:
+            found.notes = notes
+        return Opening(opened, notes)
+
+
+def _read(data: bytes, name: str) -> tuple[Mapping[str, Robot], tuple[str, ...]]:
+    """The robots of a file, and what was said while it was read."""
+    robots, notes = _noted(lambda: formats.read_robots(data, name))
+    if not robots:
+        raise FormatError(
+            "the file defines no robot",
+            where=name,
+            allowed="kuka = robot(L, …) or SerialLink(L, …)",
+            fix="let the script make a robot, or choose another file",
+        )
+    return robots, notes
+
+
+def _noted(read: Callable[[], Result]) -> tuple[Result, tuple[str, ...]]:
+    """What is read, and what was warned of meanwhile."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ArmblocksWarning)
+        result = read()
+    said = [str(one.message) for one in caught if issubclass(one.category, ArmblocksWarning)]
+    return result, tuple(dict.fromkeys(said))
