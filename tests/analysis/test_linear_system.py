@@ -353,7 +353,7 @@ def test_what_does_not_fit_is_refused() -> None:
         system.bandwidth()
     with pytest.raises(InputError, match="the gain at rest is inf"):
         transfer([1.0], [1.0, 0.0]).bandwidth()
-    with pytest.raises(InputError, match="gramians of a system that is not stable"):
+    with pytest.raises(InputError, match="is not stable and has no gramians"):
         transfer([1.0], [1.0, 0.0]).gramians()
     with pytest.raises(InputError, match="the stop time is -1"):
         system.step_response(-1.0)
@@ -361,7 +361,7 @@ def test_what_does_not_fit_is_refused() -> None:
 
 def test_connections_that_do_not_fit_are_refused() -> None:
     system, square = random_system(0), random_system(0, 3, 2, 2)
-    with pytest.raises(InputError, match=r"systems with the sample times 0 s and 0.1 s are put together"):
+    with pytest.raises(InputError, match=r"systems with the sample times 0 s and 0.1 s are connected"):
         _ = random_system(0, dt=0.1) @ system
     with pytest.raises(InputError, match=r"a series does not fit: 3 into 2.*Allowed: equal widths"):
         _ = system @ system
@@ -369,9 +369,9 @@ def test_connections_that_do_not_fit_are_refused() -> None:
         _ = system + square
     with pytest.raises(InputError, match=r"does not fit.*as many outputs as inputs"):
         system.feedback()
-    with pytest.raises(InputError, match="the way back has shape"):
+    with pytest.raises(InputError, match="the feedback path has shape"):
         square.feedback(system)
-    with pytest.raises(InputError, match="the loop of direct ways is singular"):
+    with pytest.raises(InputError, match="the direct-feedthrough loop is singular"):
         LinearSystem(square.A, square.B, square.C, -np.eye(2)).feedback()
 
 

@@ -191,7 +191,7 @@ def test_what_fails_says_where_and_keeps_the_good_part() -> None:
 def test_what_has_no_equations_has_no_slopes() -> None:
     diagram = loop(CalledPythonFunction(function=bang, sample_time=T))
     with pytest.raises(
-        InputError, match=r"block 'controller' calls Python, which has no derivatives[\s\S]*traced"
+        InputError, match=r"block 'controller' calls Python, which has no derivatives[\s\S]*traceable"
     ):
         ab.linearize(diagram, inputs="half.gain", outputs="plant")
     with pytest.raises(InputError, match=r"block 'controller' calls Python, which has no derivatives"):

@@ -137,3 +137,11 @@ def test_an_unknown_operation_is_named() -> None:
     function = traced(lambda x: casadi.erfinv(x), 1, name="probit")
     with pytest.raises(CompileError, match=r"probit: the equations use the operation OP_ERFINV"):
         compile_function(function)
+
+
+def test_a_call_of_another_function_is_named() -> None:
+    x = SX.sym("x")
+    square = casadi.Function("square", [x], [x * x], {"never_inline": True})
+    function = traced(lambda x: square.call([x], False, True)[0], 1, name="outer")
+    with pytest.raises(CompileError, match=r"outer: the equations call the function square"):
+        compile_function(function)

@@ -149,7 +149,7 @@ def test_the_effort_is_limited_by_the_environment(monkeypatch: pytest.MonkeyPatc
         assert made == [Effort[given], Effort.LITTLE]
         made.clear()
     monkeypatch.setenv("ARMBLOCKS_EFFORT", "much")
-    with pytest.raises(InputError, match=r"'much' is no effort.*'little', 'full'.*remove the variable"):
+    with pytest.raises(InputError, match=r"'much' is not a valid.*'little', 'full'.*remove the variable"):
         load_code(("empty",), lambda: "")
 
 

@@ -78,5 +78,5 @@ def test_a_table_that_is_worked_out_is_refused() -> None:
         Signature((Slot("entry", ()),)),
         equations,
     )
-    with pytest.raises(CompileError, match=r"a table is read that is no parameter.*give the numbers"):
+    with pytest.raises(CompileError, match=r"a table that is not a parameter.*give the numbers"):
         compile_function(function)

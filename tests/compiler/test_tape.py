@@ -111,7 +111,7 @@ def test_bytes_and_digest_identify_a_tape() -> None:
 
 @pytest.mark.parametrize("cut", [0, 10, 60, -8, -1])
 def test_damaged_bytes_are_refused(cut: int) -> None:
-    with pytest.raises(CompileError, match=r"these bytes are no tape.*what Tape\.to_bytes gave"):
+    with pytest.raises(CompileError, match=r"these bytes are not a tape.*what Tape\.to_bytes gave"):
         Tape.from_bytes(tape_from(mixed()).to_bytes()[:cut])
 
 

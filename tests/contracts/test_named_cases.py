@@ -121,7 +121,7 @@ DIAGRAMS: list[tuple[str, Callable[[ab.DiagramBuilder], None], str]] = [
     ("a name of 10 000 characters", named("a" * 10_000), "has 10000 characters"),
     ("an empty name", named(" "), "a block has an empty name"),
     ("a formula that is code", code, "is not a formula"),
-    ("subsystems without end", deep, "subsystems are more than 100 deep"),
+    ("subsystems without end", deep, "subsystems are nested more than 100 levels deep"),
     ("more blocks than there are", doubled_forever, f"Allowed: at most {MOST_BLOCKS}"),
 ]
 
@@ -230,7 +230,7 @@ def test_a_motor_without_a_gear_has_the_ratio_1() -> None:
 
 
 def test_negative_viscous_friction_is_warned_of_as_a_source_of_energy() -> None:
-    with pytest.warns(ArmblocksWarning, match="friction drives the joint instead of holding it"):
+    with pytest.warns(ArmblocksWarning, match="friction accelerates the joint instead of braking"):
         arm(motor=Motor(viscous_friction=-0.1))
 
 

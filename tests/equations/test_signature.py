@@ -43,7 +43,7 @@ def test_symbols_lie_row_by_row_as_numpy_does(shape: tuple[int, ...]) -> None:
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(InputError, match=r"the name 'q' stands twice in one signature"):
+    with pytest.raises(InputError, match=r"the name 'q' occurs twice in one signature"):
         Signature((Slot("q"), Slot("q")))
     with pytest.raises(InputError, match=r"no value is given for 'q'. Allowed: t, q"):
         LAYOUT.pack({"t": 0.0})

@@ -85,7 +85,7 @@ def test_what_is_no_chain_of_rows_is_refused() -> None:
     tree = replace(robot, links=(*robot.links, standard_dh("finger", parent="link2")))
     loose = replace(robot, links=(*robot.links, Link(name="plate", parent=robot.links[-1].name)))
     for other in (tree, loose):
-        with pytest.raises(RobotError, match="no single chain of D-H rows"):
+        with pytest.raises(RobotError, match="not a single chain of D-H rows"):
             converted(other, MODIFIED)
     first = reread(robot, MODIFIED).links[0]
     with pytest.raises(RobotError, match="rows are of both conventions"):

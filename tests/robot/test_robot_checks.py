@@ -29,7 +29,9 @@ def test_tree_must_be_one():
         make(Link(name=""))
     with refused("robot 'arm': two links are named 'a'. Allowed: unique names. Fix: rename one"):
         make(Link(name="a"), Link(name="a"))
-    with refused("robot 'arm': link 'b' hangs on 'c', which does not exist. Allowed: a, b. Fix: name an"):
+    with refused(
+        "robot 'arm': link 'b' has the parent 'c', which does not exist. Allowed: a, b. Fix: name an"
+    ):
         make(Link(name="a"), Link(name="b", parent="c"))
     with refused("robot 'arm': links are each other's parents: b -> c -> b"):
         make(Link(name="a"), Link(name="b", parent="c"), Link(name="c", parent="b"))
@@ -113,7 +115,9 @@ def test_contradictions_in_a_link_are_named(link: Link, text: str):
     [Motor(viscous_friction=-1e-3), Motor(coulomb_friction=(-0.1, -0.1)), Motor(coulomb_friction=(0.1, 0.1))],
 )
 def test_friction_that_drives_is_warned_of(motor: Motor):
-    with pytest.warns(ArmblocksWarning, match="robot 'arm', link 'l': friction drives the joint instead"):
+    with pytest.warns(
+        ArmblocksWarning, match="robot 'arm', link 'l': friction accelerates the joint instead"
+    ):
         make(Link(name="l", motor=motor))
 
 

@@ -418,7 +418,7 @@ def test_otherwise_needs_a_when() -> None:
         with r.otherwise():
             pass
 
-    with pytest.raises(SyntaxError, match="'otherwise' has no 'when' right before it"):
+    with pytest.raises(SyntaxError, match="'otherwise' has no 'when' directly before it"):
         Program().define(run)
 
 

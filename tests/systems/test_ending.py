@@ -84,7 +84,7 @@ def test_a_broken_assertion_fails_the_run_and_keeps_what_was_good(solver: str, s
     assert isinstance(partial, SimulationResult)
     assert partial.time[-1] == pytest.approx(math.acos(0.5), abs=1e-9)
     assert not partial.run.complete
-    assert "or let it only warn" in str(raised.value)
+    assert "or set its action to warn" in str(raised.value)
 
 
 @pytest.mark.parametrize(("solver", "step"), SOLVERS)

@@ -1,1 +1,1 @@
-"""Linear systems and operating points: what is worked out of a system's equations and their derivatives."""
+"""Linear systems and operating points, from a system's equations and their derivatives."""

@@ -1,4 +1,4 @@
-"""Linear systems put together: one after the other, side by side, in a loop."""
+"""Connections of linear systems: series, parallel, feedback."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from armblocks.errors import InputError
 def _together(first: StateSpaceModel, second: StateSpaceModel) -> float:
     if first.dt != second.dt:
         raise InputError(
-            f"systems with the sample times {first.dt:g} s and {second.dt:g} s are put together",
+            f"systems with the sample times {first.dt:g} s and {second.dt:g} s are connected",
             allowed="one sample time, or continuous systems only",
             fix="linearize the whole diagram instead",
             where="linear systems",
@@ -25,7 +25,7 @@ def _refuse_sizes(what: str, found: object, wanted: object) -> InputError:
     return InputError(
         f"{what} does not fit: {found}",
         allowed=f"{wanted}",
-        fix="choose ends with select()",
+        fix="choose inputs and outputs with select()",
         where="linear systems",
     )
 
@@ -38,7 +38,7 @@ def _states(first: StateSpaceModel, second: StateSpaceModel) -> dict[str, tuple[
 
 
 def series(second: SystemT, first: StateSpaceModel) -> SystemT:
-    """``second`` behind ``first``. Raises ``InputError`` where the widths differ."""
+    """``second`` after ``first``. Raises ``InputError`` where the widths differ."""
     dt = _together(first, second)
     if second.D.shape[1] != first.D.shape[0]:
         raise _refuse_sizes("a series", f"{first.D.shape[0]} into {second.D.shape[1]}", "equal widths")
@@ -76,7 +76,7 @@ def parallel(first: SystemT, second: StateSpaceModel) -> SystemT:
 
 
 def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> SystemT:
-    """``forward`` with ``back`` (a system, or a factor for each output) from its outputs to its inputs.
+    """``forward`` with ``back`` (a system, or a gain for each output) in the feedback path.
 
     Raises ``InputError`` where widths differ or the loop has no solution at all (``I - sign D D`` singular).
     """
@@ -100,11 +100,11 @@ def feedback(forward: SystemT, back: StateSpaceModel | float, sign: int) -> Syst
         )
     dt = _together(forward, back)
     if back.D.shape != (nu, ny):
-        raise _refuse_sizes("a loop", f"the way back has shape {back.D.shape}", f"shape {(nu, ny)}")
+        raise _refuse_sizes("a loop", f"the feedback path has shape {back.D.shape}", f"shape {(nu, ny)}")
     loop = np.eye(nu) - sign * back.D @ forward.D
     if np.linalg.cond(loop) > 1e14:
         raise InputError(
-            "the loop of direct ways is singular",
+            "the direct-feedthrough loop is singular",
             allowed="1 + D not 0",
             fix="change a gain in the loop",
             where="linear systems",

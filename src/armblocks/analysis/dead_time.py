@@ -1,13 +1,13 @@
-"""Dead time in a linear system: as an all-pass of finite order, or exactly over the frequency.
+"""Dead time in a linear system: an all-pass of finite order, or exact in the frequency response.
 
-Linearised, what comes out of the delays of a diagram is one more input ``v`` and what goes into them one more
-output ``d``::
+In the linearised system, the outputs of the delays are additional inputs ``v``, and their inputs are
+additional outputs ``d``::
 
     dx' = A dx + B du + E dv    dy = C dx + D du + F dv    dd = G dx + H du + K dv    dv(t) = dd(t - T)
 
-In its place stands Padé's approximation of order n over n, ``Q(-s T) / Q(s T)`` with the coefficients
-``(2n - k)! n! / ((2n)! k! (n - k)!)`` (Golub, Van Loan, Matrix Computations, 4th ed., 9.3.1): its gain is 1,
-and its phase is right as far as about n / T rad/s. How long a delay is stays as it is at the operating point.
+The delay is replaced by the Padé approximation of order n/n, ``Q(-s T) / Q(s T)`` with the coefficients ``(2n
+- k)! n! / ((2n)! k! (n - k)!)`` (Golub, Van Loan, Matrix Computations, 4th ed., 9.3.1): its gain is 1, and
+its phase is accurate up to about n / T rad/s. A variable delay has its value at the operating point.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Places = NDArray[np.intp]
 Realisation = tuple[Array, Array, Array, float]
 
 HIGHEST_ORDER = 10
-"""Of an approximation: beyond it, the coefficients are more rounding than approximation."""
+"""Highest order of an approximation: beyond it, rounding errors of the coefficients dominate."""
 
 
 def pade(order: int, delay: float) -> Realisation:
@@ -51,9 +51,9 @@ def pade(order: int, delay: float) -> Realisation:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DeadTime:
-    """The delays of a system at a point: where ``v`` stands in ``z``, how long each is, the slopes of ``d``.
+    """The delays of a system at a point: indices of ``v`` in ``z``, delays, derivatives of ``d``.
 
-    ``names`` are those of ``v``. Only what some equation reads is kept.
+    ``names`` are those of ``v``. Only delays that some equation reads are included.
     """
 
     places: Places
@@ -68,7 +68,7 @@ class DeadTime:
 
     @cached_property
     def through(self) -> Array:
-        """``K``: what comes out of a delay and goes into another one at once."""
+        """``K``: direct feedthrough from the output of a delay to the input of another one."""
         return self.inputs.z[:, self.places]
 
 
@@ -94,7 +94,7 @@ def dead_time(evaluated: EvaluatedSystem, point: Point, inputs: Slopes, readers:
 
 
 class Approximated:
-    """Slopes over ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W d``."""
+    """Derivatives by ``[x; q]`` in place of ``x``, with ``q' = P q + R d`` and ``v = S q + W d``."""
 
     def __init__(self, dead: DeadTime, order: int) -> None:
         self.dead = dead
@@ -118,13 +118,13 @@ class Approximated:
         )
 
     def _others(self, by_z: Array) -> Array:
-        """The slopes by all of ``z`` but what is delayed."""
+        """The derivatives by all of ``z`` except delayed values."""
         others = by_z.copy()
         others[:, self.dead.places] = 0.0
         return others
 
     def __call__(self, slopes: Slopes) -> Slopes:
-        """The slopes with the approximations in place of what is delayed."""
+        """The derivatives with the approximations in place of delayed values."""
         late = slopes.z[:, self.dead.places]
         wider = np.hstack([slopes.x, np.zeros((slopes.x.shape[0], self.by_x.shape[1] - slopes.x.shape[1]))])
         return Slopes(

@@ -1,4 +1,4 @@
-"""Frequency response and gain at rest."""
+"""Frequency response and steady-state gain."""
 
 from __future__ import annotations
 
@@ -57,8 +57,9 @@ def frequency_response(system: StateSpaceModel, frequencies: Array) -> Complex:
 def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, Array]:
     """Magnitude and continuous phase in degrees, (N, ny, nu) each, at rising frequencies (rad/s).
 
-    The phase starts at the multiple of 360 degrees that puts it next to -90 degrees for every integrator.
-    An undamped pole turns it by -180 degrees, an undamped zero by +180, as if they were hardly damped.
+    The phase starts at the multiple of 360 degrees that puts it next to -90 degrees for every integrator. An
+    undamped pole changes the phase by -180 degrees, an undamped zero by +180, like the limit of small
+    damping.
     """
     response = frequency_response(system, frequencies)
     phase = np.degrees(np.unwrap(np.angle(response), axis=0))
@@ -70,7 +71,7 @@ def gain_and_phase(system: StateSpaceModel, frequencies: Array) -> tuple[Array, 
 
 
 def _mend_phase(part: StateSpaceModel, frequencies: Array, phase: Array) -> None:
-    """Put right, in place, what unwrapping alone cannot know."""
+    """Correct the phase in place where unwrapping alone is ambiguous."""
     integrators = 0
     for roots, way in ((poles(part), -1.0), (zeros(part), 1.0)):
         s = as_continuous(part, roots)
@@ -93,12 +94,12 @@ def as_continuous(system: StateSpaceModel, roots: Complex) -> Complex:
 
 
 def dcgain(system: StateSpaceModel) -> Array:
-    """The response at rest of what lies between each input and each output."""
+    """The steady-state response of the part between each input and each output."""
     place = np.array([1.0 if system.is_discrete else 0.0], dtype=np.complex128)
     result = np.empty(system.D.shape)
     for row in range(system.D.shape[0]):
         for column in range(system.D.shape[1]):
-            # An integrator on another path must not spoil this one.
+            # An integrator on another path must not affect this one.
             part = minimal(system.select([system.outputs[row]], [system.inputs[column]]))
             value = float(evaluate(part, place)[0, 0, 0].real)
             if part.order and np.linalg.cond(place[0].real * np.eye(part.order) - part.A) > 1e14:
@@ -124,7 +125,7 @@ def frequency_range(system: StateSpaceModel) -> tuple[float, float]:
 
 
 def frequency_grid(system: StateSpaceModel, low: float, high: float, points: int = 500) -> Array:
-    """Angular frequencies (rad/s), even on a logarithmic axis and closer about lightly damped modes."""
+    """Angular frequencies (rad/s), logarithmically spaced and denser around lightly damped modes."""
     grid = np.geomspace(low, high, points)
     roots = np.concatenate([poles(system), zeros(system)])
     if system.is_discrete:

@@ -1,4 +1,4 @@
-"""Gramians: how strongly inputs reach the states of a stable system, and outputs show them."""
+"""Controllability and observability Gramians of a stable system."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def gramians(system: StateSpaceModel) -> tuple[Array, Array]:
 
     if not is_stable(system):
         raise InputError(
-            "gramians of a system that is not stable are asked for",
+            "the system is not stable and has no gramians",
             where=system.name,
-            allowed="stable systems: elsewhere the integrals grow without end",
-            fix="ask for controllability() and observability()",
+            allowed="stable systems: otherwise the integrals diverge",
+            fix="use controllability() and observability()",
         )
     inputs, outputs = system.B @ system.B.T, system.C.T @ system.C
     if system.is_discrete:

@@ -1,4 +1,4 @@
-"""A linear system as users hold it: its matrices and names, and a method for each question about it."""
+"""The user class ``LinearSystem``: matrices and names, with methods for analysis."""
 
 from __future__ import annotations
 
@@ -31,17 +31,18 @@ Complex = NDArray[np.complex128]
 class LinearSystem(StateSpaceModel):
     """``x' = A x + B u, y = C x + D u`` where ``dt`` is 0, else ``x[k+1] = A x[k] + B u[k]`` every ``dt`` s.
 
-    ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are small changes about the
+    ``A (nx, nx)``, ``B (nx, nu)``, ``C (ny, nx)``, ``D (ny, nu)``. All quantities are deviations from the
     operating ``point``. ``states``, ``inputs`` and ``outputs`` name the scalars, with their SI units; without
     names they are ``x1``, ``u1``, ``y1`` … Raises ``InputError`` for matrices that do not fit together or
-    hold what is not a finite number.
+    have entries that are not finite.
     """
 
     @property
     def is_stable(self) -> bool:
-        """Whether every free motion dies away: poles left of the imaginary axis, or in the unit circle.
+        """Whether the system is asymptotically stable: poles left of the imaginary axis, or inside the unit
+        circle.
 
-        A pole that is on that edge to the accuracy of the computation does not die away.
+        A pole on the stability boundary, within the accuracy of the computation, counts as unstable.
         """
         return is_stable(self)
 
@@ -64,14 +65,14 @@ class LinearSystem(StateSpaceModel):
         """Zeros, poles and gain of the one output over the one input. Raises ``InputError`` for more."""
         return transfer_function(self)
 
-    # Over the frequency.
+    # Frequency domain.
 
     def at(self, s: complex) -> Complex:
         """``C (s I - A)^-1 B + D`` (ny, nu) at one complex number: ``s``, or ``z`` of a discrete system."""
         return evaluate(self, np.array([s], dtype=np.complex128))[0]
 
     def dcgain(self) -> Array:
-        """Output over input (ny, nu) at rest; infinite where an integrator makes it so."""
+        """The steady-state gain (ny, nu); infinite with an integrator."""
         return dcgain(self)
 
     def frequency_response(self, frequencies: ArrayLike) -> Complex:
@@ -79,14 +80,14 @@ class LinearSystem(StateSpaceModel):
         return frequency_response(self, np.asarray(frequencies, dtype=np.float64))
 
     def margins(self) -> Margins:
-        """Gain, phase and delay margin of the loop that this system is the open loop of, with ``1 + L``."""
+        """Gain, phase and delay margin of the closed loop ``1 + L`` whose open loop is this system."""
         return margins(self)
 
     def bandwidth(self, drop: float = 3.0) -> float:
-        """First angular frequency (rad/s) at which the gain is ``drop`` dB below that at rest."""
+        """First angular frequency (rad/s) at which the gain is ``drop`` dB below the steady-state gain."""
         return bandwidth(self, drop)
 
-    # Over the time.
+    # Time domain.
 
     def step_response(self, stop_time: float | None = None, points: int = 600) -> TimeResponse[LinearSystem]:
         """Every output after a unit step of every input, exact at its instants."""
@@ -101,18 +102,18 @@ class LinearSystem(StateSpaceModel):
     def response(
         self, time: ArrayLike, inputs: ArrayLike, start: ArrayLike | None = None
     ) -> TimeResponse[LinearSystem]:
-        """Outputs for ``inputs`` (N, nu) at ``time`` (N,) s, straight between the instants, from state
+        """Outputs for ``inputs`` (N, nu) at ``time`` (N,) s, interpolated linearly, from state
         ``start`` (nx,)."""
         return forced_response(self, time, inputs, start)
 
     # Structure.
 
     def controllability(self) -> int:
-        """How many dimensions of the state the inputs reach."""
+        """The dimension of the controllable subspace."""
         return reachable_dimensions(self.A, self.B)
 
     def observability(self) -> int:
-        """How many dimensions of the state the outputs tell apart."""
+        """The rank of observability."""
         return reachable_dimensions(self.A.T, self.C.T)
 
     def gramians(self) -> tuple[Array, Array]:
@@ -127,7 +128,7 @@ class LinearSystem(StateSpaceModel):
         """Without the states that no input reaches or no output follows from; the others keep their names."""
         return on_path(self)
 
-    # Put together.
+    # Connections.
 
     def __neg__(self) -> LinearSystem:
         return dataclasses.replace(self, C=-self.C, D=-self.D)
@@ -143,17 +144,17 @@ class LinearSystem(StateSpaceModel):
         return series(self, other)
 
     def feedback(self, other: LinearSystem | float = 1.0, *, sign: int = -1) -> LinearSystem:
-        """The closed loop ``(1 - sign L)^-1 L`` with ``other`` in the way back."""
+        """The closed loop ``(1 - sign L)^-1 L`` with ``other`` in the feedback path."""
         return feedback(self, other, sign)
 
-    # To elsewhere.
+    # Export.
 
     def to_control(self) -> Any:
         """A ``StateSpace`` of python-control, which has to be installed."""
         return to_control(self)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write ``.json``, ``.npz`` or ``.mat``, all of it or nothing."""
+        """Write ``.json``, ``.npz`` or ``.mat``, atomically."""
         save(self, path)
 
     def __repr__(self) -> str:

@@ -1,15 +1,14 @@
 """The exact linear system of a hybrid system at an operating point.
 
-Between ticks the implicit function theorem takes the unknowns out::
+Between ticks the implicit function theorem eliminates the unknowns::
 
     dw = -r_w^-1 (r_x dx + r_z dz + r_p du)        dx' = A dx + Z dz + B du       dy = C dx + E dz + D du
 
-Without clocks ``dz = 0``: modes keep the value that they have. With clocks the system is looked at once a
-period, which is the least common multiple of all clocks' periods; its state is ``x`` and what the clocks
-move of ``z``, just before the first tick of the period. The inputs are held over the period. Each tick
-multiplies by the slopes of ``update`` and each time between ticks by a matrix exponential, so that the map
-over one period is exact (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 4.3, for one
-clock).
+Without clocks ``dz = 0``: modes are constant. With clocks the system is sampled once a period, the least
+common multiple of the periods of all clocks. Its state is ``x`` and the part of ``z`` that clocks update,
+just before the first tick of the period. The inputs are held over the period. Each tick multiplies by the
+derivatives of ``update`` and each interval between ticks by a matrix exponential, so that the map over one
+period is exact (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed., 4.3, for one clock).
 """
 
 from __future__ import annotations
@@ -34,12 +33,12 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MOST_TICKS = 100_000
-"""Of one period: beyond that, the clocks have next to no common multiple."""
+"""Maximum number of ticks of one common period."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ends:
-    """What a linear system is seen through: names and units of the scalars that go in and come out."""
+    """Inputs and outputs of a linear system: names and units of the scalars."""
 
     inputs: tuple[str, ...]
     input_units: tuple[str, ...]
@@ -69,7 +68,7 @@ def linearise(
     names, units = _elements(system.states)
 
     def ticked(ticking: tuple[int, ...]) -> Slopes:
-        """How all of ``z`` follows from what was before a tick."""
+        """The dependence of ``z`` on the values before a tick."""
         slopes = _without(evaluated.update_slopes(point, np.array(ticking, dtype=np.float64)), unknowns)
         _check_finite(system, _elements(system.discrete)[0], slopes, "the discrete variable")
         return late(slopes) if late else slopes
@@ -173,13 +172,13 @@ def _approximated(
             f"the dead time of {_late_blocks(system)} has no finite linear system",
             where=system.name,
             allowed="dead time with the order of its approximation",
-            fix="give delay_order=3, which is right up to about 3 / delay in rad/s",
+            fix="give delay_order=3, which is accurate up to about 3 / delay in rad/s",
         )
     if not _is_order(order):
         raise InputError(
             f"the delay_order is {order!r}",
             where=system.name,
-            allowed=f"a whole number from 1 to {HIGHEST_ORDER}",
+            allowed=f"an integer from 1 to {HIGHEST_ORDER}",
             fix="3 is a good start",
         )
     everybody = [*readers]
@@ -206,7 +205,7 @@ def _elements(layout: Signature) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
-    """How the unknowns of the implicit equations follow everything else."""
+    """The dependence of the unknowns of the implicit equations on all other variables."""
     system = evaluated.system
     if not system.algebraic.size:
         return None
@@ -216,7 +215,7 @@ def _unknowns(evaluated: EvaluatedSystem, point: Point) -> Slopes | None:
         raise SimulationError(
             f"the implicit equations of '{', '.join(system.algebraic.names)}' are singular at this point",
             where=system.name,
-            allowed="points at which the unknowns follow smoothly from everything else",
+            allowed="points at which the unknowns depend smoothly on all other variables",
             fix="linearize at another point, or change the loop",
         )
 
@@ -243,7 +242,7 @@ def _check_finite(system: HybridSystem, names: Sequence[str], slopes: Slopes, wh
     for row, name in enumerate(names):
         if not all(np.isfinite(part[row]).all() for part in (slopes.x, slopes.z, slopes.p)):
             raise SimulationError(
-                f"the slope of {what} '{name}' is not finite",
+                f"the derivative of {what} '{name}' is not finite",
                 where=system.name,
                 allowed="points at which all equations are smooth",
                 fix="linearize at another operating point",
@@ -316,7 +315,7 @@ def ticks_of_a_period(system: HybridSystem) -> tuple[Fraction, list[tuple[Fracti
 def _kept(
     system: HybridSystem, matrices: tuple[Array, Array, Array, Array], moved: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """All states but held outputs that are worked out anew before anybody looks at them."""
+    """All states except held outputs that are recomputed before they are read."""
     a, _, c, _ = matrices
     n = a.shape[0] - moved.size
     held = np.zeros(n + moved.size, dtype=np.bool_)
@@ -327,7 +326,8 @@ def _kept(
 
 
 def input_ends(system: HybridSystem, paths: Mapping[str, str]) -> tuple[list[int], tuple[str, ...]]:
-    """Places in ``p`` and names of the scalars of some parameters, given as name for people to path."""
+    """Indices in ``p`` and names of the scalars of some parameters, given as a map from display names to
+    paths."""
     places: list[int] = []
     names: list[str] = []
     for name, path in paths.items():

@@ -1,4 +1,4 @@
-"""Poles, and what each says of the motion."""
+"""Poles and the properties of their modes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def modes(system: StateSpaceModel) -> tuple[Mode, ...]:
 
 
 def mode_of(pole: complex, dt: float = 0.0) -> Mode:
-    """What one pole says."""
+    """The properties of one pole."""
     s = pole
     if dt > 0.0:
         s = complex(np.log(pole)) / dt if pole != 0.0 else complex(-math.inf, 0.0)

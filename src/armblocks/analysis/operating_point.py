@@ -1,4 +1,4 @@
-"""Operating points: all that a system has to know of a moment, by name."""
+"""Operating points: all variables of a system at one time, by name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_ITERATIONS = 60
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OperatingPoint:
-    """The moment ``time`` (s) of a system: states, discrete variables (modes among them), unknowns of
+    """The values of a system at ``time`` (s): states, discrete variables (modes among them), unknowns of
     implicit equations, tunable parameters and signals, each by its path and in its shape."""
 
     name: str
@@ -53,7 +53,7 @@ def operating_point(evaluated: EvaluatedSystem, point: Point) -> OperatingPoint:
 
 
 def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
-    """Where a run begins: after the first ticks, with all modes settled and all implicit equations solved.
+    """The start of a run: after the first ticks, with consistent modes and solved implicit equations.
 
     Raises ``SimulationError`` where those have no solution near their first guess.
     """
@@ -71,7 +71,7 @@ def initial_point(evaluated: EvaluatedSystem, p: Array) -> Point:
 
 
 def placed(evaluated: EvaluatedSystem, known: OperatingPoint, parameters: Mapping[str, Array]) -> Point:
-    """The same moment in a system that has more parameters, and perhaps other unknowns.
+    """The same operating point in a system with more parameters, and possibly other unknowns.
 
     ``parameters`` gives the values of those that ``known`` does not have. An unknown stands for a signal, so
     that its value is known too, up to the last Newton step.
@@ -138,7 +138,7 @@ def solved(evaluated: EvaluatedSystem, point: Point) -> Point:
         return at(w)
     worst = system.algebraic.names[int(np.argmax(np.abs(residual)))]
     raise SimulationError(
-        f"the implicit equation of '{worst}' has no solution near where it was sought",
+        f"the implicit equation of '{worst}' has no solution near the start value",
         where=system.name,
         allowed="points at which every algebraic loop has a solution",
         fix="start from another operating point",

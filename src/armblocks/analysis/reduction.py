@@ -1,4 +1,4 @@
-"""Which states inputs reach and outputs follow from, and systems without the others."""
+"""Controllable and observable states, and reduction of a system to them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 def staircase(A: Array, B: Array) -> tuple[Array, int]:
-    """An orthogonal basis (n, n) whose first ``k`` columns span what the inputs reach, and ``k``.
+    """An orthogonal basis (n, n) whose first ``k`` columns span the controllable subspace, and ``k``.
 
     The staircase algorithm (Van Dooren, IEEE Trans. Automatic Control 26, 1981, 111-129): rank decisions on
     blocks instead of on the powers of the controllability matrix.

@@ -1,4 +1,4 @@
-"""Where the poles of a closed loop go while its gain grows."""
+"""The root locus: the poles of a closed loop as functions of its gain."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def root_locus(system: LinearSystem, gains: Array | None = None) -> RootLocus:
 
 
 def extent(loop: LinearSystem, zeros: Complex) -> float:
-    """How far from the origin the picture of a locus reaches."""
+    """The radius of the figure of a root locus."""
     if loop.is_discrete:
         return 1.5
     return 3.0 * max(float(np.abs(np.concatenate([loop.poles(), zeros])).max(initial=0.0)), 1e-9)

@@ -1,4 +1,4 @@
-"""States in units that make a system's numbers of one size."""
+"""Balancing: scaling of states so that the entries of a system have similar magnitudes."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
-"""Operating points at which a system rests: Newton's method, damped, with exact slopes.
+"""Equilibrium operating points: a damped Newton method with exact derivatives.
 
-The unknowns are the states that are not given, what the clocks move, what comes out of delays, the unknowns
-of implicit equations, and the parameters that are free. The equations: every state that shall rest has the
-rate 0, every tick leaves what it moves as it is, what comes out of a delay is what goes in, the implicit
-equations hold, and the chosen signals have their values. Steps are those of Levenberg and Marquardt (Moré,
-Lecture Notes in Mathematics 630, 1978, 105-116), each unknown in the scale of its own column and kept within
-its bounds; of several solutions the one near the start is found, and where there are infinitely many, the
-nearest. Modes follow the point that was found, then it is sought again; where that leads nowhere (the line of
-a table's first piece meets zero far beyond its last), they follow every step.
+The unknowns are the states that are not given, the discrete states of clocks, the outputs of delays, the
+unknowns of implicit equations, and the free parameters. The equations are: the derivatives of all non-moving
+states are 0, ticks change no state, outputs of delays equal their inputs, the implicit equations hold, and
+the chosen signals have their required values. Steps are those of Levenberg and Marquardt (Moré, Lecture Notes
+in Mathematics 630, 1978, 105-116), each unknown in the scale of its own column and kept within its bounds; of
+several solutions the one near the start is found, and where there are infinitely many, the nearest. The modes
+are updated at the solution, and the iteration is repeated. If this fails (the line of a table's first segment
+may reach zero far beyond the last segment), the modes are updated at every step.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ Places = NDArray[np.intp]
 
 MOST_ITERATIONS = 200
 MOST_MODES = 20
-"""How often the modes may change before it is said that they do not settle."""
+"""Maximum number of mode changes."""
 ROUNDOFFS = 4.0 * float(np.finfo(np.float64).eps)
 """Rounding error of a term of an equation, as a share of it."""
 NAMED = 6
-"""How many culprits a message names."""
+"""Maximum number of equations that a message names."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrimProblem:
-    """What is sought.
+    """A trim problem.
 
     ``start`` the first guess, ``free_states`` places in ``x`` that may change, ``resting`` places in ``x``
     whose rate has to be 0, ``free_parameters`` places in ``p``, ``rows`` places in ``y`` that have to have
@@ -58,7 +58,7 @@ class TrimProblem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrimResult:
-    """An operating point and how well it rests.
+    """An operating point with its residuals.
 
     ``free``: the parameters that were found, as ``simulate(parameters=…)`` takes them. ``accuracies``: bound
     of the rounding error of everything that was sought, by name and in its shape. ``residuals``: what is left
@@ -108,10 +108,10 @@ def trim_system(problem: TrimProblem) -> TrimResult:
     result = search.result(point, iterations)
     if chasing:
         raise SimulationError(
-            f"the modes {', '.join(chasing[:NAMED])} do not settle",
+            f"the modes {', '.join(chasing[:NAMED])} remain inconsistent",
             where=problem.system.name,
             allowed="an operating point inside one piece of every switching block",
-            fix="start from a point on the side that is meant, or change the limits",
+            fix="start from a point on the intended side, or change the limits",
             partial=result,
         )
     if not search.rests(point):

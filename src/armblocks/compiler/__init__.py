@@ -1,7 +1,8 @@
 """From traced equations to machine code: tape, LLVM IR, kernels, the disk cache.
 
-No module here knows of robots, diagrams or blocks, and only :mod:`armblocks.compiler.from_casadi` knows
-CasADi's graphs. ``llvmlite`` is imported when something is first compiled or loaded.
+The modules here are independent of robots, diagrams and blocks, and only
+:mod:`armblocks.compiler.from_casadi` depends on CasADi. ``llvmlite`` is imported at the first compilation or
+load.
 """
 
 from armblocks.compiler.kernel import Kernel, compile_function

@@ -1,4 +1,4 @@
-"""The arrays that users pass to kernels: checked, and brought into the form that native code reads."""
+"""Checks and conversion of the arrays that users pass to kernels."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def in_order(
     """All inputs in the order of the slots: the first ones are ``values``, the others ``named``.
 
     Raises :class:`UnknownNameError` for a name that is neither an input nor one of the ``options`` of the
-    call, :class:`InputError` for an input that is missing or given twice.
+    call, :class:`InputError` for a missing or duplicate input.
     """
     rest = signature.names[len(values) :]
     if set(named) == set(rest):
@@ -51,15 +51,15 @@ def in_order(
         f"'{twice[0]}' is given twice" if twice else f"'{missing[0]}' is missing",
         where=name,
         allowed=_listing(signature),
-        fix=f"call {name}({', '.join(signature.names)}), each in its place or by its name",
+        fix=f"call {name}({', '.join(signature.names)}), positional or by keyword",
     )
 
 
 def read_input(name: str, slot: Slot, value: ArrayLike) -> Array:
-    """``value`` as a float64 array of the slot's shape, or of that shape with the samples' axis before it.
+    """``value`` as a float64 array of the slot's shape, or with a leading sample axis.
 
-    The strides are left as they are. Raises :class:`InputError` for another shape, and for what holds no real
-    numbers (complex, text, objects, booleans).
+    Strides are kept. Raises :class:`InputError` for another shape or dtype (complex, text, objects,
+    booleans).
     """
     try:
         array = np.asarray(value)
@@ -94,8 +94,8 @@ def count_samples(name: str, signature: Signature, arrays: Sequence[Array]) -> i
         raise InputError(
             f"the inputs hold different numbers of samples: {found}",
             where=name,
-            allowed="one number of samples; an input without a samples' axis serves all",
-            fix="give as many samples of each",
+            allowed="one number of samples; an input without a sample axis is used for all samples",
+            fix="give equal numbers of samples",
         )
     return next(iter(counts.values()), None)
 
@@ -103,10 +103,10 @@ def count_samples(name: str, signature: Signature, arrays: Sequence[Array]) -> i
 def new_outputs(
     name: str, signature: Signature, shapes: Sequence[Shape], out: object, inputs: Sequence[Array]
 ) -> tuple[list[Array], list[Array]]:
-    """Arrays to write into and arrays to hand out: the same, unless ``out`` shares memory with an input.
+    """Arrays to write to and arrays to return: the same, unless ``out`` shares memory with an input.
 
-    Raises :class:`InputError` when ``out`` is not what the call would give: shape, float64, C-contiguous,
-    writable; a tuple of these where there are several outputs.
+    Raises :class:`InputError` unless ``out`` has the shape of the result and is float64, C-contiguous and
+    writable; a tuple of such arrays for several outputs.
     """
     if out is None:
         fresh = [new_result(shape) for shape in shapes]
@@ -117,7 +117,7 @@ def new_outputs(
             f"out= holds {len(given)} arrays",
             where=name,
             allowed=f"one per output: {_listing(signature)}",
-            fix="leave out= away, or give one array for each output",
+            fix="omit out=, or give one array for each output",
         )
     written: list[Array] = []
     handed: list[Array] = []
@@ -147,12 +147,12 @@ def _check_output(name: str, slot: Slot, shape: Shape, array: object) -> Array:
         f"out= for '{slot.name}' {found}",
         where=name,
         allowed=f"a writable C-contiguous float64 array of shape {shape}",
-        fix="leave out= away, or allocate it with numpy.empty",
+        fix="omit out=, or allocate it with numpy.empty",
     )
 
 
 def check_threads(name: str, threads: object) -> int:
-    """The number of threads. Raises :class:`InputError` unless it is a whole number from 1 up."""
+    """The number of threads. Raises :class:`InputError` unless it is a positive integer."""
     try:
         count = 0 if isinstance(threads, bool) else operator.index(cast("int", threads))
     except TypeError:
@@ -161,8 +161,8 @@ def check_threads(name: str, threads: object) -> int:
         raise InputError(
             f"threads={threads!r}",
             where=name,
-            allowed="a whole number from 1 up",
-            fix="leave threads= away for one",
+            allowed="a positive integer",
+            fix="omit threads= for one thread",
         )
     return count
 

@@ -21,9 +21,9 @@ def emit_batch(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
     """Add ``void @name(i64 start, i64 stop, i64 columns, ptr in0, …, ptr out0, …)``.
 
     It evaluates the samples ``start`` to ``stop - 1``. ``columns`` is N, the length of a line of the arrays
-    in column layout. Outputs must not overlap inputs. What only depends on shared inputs is worked out
-    once. Samples that do not fill a register, and blocks with a sample that a vector function leaves
-    undecided (the sine of a huge angle), are evaluated with one lane: the bits are the same.
+    in column layout. Outputs must not overlap inputs. Values that depend on shared inputs only are computed
+    once. Samples that do not fill a register, and blocks with a sample that a vector function does not
+    support (the sine of a huge angle), are evaluated with one lane; results are identical.
     """
     _add_block(module, tape, layout, 1, f"{name}.sample")
     if lanes > 1:
@@ -50,10 +50,10 @@ def emit_shares(module: Module, tape: Tape, name: str) -> None:
     """Add ``void @name.shares(ptr job, i64 hold, i64 patience, ptr in0, …, ptr out0, …)``.
 
     Several threads call it with one ``job`` of four i64: the next sample, the count of threads at work, the
-    samples of a share, the samples of the batch. Each takes shares until there are none. Then it spins:
-    ``hold`` turns in any case, and up to ``patience`` turns while other threads are at work.
+    samples of a share, the samples of the batch. Each thread takes shares until none are left. Then it spins:
+    always ``hold`` iterations, and up to ``patience`` iterations while other threads are active.
     """
-    following, at_work = 0, 1  # places in the job that the threads change
+    following, at_work = 0, 1  # indices in the job that threads modify
 
     def batch(r: Routine, start: Integer, stop: Integer, columns: Integer, *arrays: Reals) -> None:
         """What :func:`emit_batch` adds."""
@@ -86,7 +86,7 @@ def _sample(r: Routine, sample: Integer, columns: Integer, *arrays: Reals) -> No
 
 
 def _lanes(r: Routine, first: Integer, columns: Integer, *arrays: Reals) -> Boolean:
-    """Evaluate as many samples as there are lanes; gives whether they must be evaluated one by one."""
+    """Evaluate one sample per lane; returns whether they must be evaluated one by one."""
     raise NotImplementedError
 
 
@@ -142,7 +142,7 @@ def _add_block(module: Module, tape: Tape, layout: BatchLayout, lanes: int, name
 
 
 def _groups(tape: Tape, layout: BatchLayout, lanes: int) -> list[tuple[int, int, tuple[int, ...]]]:
-    """Slot, first place and registers of what is stored together: a column, or as many of a row as lanes."""
+    """Slot, first index and registers of values that are stored together: a column, or part of a row."""
     groups: list[tuple[int, int, tuple[int, ...]]] = []
     for slot, (members, kind) in enumerate(zip(tape.outputs, layout.outputs)):
         if kind is Layout.COLUMNS:

@@ -1,8 +1,8 @@
 """Batches on several threads.
 
-The threads take shares of the samples in native code, without the interpreter's lock. A thread that starts
-late finds fewer shares, or none, and nobody waits for it: waking a sleeping thread takes 0.05 ms, on a busy
-machine much longer, while the batch of a robot model may take 0.5 ms.
+The threads take shares of the samples in native code, without the interpreter lock. A thread that starts late
+finds fewer shares, or none, and the caller does not wait for it: waking a sleeping thread takes 0.05 ms, on a
+busy machine much longer, while the batch of a robot model may take 0.5 ms.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from functools import cache
 from queue import SimpleQueue
 
 _SMALLEST_PART = 2048
-"""Samples for which another thread is worth while."""
+"""Number of samples that justify another thread."""
 _SMALLEST_SHARE = 512
 _SHARES_PER_THREAD = 16
 _RUNNING = 1
 # Turns of a loop of 1 to 4 ns.
 _HOLD = 2_000
-"""For so long a helper that has finished leaves the interpreter's lock to the thread that called."""
+"""Time for which a finished helper leaves the interpreter lock to the calling thread."""
 _PATIENCE = 50_000
-"""For so long the thread that called waits for helpers before it goes to sleep."""
+"""Time for which the calling thread spins for helpers before it sleeps."""
 
 Shares = Callable[..., None]
 """Function of :func:`~armblocks.compiler.batch.emit_shares`: job, hold, patience, addresses of the arrays."""
 
 
 def worth_while(samples: int, threads: int) -> int:
-    """How many of the threads have enough to do in a batch."""
+    """The number of threads that a batch can use."""
     return min(threads, max(1, samples // _SMALLEST_PART))
 
 
@@ -44,7 +44,7 @@ def evaluate_in_threads(
     job = (ctypes.c_int64 * 4)(0, 0, share, samples)
 
     def help_out() -> None:
-        # Where the batch is done already this takes no share, and does not touch the arrays.
+        # If the batch is complete, this takes no share and does not access the arrays.
         shares(job, _HOLD, 0, *addresses)
         _ = kept
 
@@ -69,7 +69,8 @@ def _wait_for_helpers(job: ctypes.Array[ctypes.c_int64]) -> None:
 
 
 class _Helpers:
-    """Threads that wait for work. There are as many as were ever busy at once, up to a limit."""
+    """A pool of waiting threads. It grows to the largest number that was busy at the same time, up to a
+    limit."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
@@ -78,7 +79,7 @@ class _Helpers:
         self._threads = self._busy = 0
 
     def give(self, work: Callable[[], None]) -> None:
-        """Let a thread do the work, which raises nothing, as soon as one is free."""
+        """Run ``work``, which must not raise, in a free thread."""
         with self._lock:
             self._busy += 1
             another = self._threads < min(self._busy, self._limit)
@@ -102,5 +103,5 @@ def _helpers() -> _Helpers:
 
 
 if hasattr(os, "register_at_fork"):
-    # Threads do not survive a fork: the child makes its own.
+    # Threads do not survive a fork: the child process starts new ones.
     os.register_at_fork(after_in_child=_helpers.cache_clear)

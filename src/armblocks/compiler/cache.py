@@ -1,11 +1,11 @@
-"""Results of compilation on disk, so that a second process starts at once.
+"""Disk cache of compilation results.
 
-One file for each result; its name is the SHA-256 of all that the result depends on, so nothing is ever
-replaced by something else. A file holds a checksum of its content: what is damaged or cut short counts as
-absent. Files are written beside their place and moved into it, so concurrent processes see whole files only.
-A folder that cannot be read or written is no error: everything is then compiled anew.
+There is one file for each result. Its name is the SHA-256 of everything that the result depends on, so a file
+never changes its meaning. A file has a checksum: damaged or truncated files count as absent. Files are
+written under a temporary name and renamed, so concurrent processes see complete files only. If the folder
+cannot be read or written, everything is compiled again without an error.
 
-The folder is ``$ARMBLOCKS_CACHE_DIR`` (empty: no cache), else the system's place for caches.
+The folder is ``$ARMBLOCKS_CACHE_DIR`` (empty: no cache), else the system's cache folder.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _MAGIC = b"armblocks cache 1\n"
 _SIZE_LIMIT = 256 * 1024 * 1024
 _DAY = 86400.0
 _PRUNE_EVERY = 600.0
-"""Seconds between two looks at all files: there may be tens of thousands."""
+"""Seconds between two scans of all files, of which there may be tens of thousands."""
 _SUFFIX = ".bin"
 
 
 def folder() -> Path | None:
-    """Where results are kept; None when the cache is switched off or there is no place for it."""
+    """The cache folder; None if the cache is disabled or there is no folder for it."""
     chosen = os.environ.get("ARMBLOCKS_CACHE_DIR")
     if chosen is not None:
         return Path(chosen) if chosen else None
@@ -37,12 +37,12 @@ def folder() -> Path | None:
 
 
 def object_name(parts: Sequence[str]) -> str:
-    """Name of machine code: ``parts`` say which, the compiler's own sources are added."""
+    """File name of machine code, from ``parts`` and the sources of the compiler."""
     return _digest(("object", compiler_fingerprint(), *parts))
 
 
 def record_name(key: str) -> str:
-    """Name of what is known under a caller's key; the sources of the whole package are added."""
+    """File name of a result with a caller's key, from the key and the sources of the whole package."""
     return _digest(("record", package_fingerprint(), key))
 
 
@@ -51,21 +51,21 @@ def _digest(parts: Sequence[str]) -> str:
 
 
 def _sha256(data: bytes) -> bytes:
-    import hashlib  # loads OpenSSL, which is slow; importing armblocks does without
+    import hashlib  # imported here because it loads OpenSSL, which is slow
 
     return hashlib.sha256(data).digest()
 
 
 @cache
 def compiler_fingerprint() -> str:
-    """Changes whenever a source file changes that decides which machine code is made."""
+    """A digest of the source files that determine the machine code."""
     package = Path(__file__).parent.parent
     return _fingerprint(*(package / name for name in ("compiler", "routines", "integration")))
 
 
 @cache
 def package_fingerprint() -> str:
-    """Changes whenever a source file of the package changes."""
+    """A digest of all source files of the package."""
     return _fingerprint(Path(__file__).parent.parent)
 
 
@@ -90,7 +90,7 @@ def _python_files(root: Path | str) -> Iterator[os.DirEntry[str]]:
 
 
 def load(name: str) -> bytes | None:
-    """The content stored under ``name``, None where there is none or it is damaged."""
+    """The content stored under ``name``, None if it is absent or damaged."""
     root = folder()
     if root is None:
         return None
@@ -103,7 +103,7 @@ def load(name: str) -> bytes | None:
     content = data[start:]
     if not data.startswith(_MAGIC) or data[len(_MAGIC) : start] != _sha256(content):
         return None
-    with contextlib.suppress(OSError):  # what is in use is pruned last
+    with contextlib.suppress(OSError):  # mark as used, so that it is pruned last
         if time.time() - path.stat().st_mtime > _DAY:
             os.utime(path)
     return content
@@ -134,7 +134,7 @@ def _path(root: Path, name: str) -> Path:
 
 
 def _prune_now_and_then(root: Path) -> None:
-    """Prune where no process has done so lately: a file says when it was done last."""
+    """Prune unless a process has done so recently; a file stores the time."""
     last = root / "pruned"
     with contextlib.suppress(OSError):
         if 0.0 <= time.time() - last.stat().st_mtime < _PRUNE_EVERY:

@@ -1,15 +1,14 @@
-"""The way into a kernel from Python: a CPython builtin whose code stands in the kernel's own LLVM module.
+"""Calling a kernel from Python: a CPython builtin whose code is part of the kernel's LLVM module.
 
 A call through ``ctypes`` costs several times the work of a whole robot model. The builtin made here has the
 signature of ``METH_FASTCALL | METH_KEYWORDS``. It checks its arguments. When each is a plain C-contiguous
 float64 array of the slot's shape (a float for a scalar slot), with or without the samples' axis, it allocates
-the result, or takes the array of ``out=``, and calls the evaluation: no Python code runs. Anything else
-(lists, subclasses, a wrong shape, ``out=`` that shares memory with an input, two threads) goes to a Python
-callable that serves or refuses it with the full text. No C compiler is involved, so the wheel stays pure
-Python.
+the result, or takes the array of ``out=``, and calls the evaluation: no Python code runs. Other calls (lists,
+subclasses, a wrong shape, ``out=`` that shares memory with an input, two threads) go to a Python callable,
+which handles them or raises the error. No C compiler is involved, so the wheel is pure Python.
 
-Batches have machine code of their own, which is made when a batch first needs it. The first batch therefore
-goes to the Python callable; the kernel then puts the address into :data:`BATCHES`.
+Batches have separate machine code, which is compiled at the first batch. The first batch therefore goes to
+the Python callable; the kernel then stores the address in :data:`BATCHES`.
 
 The builtin reads ``PyArrayObject`` by its field offsets, which NumPy's binary interface fixes. They are
 compared with a real array once per process; if anything differs (a build without the GIL has another object
@@ -34,11 +33,12 @@ from armblocks.errors import InputError
 ENTRY = "armblocks_entry"
 """Symbol of the builtin's C function."""
 TABLE = "armblocks_entry_table"
-"""Symbol of the addresses that each process fills in: code on disk must not hold any."""
+"""Symbol of the table of addresses that each process fills in, because cached code must not contain
+addresses."""
 BATCHES = "armblocks_entry_batches"
 """Symbol of the addresses of the functions for batches, null until made: see :func:`offer_batch`."""
 MOST_BATCH_INPUTS = 8
-"""Batches of kernels with more inputs go to the Python callable: the table has a place for each subset."""
+"""Batches of kernels with more inputs go to the Python callable: the table has an entry for each subset."""
 
 _FASTCALL_WITH_KEYWORDS = 0x0080 | 0x0002
 # Byte offsets in the structures of CPython and NumPy on 64-bit systems.
@@ -87,18 +87,18 @@ class _MethodDefinition(ctypes.Structure):
     )
 
 
-# A builtin reads its definition when it is taken down, and the collector of cycles may clear the builtin's
-# ``self`` before: definitions (some hundred bytes each) are therefore kept for the life of the process.
+# A builtin reads its definition when it is deallocated, and the garbage collector may clear its ``self`` #
+# before that: definitions (some hundred bytes each) are therefore kept for the lifetime of the process.
 _DEFINITIONS: list[_MethodDefinition] = []
 
 
 Maker = tuple[Callable[..., object], tuple[object, ...]]
-"""A function with its arguments: what gives, in another process too, an object that has the builtin as an
-attribute of its name. Pickle asks for it."""
+"""A function with its arguments that creates, also in another process, an object with the builtin as an
+attribute; used for pickling."""
 
 
 class _Owner:
-    """The builtin's ``self``: what it falls back to, and what must live as long as it does.
+    """The builtin's ``self``: its fallback, and the objects that it keeps alive.
 
     The C function reads ``call`` by its offset.
     """
@@ -111,19 +111,19 @@ class _Owner:
         self.maker = maker
 
     def __reduce__(self) -> Maker:
-        """Python pickles a builtin as an attribute of its ``self``: that of the maker's object, here."""
+        """Python pickles a builtin as an attribute of its ``self``, here of the maker's object."""
         if self.maker is None:
             raise InputError(
                 "native code cannot be pickled",
                 allowed="methods of an Arm, such as arm.fkine",
-                fix="pickle what the code was compiled from",
+                fix="pickle the object from which the code was compiled",
                 where="kernel",
             )
         return self.maker
 
 
 def offer_batch(code: NativeCode, batched: Sequence[bool], address: int) -> None:
-    """Tell the builtin in ``code`` the function for batches in which the inputs ``batched`` have samples.
+    """Give the builtin in ``code`` the function for batches in which the inputs ``batched`` have samples.
 
     The function's code must live as long as the builtin.
     """
@@ -144,9 +144,10 @@ def make_entry(
 ) -> Callback:
     """The builtin for the C function at ``address``.
 
-    ``table`` is the address of the module's :data:`TABLE`. Calls that the C function does not serve go to
+    ``table`` is the address of the module's :data:`TABLE`. Calls that the C function does not handle go to
     ``fallback``. ``kept`` (the machine code) lives as long as the builtin, which is pickled by its ``maker``.
-    Where the binary interface of Python or NumPy is not the expected one, ``fallback`` itself is given back.
+    Where the binary interface of Python or NumPy differs from the expected one, ``fallback`` itself is
+    returned.
     """
     addresses = _addresses()
     if addresses is None:
@@ -175,7 +176,7 @@ class _View:
 
 @cache
 def _addresses() -> list[int] | None:
-    """What the table holds, in the order of the places; None where an interface is not as expected."""
+    """The content of the table, in order; None if an interface differs from the expected one."""
     if ctypes.sizeof(ctypes.c_void_p) != 8 or not _layout_is_known():
         return None
     try:

@@ -40,13 +40,13 @@ R = TypeVar("R")
 _OPTIONS = "entry.options"
 _NO_SAMPLES = -1
 _LONG_BATCH = 512
-"""From so many samples on, other Python threads may run during the evaluation; fewer take microseconds."""
+"""Number of samples from which on the interpreter lock is released during the evaluation."""
 
 
 def emit_entry(module: Module, inputs: Signature, outputs: Signature, evaluate: str) -> None:
     """Add the builtin's C function.
 
-    ``void @evaluate(ptr in0, …, ptr out0, …)`` evaluates one sample. The function whose address stands in
+    ``void @evaluate(ptr in0, …, ptr out0, …)`` evaluates one sample. The function whose address is in
     :data:`~armblocks.compiler.entry.BATCHES` evaluates a batch; its index has bit ``k`` set if input ``k``
     has the samples' axis.
     """
@@ -64,7 +64,7 @@ def emit_entry(module: Module, inputs: Signature, outputs: Signature, evaluate: 
 
 
 def _known(r: Routine, name: str) -> Address:
-    """An address that the process filled in."""
+    """An address from the table that the process fills in."""
     return r.filled_in(TABLE, len(PLACES))[PLACES.index(name)]
 
 
@@ -73,18 +73,18 @@ def _known_function(r: Routine, function: Function[P, R]) -> Function[P, R]:
 
 
 class _PythonObjects:
-    """Looks into Python objects, and leaves a part of the routine where they are not as expected."""
+    """Inspects Python objects, and leaves a part of the routine where they are not as expected."""
 
     def __init__(self, r: Routine, served: Part) -> None:
         self.r = r
         self._served = served
 
     def require(self, condition: Boolean) -> None:
-        """Leave the call to Python unless the condition holds."""
+        """Use the Python callable unless the condition holds."""
         self._served.leave_unless(condition)
 
     def known(self, name: str) -> Address:
-        """An address that the process filled in."""
+        """An address from the table that the process fills in."""
         return _known(self.r, name)
 
     def call(self, function: Function[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
@@ -92,13 +92,13 @@ class _PythonObjects:
         return self.r.call(_known_function(self.r, function), *args, **kwargs)
 
     def require_array(self, value: Address, flags: int) -> None:
-        """Go on only for a plain array of float64 that has all of the flags."""
+        """Continue only for a plain float64 array with all of the flags."""
         self.require(value.pointer(OBJECT_TYPE) == self.known("array_type"))
         numbers = value.pointer(ARRAY_DESCR) == self.known("float64")
         self.require(numbers & ((value.int32(ARRAY_FLAGS) & flags) == flags))
 
     def require_extents(self, dimensions: Integers, shape: Shape) -> None:
-        """Go on only where the dimensions are those of ``shape``."""
+        """Continue only if the dimensions are those of ``shape``."""
         for axis, extent in enumerate(shape):
             self.require(dimensions[axis] == extent)
 
@@ -134,7 +134,7 @@ class _Call:
         """Objects to release if something later fails."""
 
     def serve(self, count: Integer, inputs: Sequence[Shape], outputs: Sequence[Shape]) -> None:
-        """Return the result, or leave the call to Python."""
+        """Return the result, or use the Python callable."""
         self.require(count == len(inputs))
         out = self.out_option(len(inputs))
         arguments = [self.argument(k, shape) for k, shape in enumerate(inputs)]
@@ -144,7 +144,7 @@ class _Call:
         self.require_small(outputs, samples, out)
         if len(outputs) == 1:
             results = [self.given_or_new(outputs[0], samples, batched, out, arguments)]
-        else:  # a tuple of arrays for the results is left to the Python callable
+        else:  # the Python callable handles a tuple of result arrays
             self.require(out.is_null)
             results = [self.new_result(shape, samples, batched) for shape in outputs]
         self.evaluate(batch, samples, [argument.data for argument in arguments], results)
@@ -219,13 +219,13 @@ class _Call:
 
     # ---- results -----------------------------------------------------------------------------------------
     def require_small(self, shapes: Sequence[Shape], samples: Integer, out: Address) -> None:
-        """Go on only where no new array is large: the memory of large ones is used again."""
+        """Continue only if no new array is large, because the memory of large arrays is reused."""
         size = max((math.prod(shape) for shape in shapes), default=0)
         if size:
             self.require((samples < -(-LARGE // size)) | ~out.is_null)
 
     def new_result(self, shape: Shape, samples: Integer, batched: Boolean) -> _Result:
-        """A new array, or room for one number."""
+        """A new array, or memory for one number."""
         result = _Result(made=self.r.address(self.r.null), target=self.r.address(self.r.null))
         self.owned.append(result.made)
         self._allocate(shape, samples, batched, result)
@@ -294,7 +294,7 @@ class _Call:
         batched: Boolean,
         arguments: Sequence[_Argument],
     ) -> None:
-        """Go on only where the array is as a new one would be, apart from all inputs."""
+        """Continue only if the array matches a new one and does not overlap inputs."""
         r, objects = self.r, self.objects
         objects.require_array(out, C_CONTIGUOUS_AND_ALIGNED | WRITEABLE)
         own = batched.count()
@@ -373,7 +373,7 @@ def _evaluate_batch(r: Routine, start: Integer, stop: Integer, columns: Integer,
 def _options(r: Routine, values: Addresses, names: Address) -> tuple[Boolean, Address]:
     """Whether the builtin serves the options, and the array of ``out=``, or null.
 
-    Options are ``threads=1`` and ``out=``. ``out=None`` is as if left away.
+    Options are ``threads=1`` and ``out=``. ``out=None`` counts as omitted.
     """
     out = r.address(r.null)
     with r.part() as served:

@@ -1,4 +1,4 @@
-"""CasADi graphs to tapes: the only place on the numerics side that knows CasADi."""
+"""Translation of CasADi graphs to tapes: the only CasADi-dependent module of the numerics."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _OPCODES = {number: (_SAME[name], _SAME[name].arity) for number, name in _NAMES.
 def tape_from(traced: TracedFunction) -> Tape:
     """The tape of a traced function.
 
-    Raises :class:`CompileError` naming the operation, if the graph has one that tapes do not know.
+    Raises :class:`CompileError` naming the operation, if the graph has an unsupported operation.
     """
     function = Function("f", list(traced.arguments), [*traced.results, traced.rounded], {"cse": True})
     builder = TapeBuilder([slot.size for slot in traced.inputs])
@@ -136,7 +136,7 @@ def _call(builder: TapeBuilder, function: Function, arguments: Sequence[int], na
             f"the equations call the function {function.name()}",
             where=name,
             allowed="calls of linear_solution",
-            fix="let CasADi put the function's operations in the place of the call",
+            fix="let CasADi inline the function",
         )
     starts = itertools.accumulate((rule.nnz_in(k) for k in range(rule.n_in())), initial=0)
     inputs = [arguments[start:end] for start, end in itertools.pairwise(starts)]
@@ -144,7 +144,7 @@ def _call(builder: TapeBuilder, function: Function, arguments: Sequence[int], na
 
 
 def _translate(builder: TapeBuilder, number: int, operands: Sequence[int], name: str) -> int:
-    """An operation of CasADi that is no single one of a tape."""
+    """An operation of CasADi that needs several tape operations."""
     if number == casadi.OP_SQ:
         return builder.add(Opcode.MULTIPLY, operands[0], operands[0])
     if number == casadi.OP_TWICE:
@@ -173,9 +173,9 @@ def _read(builder: TapeBuilder, table: int, second: int, name: str) -> int:
     start = builder.operands_of(table, Opcode.READ)
     if start is None or not builder.is_input(start[0]):
         raise CompileError(
-            "a table is read that is no parameter of the system",
+            "a table that is not a parameter of the system is read",
             where=name,
-            allowed="tables that are parameters themselves, not worked out from others",
+            allowed="tables that are parameters, not computed from other parameters",
             fix="give the numbers of the table to the block",
         )
     return builder.add(Opcode.READ, start[0], start[1], second)

@@ -1,6 +1,6 @@
-"""A slow interpreter of tapes in NumPy: the second opinion on compiled code.
+"""A slow interpreter of tapes in NumPy, the reference for compiled code.
 
-It shares nothing with the code generator but the tape: arithmetic is NumPy's, and sin, exp and the others are
+It shares only the tape with the code generator: arithmetic is NumPy's, and sin, exp and the others are
 NumPy's or the C library's own. Tapes without elementary functions give the same bits as compiled code when
 ``fused`` is true, because fused multiply-adds are then rounded once, as the hardware does.
 """
@@ -26,7 +26,7 @@ def interpret(tape: Tape, inputs: Sequence[ArrayLike], *, fused: bool = True) ->
     """Evaluate ``tape`` for samples.
 
     ``inputs[k]`` has shape ``(..., size of slot k)``; the leading shapes broadcast against each other.
-    Gives one array ``(..., size)`` per output slot. With ``fused=False`` a multiply-add is rounded twice.
+    Returns one array ``(..., size)`` per output slot. With ``fused=False`` a multiply-add is rounded twice.
     Raises :class:`InputError` when the count of inputs or the size of one is wrong.
     """
     arrays = [np.asarray(value, dtype=np.float64) for value in inputs]

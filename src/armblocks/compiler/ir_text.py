@@ -1,10 +1,9 @@
 """LLVM IR as text: a module that collects definitions, and the body of one function over one or more lanes.
 
-A body is straight-line code; what loops or branches is a routine (:mod:`armblocks.routines`). Text is written
+A body is straight-line code; loops and branches are routines (:mod:`armblocks.routines`). Text is emitted
 directly, because building IR objects costs many times the work of printing them. A :class:`Body` hides the
-number of lanes: ``body.add(a, b)`` is ``fadd double`` or ``fadd <8 x double>``. No fast-math flag is ever set
-and ``fma`` only stands where it was asked for, so the same operations give the same bits at every number of
-lanes.
+number of lanes: ``body.add(a, b)`` is ``fadd double`` or ``fadd <8 x double>``. No fast-math flags are set
+and ``fma`` is emitted only on request, so results do not depend on the number of lanes.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ class Module:
         return symbol in self._parts
 
     def add(self, symbol: str, text: str) -> None:
-        """Add the text that defines ``symbol``; a second text for the same symbol is left out."""
+        """Add the text that defines ``symbol``; a second text for the same symbol is ignored."""
         self._parts.setdefault(symbol, text)
 
     def define(self, symbol: str, write: Callable[[], str]) -> None:
-        """Add what ``write`` gives, unless the symbol is there already; it may add others meanwhile."""
+        """Add the text from ``write``, unless the symbol exists; ``write`` may add other definitions."""
         if symbol not in self._parts:
-            self._parts[symbol] = ""  # stands early, so that a definition is not asked for twice
+            self._parts[symbol] = ""  # reserved first, so that recursive requests do not define it twice
             self._parts[symbol] = write()
 
     def declare(self, result: str, symbol: str, *arguments: str) -> None:
@@ -121,8 +120,8 @@ class Body:
         """``a b + c``, rounded once."""
         result = self.intrinsic("fma", a, b, c)
         # For -(a b + c) LLVM selects ARM64's FNMADD, which computes (-a) b + (-c): where the sum is exactly
-        # zero that gives +0 instead of -0. A negation may also arise from a select or a product with -1, so
-        # the fence stands here. Vectors have no such instruction.
+        # zero that gives +0 instead of -0. A negation may also arise from a select or a product with -1, so #
+        # the barrier is here. Vectors have no such instruction.
         return self.intrinsic("arithmetic.fence", result) if self.lanes == 1 else result
 
     def intrinsic(self, name: str, *operands: str) -> str:
@@ -133,7 +132,7 @@ class Body:
         return self.let(f"call {self.real} @{symbol}({', '.join(f'{self.real} {x}' for x in operands)})")
 
     def held_index(self, a: str, size: int) -> str:
-        """``a`` cut to a 64-bit integer and held in 0 … size - 1, whatever it is (0 for a NaN)."""
+        """``a`` truncated to a 64-bit integer and limited to 0 … size - 1 (0 for NaN)."""
         kind = "i64" if self.lanes == 1 else f"v{self.lanes}i64"
         real = "f64" if self.lanes == 1 else f"v{self.lanes}f64"
         to_word = f"llvm.fptosi.sat.{kind}.{real}"
@@ -188,7 +187,7 @@ class Body:
         return self.let(f"or {self.bit} {a}, {b}")
 
     def doubt(self, condition: str) -> None:
-        """Mark lanes in which this body's results are wrong and must be worked out with one lane."""
+        """Mark lanes in which this body's results are invalid and must be computed with one lane."""
         self.undecided = condition if self.undecided is None else self.either(self.undecided, condition)
 
     # Sums and products without error, as unevaluated pairs.

@@ -1,4 +1,4 @@
-"""What the disk cache keeps of traced equations beside machine code: tapes, and signatures as JSON."""
+"""Cached data of traced equations besides machine code: tapes, and signatures as JSON."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def keep_tape(tape: Tape) -> None:
 
 
 def kept_tape(digest: str, trace: Callable[[], TracedFunction]) -> Tape:
-    """The tape of that digest from disk; where it is absent or damaged it is made anew from ``trace()``."""
+    """The tape of that digest from disk; if it is absent or damaged, it is recomputed with ``trace()``."""
     stored = cache.load(_name(digest))
     if stored is not None:
         try:

@@ -36,9 +36,9 @@ _ROWS, _COLUMNS, _SHARED = Layout.ROWS.value, Layout.COLUMNS.value, Layout.SHARE
 
 
 def compile_function(traced: TracedFunction) -> Kernel:
-    """The kernel of a traced function. Machine code is made when a call first needs it, or found on disk.
+    """The kernel of a traced function. Machine code is compiled at the first call, or loaded from the cache.
 
-    Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that kernels do not know.
+    Raises :class:`~armblocks.errors.CompileError` if the equations use an unsupported operation.
     """
     from armblocks.compiler.from_casadi import tape_from
 
@@ -49,8 +49,8 @@ def compile_function(traced: TracedFunction) -> Kernel:
 class Kernel:
     """``outputs = kernel(*inputs)`` in native code.
 
-    ``name``, ``inputs`` and ``outputs`` are those of the traced function. The same input gives the same bits
-    for one sample or many, whatever the number of threads.
+    ``name``, ``inputs`` and ``outputs`` are those of the traced function. Results do not depend on the number
+    of samples or threads.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Kernel:
         self._digest = digest
         self._make_tape = tape
         self._batches: dict[str, tuple[Callable[..., None], Shares]] = {}
-        self._loaded: dict[str, NativeCode] = {}  # what the functions above run in
+        self._loaded: dict[str, NativeCode] = {}  # code that contains the functions above
         self._lock = threading.RLock()
 
     @cached_property
@@ -77,14 +77,15 @@ class Kernel:
 
     @cached_property
     def entry(self) -> Callable[..., Any]:
-        """A builtin that takes the same arguments as the kernel; by far the fastest way in."""
+        """A builtin with the same arguments as the kernel; the fastest way to call it."""
         return self.entry_before(self.__call__)
 
     def entry_before(self, fallback: Callable[..., Any], maker: Maker | None = None) -> Callable[..., Any]:
-        """A builtin like :attr:`entry` that leaves what it does not serve to ``fallback``.
+        """A builtin like :attr:`entry` with another ``fallback``.
 
-        It serves plain arrays, ``out=`` and ``threads=1``. ``fallback`` gets all else, unchanged, inputs by
-        name among it. ``maker`` makes the object of which the builtin is an attribute, where it is pickled.
+        It handles plain arrays, ``out=`` and ``threads=1``. All other calls, including keyword inputs, go to
+        ``fallback`` unchanged. For pickling, ``maker`` creates the object of which the builtin is an
+        attribute.
         """
         options = "*, out=None, threads=1"
         names = ", ".join(self.inputs.names)
@@ -108,13 +109,13 @@ class Kernel:
     def __call__(self, *arrays: ArrayLike, out: object = None, threads: int = 1, **named: ArrayLike) -> Any:
         """Evaluate one sample or a batch.
 
-        Inputs come in order or by name. Each has its slot's shape, or ``(N, *shape)``; an input without the
-        samples' axis serves all samples. Any float or integer dtype and any strides are taken; C-contiguous
-        float64 is read in place. ``out`` takes the result: an array as the call would give, or a tuple of
-        them where there are several outputs; it may be one of the inputs. ``threads`` spreads a batch over
-        that many threads.
+        Inputs come in order or by name. Each has its slot's shape, or ``(N, *shape)``; an input without a
+        sample axis is used for all samples. Any float or integer dtype and any strides are accepted;
+        C-contiguous float64 is read in place. ``out`` receives the result: an array of the shape of the
+        result, or a tuple of arrays for several outputs; it may be one of the inputs. ``threads`` is the
+        number of threads for a batch.
 
-        Gives one array per output, of the slot's shape or ``(N, *shape)``; a ``numpy.float64`` for one
+        Returns one array per output, of the slot's shape or ``(N, *shape)``; a ``numpy.float64`` for one
         scalar. Raises :class:`~armblocks.errors.InputError` for wrong counts, shapes, dtypes and options.
         """
         if named:
@@ -124,7 +125,7 @@ class Kernel:
     def columns(self, *arrays: ArrayLike, out: object = None, threads: int = 1) -> Any:
         """Evaluate a batch into arrays of column layout: ``(*shape, N)`` for each output.
 
-        Inputs as in a call; at least one must have the samples' axis. An input ``(N, n)`` that is the
+        Inputs as in a call; at least one must have a sample axis. An input ``(N, n)`` that is the
         transpose of a C-contiguous ``(n, N)`` array is read in place too.
         """
         return self._run(arrays, out, threads, columns=True)

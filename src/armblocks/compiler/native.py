@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from llvmlite import binding as llvm
 
 LONG, VERY_LONG = 8_000, 100_000
-"""Lines of IR from which on the time to optimise is out of proportion: the code is so long that it waits for
-memory, not for arithmetic."""
+"""Number of IR lines from which on optimisation does not pay, because such long code is limited by memory
+access."""
 
 _LOCK = threading.Lock()  # LLVM's global context is not for two threads at once
 
@@ -43,12 +43,12 @@ class NativeCode:
 
 
 class Effort(Enum):
-    """How much work of LLVM goes into a module: it changes how fast the code is, and no bit of a result."""
+    """LLVM's optimisation effort for a module: it changes the speed of the code, not its results."""
 
     LITTLE = 0
-    """For code that runs a few times: no passes, and registers given out as they come."""
+    """For code that runs a few times: no passes, fast register allocation."""
     FULL = 1
-    """For code that runs often: all that pays for itself, by the length of the module."""
+    """For code that runs often: passes according to the length of the module."""
 
 
 def allowed_effort() -> Effort:
@@ -61,7 +61,7 @@ def allowed_effort() -> Effort:
         if effort.name.lower() == asked:
             return effort
     raise InputError(
-        f"'{asked}' is no effort",
+        f"'{asked}' is not a valid effort",
         where="the environment variable ARMBLOCKS_EFFORT",
         allowed=", ".join(f"'{effort.name.lower()}'" for effort in Effort),
         fix="set one of these, or remove the variable for fast code",
@@ -71,8 +71,8 @@ def allowed_effort() -> Effort:
 def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Effort.FULL) -> NativeCode:
     """Machine code of the module whose IR text ``write()`` gives.
 
-    ``key`` says which module it is (a variant's name, tape digests, options: all that the text depends on);
-    target and versions are added here. If the disk cache knows the key, ``write`` is not called. With
+    ``key`` identifies the module (a variant's name, tape digests, options: everything that the text depends
+    on); target and versions are added here. If the disk cache knows the key, ``write`` is not called. With
     ``ARMBLOCKS_EFFORT=little`` no code gets more effort. Raises ``InputError`` for another word there.
     """
     target, effort = host_target(), Effort(min(effort.value, allowed_effort().value))
@@ -82,7 +82,7 @@ def load_code(key: Sequence[str], write: Callable[[], str], effort: Effort = Eff
         try:
             return _link(code, target)
         except RuntimeError:
-            pass  # an object that LLVM cannot read is made anew
+            pass  # an object that LLVM cannot read is compiled again
     code = compile_object(write(), target, effort=effort)
     cache.store(name, code)
     return _link(code, target)
@@ -112,7 +112,7 @@ def _optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> None:
     from llvmlite import binding as llvm
 
     tuning = llvm.create_pipeline_tuning_options(speed_level=2)
-    # The code is written over lanes already; these would only take time.
+    # The code is already vectorised; these passes would only take time.
     tuning.slp_vectorization = False
     tuning.loop_vectorization = False
     tuning.loop_unrolling = False

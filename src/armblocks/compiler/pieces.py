@@ -1,10 +1,10 @@
 """Long tapes cut into pieces, each a function of its own.
 
-The work of LLVM grows faster than a function does, above all with what the function reads and writes, which
-LLVM compares pair by pair: ten thousand operations in one function take minutes, in pieces they take seconds.
-What one piece works out and a later one needs goes through memory, which costs time where much is used again,
-as in an arm's dynamics, and next to none in a chain of blocks. So reads and writes count for more than
-arithmetic here. The operations are the same in the same order, and so are the bits.
+The work of LLVM grows faster than linearly with the length of a function, mainly because of loads and stores,
+which LLVM compares pairwise: ten thousand operations in one function take minutes, in pieces they take
+seconds. Values that cross pieces are passed through memory, which costs time if many are reused, as in an
+arm's dynamics, and little in a chain of blocks. Reads and writes therefore have a higher weight than
+arithmetic. The operations and their order are unchanged, and so are the results.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LONGEST = 2600
 LENGTH = 600
 """Weight of a piece, about."""
 ACCESS_WEIGHT, FUNCTION_WEIGHT = 4, 8
-"""A read of an input, or a write, and an elementary function count as so many operations."""
+"""Weights of a read or write, and of an elementary function, in operations."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class Piece:
 
 @dataclass(frozen=True, kw_only=True)
 class Cut:
-    """A tape in pieces. ``places`` says where a register that a later piece reads lies in memory."""
+    """A tape in pieces. ``places`` maps registers that later pieces read to their positions in memory."""
 
     pieces: tuple[Piece, ...]
     places: dict[int, int]
@@ -45,7 +45,7 @@ class Cut:
 
 
 def is_long(tape: Tape) -> bool:
-    """Whether a tape is better cut."""
+    """Whether a tape should be cut."""
     # A vector's operands are copied in blocks, not read one by one.
     read = {r for opcode, operands in tape.operations if opcode not in VECTORS for r in operands}
     accesses = sum(register < tape.first_constant for register in read) + sum(tape.output_sizes)
@@ -75,7 +75,7 @@ def cut(tape: Tape, stores: Stores) -> Cut:
         weight += FUNCTION_WEIGHT if opcode in ELEMENTARY else 1
         weight += ACCESS_WEIGHT * (len(done) + len(new))
         following = tape.operations[k + 1].opcode if k + 1 < len(tape.operations) else None
-        # The members of a vector stand in the piece that works it out.
+        # The members of a vector are in the piece that computes it.
         if weight >= LENGTH and following is not Opcode.MEMBER:
             pieces.append(Piece(first=begin, last=k + 1, stores=tuple(waiting)))
             begin, weight, waiting = k + 1, 0, []
@@ -89,7 +89,7 @@ def cut(tape: Tape, stores: Stores) -> Cut:
 
 
 def _with_places(tape: Tape, stores: Stores, pieces: Sequence[Piece]) -> Cut:
-    """Give each register that crosses a border a place, free again after the last piece that reads it."""
+    """Assign memory to each register that crosses a boundary, reusable after the last piece that reads it."""
     first = tape.first_operation
     made: dict[int, int] = {}
     last_read: dict[int, int] = {}

@@ -1,4 +1,4 @@
-"""Kernels by a key that an earlier process knew: no tracing, no CasADi, no LLVM optimiser."""
+"""Kernels from the disk cache by key: without tracing, CasADi or the LLVM optimiser."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def recall(key: str, trace: Callable[[], TracedFunction]) -> Kernel:
     """The kernel of the equations that ``key`` identifies.
 
-    ``key`` must say everything that the equations depend on (which ones, and all numbers traced into them);
-    the sources of this package are added to it. ``trace()`` is only called when the disk cache does not
-    know the key. Raises what ``trace`` and :func:`~armblocks.compiler.compile_function` raise.
+    ``key`` must cover everything that the equations depend on (their kind, and all numbers traced into them);
+    the sources of this package are added to it. ``trace()`` is only called if the key is not in the disk
+    cache. Raises what ``trace`` and :func:`~armblocks.compiler.compile_function` raise.
     """
     name = cache.record_name(key)
     record = cache.load(name)

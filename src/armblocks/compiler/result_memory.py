@@ -1,9 +1,9 @@
-"""Memory of large results, used again once no array refers to it.
+"""Reuse of the memory of large results that no array refers to any more.
 
 The C library takes memory for a large array from the system and gives it back with the array. The system
 clears each page when it is first written, which costs more than most kernels: 58 MB take 4.7 ms beside 3.9 ms
 of evaluation (puma560 ``jacob0``, 200 000 samples, AMD EPYC, pages of 2 MB). The C library keeps memory up to
-32 MB for itself at times, never more. What has been written before costs nothing.
+32 MB for itself at times, never more. Reused pages need no clearing.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from armblocks.equations import Shape
 Array = NDArray[np.float64]
 
 LARGE = 1 << 19
-"""Numbers (4 MiB) from which on memory is used again. The C library itself keeps smaller pieces."""
+"""Number of doubles (4 MiB) from which on memory is reused. The C library itself keeps smaller blocks."""
 MOST_IDLE = 128 * 1024 * 1024
-"""Bytes that a process keeps for later results."""
+"""Maximum number of bytes that a process keeps for later results."""
 
 
 def new_result(shape: Shape) -> Array:
@@ -87,7 +87,7 @@ class ResultMemory:
                 break
             if count <= memory.size <= 2 * count:
                 return memory
-            self._idle.appendleft(memory)  # what does not fit is the first to go
+            self._idle.appendleft(memory)  # too small: freed first
         return np.empty(count + count // 8)  # more, for a result that is a little longer the next time
 
 

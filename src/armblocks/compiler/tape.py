@@ -1,4 +1,5 @@
-"""A function as a flat scalar program: inputs, constants, operations, outputs. No CasADi, no LLVM.
+"""A function as a flat scalar program: inputs, constants, operations, outputs. Independent of CasADi and
+LLVM.
 
 Every value has a register, and a register is written once. Registers are numbered through: first the inputs
 (slot after slot), then the constants, then one for each operation in order, so that operation ``k`` writes
@@ -202,7 +203,7 @@ class Tape:
             flat = numbers[n_in + n_out + n_code :]
         except (ValueError, KeyError, IndexError, struct.error) as error:
             raise CompileError(
-                f"these bytes are no tape: {error}",
+                f"these bytes are not a tape: {error}",
                 allowed="what Tape.to_bytes gave",
                 where="tape",
                 fix="write the tape again with Tape.to_bytes",

@@ -1,8 +1,8 @@
 """Builds tapes: folds constants, finds common subexpressions, fuses multiply-adds, drops dead code.
 
-Only rewritings that give the same bits for every input (but the sign of a NaN) are made, with one exception
-that is made here once and for all machines: ``a b + c`` becomes one fused multiply-add where the product has
-no other use and is not one that the traced function rounds.
+Only rewritings with identical results for every input (except the sign of a NaN) are applied, with one
+exception that is decided here for all machines: ``a b + c`` becomes one fused multiply-add where the product
+has no other use and is not one that the traced function rounds.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NOT_FOLDED = ELEMENTARY | VECTORS
 
 
 class TapeBuilder:
-    """Collects scalar operations and gives a checked, tidy :class:`Tape`.
+    """Collects scalar operations and builds a checked :class:`Tape` without dead code.
 
     Values are named by handles (integers) that the methods return. Handles are not registers.
     """
@@ -96,7 +96,8 @@ class TapeBuilder:
         return self._merge_branches(b, a) if merged is None else merged
 
     def _merge_branches(self, a: int, b: int) -> int | None:
-        """CasADi writes a choice as (c ? yes : 0) + (not c ? no : 0), here (c ? yes : 0) + (c ? 0 : no)."""
+        """CasADi represents a conditional as (c ? yes : 0) + (not c ? no : 0), here (c ? yes : 0) + (c ? 0 :
+        no)."""
         first, second = self.operands_of(a, Opcode.SELECT), self.operands_of(b, Opcode.SELECT)
         if first is None or second is None or first[0] != second[0]:
             return None

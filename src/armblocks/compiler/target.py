@@ -15,7 +15,8 @@ _LOCK = threading.Lock()
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """What the code generator must know of a processor. All parts belong to the key of cached code."""
+    """The properties of a processor for the code generator. All of them are part of the key of cached
+    code."""
 
     triple: str
     cpu: str
@@ -45,7 +46,7 @@ class Target:
 
 @cache
 def host_target() -> Target:
-    """The processor that we run on. Starts LLVM on first use."""
+    """The processor of this machine. Initialises LLVM at the first use."""
     import llvmlite
     from llvmlite import binding as llvm
 

@@ -1,4 +1,4 @@
-"""Memory that a function body uses for a while: from the stack, or from the C library where it is long.
+"""Temporary memory of a function body: from the stack, or from the C library if it is large.
 
 Stacks are short: 8 MiB in the first thread of a process, 512 KiB in others on some systems. Linear equations
 in 300 unknowns over eight lanes need 12 MB.
@@ -40,7 +40,7 @@ class WorkSpace:
         self._body.do(f"store {self._body.real} {value}, ptr {self.row(index)}, align {self._align}")
 
     def free(self) -> None:
-        """Give the memory back."""
+        """Release the memory."""
         give_back = "llvm.stackrestore.p0" if self._on_stack else "free"
         self._body.module.declare("void", give_back, "ptr")
         self._body.do(f"call void @{give_back}(ptr {self._mark})")

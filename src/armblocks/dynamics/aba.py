@@ -21,7 +21,7 @@ def aba(
     gravity: Vector,
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[SX]:
-    """Joint accelerations from the joint torques that friction leaves over, in the order of q.
+    """Joint accelerations from the joint torques less friction, in the order of q.
 
     ``on_bodies`` wrenches that bodies exert on the surroundings, each in its body's frame.
     Spatial vectors are angular, then linear. The cost grows with n instead of n^3: right for long chains.
@@ -35,7 +35,7 @@ def aba(
     v: list[SX] = []
     c: list[SX] = []
     pA: list[SX] = []
-    # 1. Outward: velocities and what they cost.
+    # 1. Outward: velocities and velocity-product terms.
     for i, body in enumerate(bodies):
         vJ = S[i] * qd[body.joint]
         inherited = SX(6, 1) if body.parent == BASE else mtimes(X[i], v[body.parent])

@@ -13,10 +13,10 @@ from armblocks.spatial.vectors import ZERO, Symmetric
 def regrouped(tree: KinematicTree) -> KinematicTree:
     """The same equations of motion with the fewest inertial parameters.
 
-    A joint cannot feel some of its body's parameters apart from those of its parent: a revolute joint the
-    mass, the first moment along its axis and an inertia that is equal across the axis; a prismatic joint the
-    whole inertia matrix. These move to the parent. Each body's origin is first slid along its joint's axis to
-    the foot of the common normal with the next axis, which spares the products with that distance.
+    Some parameters of a body have the same effect on its joint as parameters of its parent: a revolute joint
+    the mass, the first moment along its axis and an inertia that is equal across the axis; a prismatic joint
+    the whole inertia matrix. These move to the parent. Each body's origin is first slid along its joint's
+    axis to the foot of the common normal with the next axis, which spares the products with that distance.
 
     Joint torques, mass matrix and kinetic energy are those of the robot; the inertia of a single body is not.
     Source: Khalil, Dombre, *Modeling, Identification and Control of Robots*, 9.4 (base inertial parameters).
@@ -34,13 +34,14 @@ def regrouped(tree: KinematicTree) -> KinematicTree:
 
 
 def _shared_with_parent(inertia: RigidInertia, *, turn: float, slide: float) -> RigidInertia:
-    """The part that is the same on either side of the joint: unmoved by its motion, no momentum from it."""
+    """The part of the inertia that can be assigned to either side of the joint."""
     second = inertia.second
     if turn:
-        # Equal across the axis and none about it: a turn neither changes it nor gives it momentum.
+        # Equal across the axis and zero about it: a rotation neither changes it nor gives it momentum.
         second = Symmetric(second.yy, second.yy, 0.0, 0.0, 0.0, 0.0)
     if slide:
-        # Without mass a slide gives no momentum, and without first moment it leaves the inertia as it is.
+        # Without mass a translation gives no momentum, and without first moment it does not change the
+        # inertia.
         return RigidInertia(0.0, ZERO, second)
     return RigidInertia(inertia.mass, (0.0, 0.0, inertia.first[2]), second)
 

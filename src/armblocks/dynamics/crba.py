@@ -39,7 +39,7 @@ def crba(tree: KinematicTree, joints: Sequence[JointMotion]) -> SquareMatrix:
             body.turn * S.zz,
         )
         M[i][i] = body.turn * moment[2] + body.slide * force[2] + body.reflected_inertia
-        # 3. What the joints further in feel of it.
+        # 3. Torque at the ancestor joints (toward the base).
         j = i
         while bodies[j].parent != BASE:
             force_in_parent = joints[j].to_parent(force)

@@ -1,4 +1,4 @@
-"""Forward dynamics: which joint accelerations follow from joint torques, and whether any do."""
+"""Forward dynamics: joint accelerations from joint torques, and a check of the inertia matrix."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ from armblocks.robot.tree import KinematicTree
 from armblocks.spatial.vectors import Scalar
 
 MOST_JOINTS_BY_MATRIX = 18
-"""Up to here the factored inertia matrix takes fewer operations than articulated bodies: counted on chains of
-revolute joints about any axes (6 joints: 2,200 against 4,345; 16 joints: 12,165 against 14,555)."""
+"""Up to this number of joints the factored inertia matrix takes fewer operations than the articulated-body
+algorithm: counted on chains of revolute joints about any axes (6 joints: 2,200 against 4,345; 16 joints:
+12,165 against 14,555)."""
 
 SAMPLES = 3
 NO_INERTIA = 1e-12
-"""A pivot below this part of its diagonal entry is rounding of zero."""
+"""A pivot below this fraction of its diagonal entry counts as zero."""
 
 
 def forward_dynamics(
@@ -32,7 +33,7 @@ def forward_dynamics(
     tau: Sequence[Scalar],
     on_bodies: Mapping[int, Wrench] | None = None,
 ) -> list[SX]:
-    """Accelerations of the joints, in the order of q, where ``tau`` is what friction leaves over."""
+    """Accelerations of the joints, in the order of q, where ``tau`` is the joint torque less friction."""
     joints = joint_motions(tree, q)
     n = tree.n
     if n > MOST_JOINTS_BY_MATRIX:
@@ -48,10 +49,10 @@ def forward_dynamics(
 
 
 def check_accelerations_exist(tree: KinematicTree) -> None:
-    """Raise RobotError, naming the joint, where some joint has nothing to accelerate at any q.
+    """Raise RobotError, naming the joint, where the inertia at some joint is zero for all q.
 
-    That is a pivot of the factored inertia matrix (what the joint feels while all joints beyond it are free)
-    that is zero, or below it, at several random positions.
+    The criterion is a pivot of the factored inertia matrix (the inertia at the joint while all distal joints
+    are free) that is not positive at several random positions.
     """
     if tree.n == 0:
         return

@@ -1,9 +1,8 @@
-"""Equations of motion of an arm some of whose joints are held: by dry friction that sticks, or by a stop.
+"""Equations of motion of an arm with locked joints: by sticking friction or by a stop.
 
-Which joints are held is a question of a moment (:func:`settled` answers it); while the time flows it stays,
-so that the equations are smooth. Sources: Siciliano et al., *Robotics*, 2009, 7.3 (equations of motion);
-Pfeiffer, Glocker, *Multibody Dynamics with Unilateral Contacts*, 1996 (stick and slip as a complementarity,
-impacts).
+:func:`settled` finds the locked joints at one time; the set is constant between events, so that the equations
+are smooth. Sources: Siciliano et al., *Robotics*, 2009, 7.3 (equations of motion); Pfeiffer, Glocker,
+*Multibody Dynamics with Unilateral Contacts*, 1996 (stick and slip as a complementarity, impacts).
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ from armblocks.robot.robot import Robot
 from armblocks.robot.tree import KinematicTree
 
 ROUNDING = 1e-9
-"""A torque that works against a joint's motion counts beyond this part of its friction, as it breaks away."""
+"""Relative torque margin: a torque against the sliding direction counts only beyond this fraction of the
+friction."""
 _SOME_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
@@ -32,7 +32,7 @@ _SOME_PAYLOAD = SX([1.0, 0.1, 0.2, 0.3, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 class DryFriction:
     """Coulomb friction of the joints, N m or N: ``forward`` >= 0 and ``backward`` <= 0, each (n,).
 
-    A joint sticks while what would move it lies within ``breakaway`` times these two.
+    A joint sticks while the torque on it is within ``breakaway`` times these limits.
     """
 
     forward: NDArray[np.float64]
@@ -70,10 +70,10 @@ def viscous_friction(robot: Robot) -> NDArray[np.float64]:
 
 
 class JointEquations:
-    """``M(q) qdd + bias(q, qd) = torque`` at one state, where ``torque`` is all that acts at the joints.
+    """``M(q) qdd + bias(q, qd) = torque`` at one state, where ``torque`` is the total joint torque.
 
     ``bias`` has gravity, velocity terms and the ``wrench`` (see :mod:`armblocks.dynamics.traces`); ``M`` and
-    ``bias`` have the ``payload``. Raises RobotError, naming the joint, where one has nothing to accelerate.
+    ``bias`` have the ``payload``. Raises RobotError, naming the joint, where the inertia at a joint is zero.
     """
 
     def __init__(
@@ -108,11 +108,11 @@ class JointEquations:
         return result
 
     def accelerations(self, torque: SX, free: SX) -> SX:
-        """``qdd`` (n,), exactly 0 of the joints that are held."""
+        """``qdd`` (n,), exactly 0 for locked joints."""
         return self.solve(torque - self.bias, free)
 
     def unbalanced(self, torque: SX, qdd: SX) -> SX:
-        """What is left to move each joint (n,): of a held one, the torque that has to hold it."""
+        """The remaining torque at each joint (n,); for a locked joint, its holding torque."""
         return torque - self.bias - mtimes(self.M, qdd)
 
     def stopped(self, qd: SX, stopping: SX) -> SX:
@@ -127,7 +127,7 @@ class JointEquations:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """How joints stand: ``mode`` 1 slides forwards (or is free), -1 backwards, 0 is held;
+    """The modes of the joints: ``mode`` 1 slides forwards (or is free), -1 backwards, 0 is locked;
     ``contact`` 1 at the upper stop, -1 at the lower one, 0 at none. Each (n,)."""
 
     mode: SX
@@ -135,7 +135,7 @@ class Rest:
 
 
 def from_rest(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
-    """Whither a held joint goes: 1 forwards, -1 backwards, 0 where friction or its stop holds it."""
+    """Direction in which a locked joint starts to move: 1 forwards, -1 backwards, 0 stays locked."""
     forwards = logic_and(held_torque > forward, contact <= 0.0)
     backwards = logic_and(held_torque < backward, contact >= 0.0)
     return forwards - backwards
@@ -144,13 +144,13 @@ def from_rest(held_torque: SX, contact: SX, forward: SX, backward: SX) -> SX:
 def settled(
     equations: JointEquations, qd: SX, driving: SX, start: Rest, friction: DryFriction, breakaway: SX
 ) -> Rest:
-    """Which joints are held at this moment, and whither the others slide.
+    """The locked joints, and the sliding directions of the others.
 
     ``driving`` is the torque (n,) at the joints without dry friction and rigid stops; ``start`` a first
-    guess. A joint that moves slides. Of those at rest, all that friction cannot hold are let go, and all that
-    would slide against their own direction are held, as many rounds as there are joints. (The accelerations
-    are those of least constraint, min 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction |qdd|, which is
-    convex: there is one answer.) What is not settled then, the guards find.
+    guess. A moving joint slides. Of the joints at rest, those beyond their friction limit are released, and
+    those that would slide against their direction are locked, in as many rounds as there are joints. (The
+    accelerations are those of least constraint, min 1/2 qdd' M qdd - qdd' (torque - bias) + sum of friction
+    |qdd|, which is convex and has a unique solution.) Remaining inconsistencies are found by the guards.
     """
     n = qd.numel()
     dry = np.zeros(n)

@@ -1,4 +1,4 @@
-"""The geometric Jacobian of the tool, and how well it can move."""
+"""The geometric Jacobian of the tool, and manipulability."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Column = tuple[Vector, Vector]
 """Linear and angular velocity of the tool at unit rate of one joint."""
 
 MOST_COLUMNS_BY_MINORS = 8
-"""Up to here all 6x6 minors are formed; beyond, the Gram matrix is cheaper."""
+"""Up to this number of joints all 6x6 minors are formed; beyond, the Gram matrix is cheaper."""
 
 
 def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
@@ -32,7 +32,8 @@ def world_columns(tree: KinematicTree, q: Sequence[Scalar]) -> list[Column]:
 def tool_columns(tree: KinematicTree, q: SX) -> list[Column]:
     """Columns of ``jacobe``: point is the tool's origin, axes are the tool's.
 
-    Poses are carried from the tool inwards, so that no rotation into the world and back is formed.
+    Poses are propagated from the tool towards the base, so that no rotation into the world and back is
+    formed.
     """
     columns: list[Column] = [(ZERO, ZERO)] * tree.n
     carrier = tree.tool.body

@@ -1,4 +1,4 @@
-"""What a joint coordinate does to the frames on both sides, as the algorithms need it."""
+"""The motion of the frames on both sides of a joint."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def constant_pose(T: Transform) -> Pose:
 
 
 def body_poses(tree: KinematicTree, q: Sequence[Scalar], ground: Pose) -> list[Pose]:
-    """Poses of all bodies where the base stands at ``ground``; q in the robot's order, rad or m."""
+    """Poses of all bodies with the base at ``ground``; q in the robot's order, rad or m."""
     base = _TurnedPose(ground, 0.0, 0.0, Turn(1.0, 0.0), ground)
     turned: list[_TurnedPose] = []
     for body in tree.bodies:
@@ -92,6 +92,6 @@ def _moved(parent: _TurnedPose, body: Body, q: Scalar) -> _TurnedPose:
 
 
 def frame_pose(frame: Frame, bodies: Sequence[Pose], ground: Pose) -> Pose:
-    """The pose of a frame that rides on a body or on the base."""
+    """The pose of a frame that is fixed to a body or to the base."""
     carrier = ground if frame.body == BASE else bodies[frame.body]
     return carrier.after(frame.pose)

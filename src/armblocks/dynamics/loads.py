@@ -14,7 +14,7 @@ from armblocks.spatial.inertia import RigidInertia
 from armblocks.spatial.vectors import Symmetric, Vector, add, cross, rotate
 
 WRENCH_SLOT = Slot("wrench", (6,), "N, N m")
-"""Force, then moment, that the tip exerts on its surroundings, about the last link's origin in its axes."""
+"""Force, then moment, of the tip on the environment, about the last link's origin in its axes."""
 PAYLOAD_SLOT = Slot("payload", (10,), "kg, m, kg m2")
 """Mass, centre x y z, inertia xx yy zz xy yz xz about that centre, all in the tool frame."""
 

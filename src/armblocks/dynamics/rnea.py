@@ -12,7 +12,7 @@ from armblocks.spatial.vectors import ZERO, Matrix, Scalar, Vector, add, cross, 
 
 
 class Wrench(NamedTuple):
-    """A force (N) and a moment (N m) about the origin of the frame that it stands in."""
+    """A force (N) and a moment (N m) about the origin of its frame."""
 
     force: Vector
     moment: Vector
@@ -54,13 +54,13 @@ def rnea(
         # 1. Outward: velocities and accelerations. Gravity is an upward acceleration of the base.
         motion = _carried(ground if body.parent == BASE else motions[body.parent], joint, qd, qdd)
         motions.append(motion)
-        # 2. The wrench that moves the body so.
+        # 2. The net wrench on each body.
         wrench = inertial_wrench(body.inertia, motion)
         if on_bodies and i in on_bodies:
             wrench = Wrench(*(add(a, b) for a, b in zip(wrench, on_bodies[i])))
         wrenches.append(wrench)
     tau: list[Scalar] = [0.0] * len(bodies)
-    # 3. Inward: every joint carries its own body and all that hangs on it.
+    # 3. Inward: every joint transmits the wrench of its body and of all distal bodies.
     for i in reversed(range(len(bodies))):
         body = bodies[i]
         force, moment = wrenches[i]
@@ -131,7 +131,7 @@ def inertial_wrench(inertia: RigidInertia, motion: BodyMotion) -> Wrench:
 
 
 def _added(parent: Wrench, child: Wrench, joint: JointMotion) -> Wrench:
-    """The parent's wrench with what its child hands down, about the parent's origin."""
+    """The parent's wrench plus that of its child, about the parent's origin."""
     force = joint.to_parent(child.force)
     moment = add(joint.to_parent(child.moment), cross(joint.p, force))
     return Wrench(add(parent.force, force), add(parent.moment, moment))

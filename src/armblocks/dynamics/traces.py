@@ -1,15 +1,15 @@
-"""Every quantity that an arm offers, as a traced function: the table that the rest of the house uses.
+"""All quantities of an arm as traced functions, with a table for the other packages.
 
 Shapes, units and frames of the inputs and outputs, here and in all functions below:
 
 ``q`` (n,) rad or m, ``qd`` (n,) per second, ``qdd`` (n,) per second squared, ``tau`` (n,) N m or N, all in
 the order of the robot's moving links.
-``wrench`` (6,): force (N) and moment (N m) that the tip exerts on its surroundings, about the origin and in
-the axes of the *last link's* frame (the toolbox's ``fext``; the tool transform has no part in it).
+``wrench`` (6,): force (N) and moment (N m) of the tip on the environment, about the origin and in
+the axes of the *last link's* frame (the toolbox's ``fext``, independent of the tool transform).
 ``payload`` (10,): mass (kg), centre x y z (m), inertia xx yy zz xy yz xz about that centre (kg m2), in the
 axes of the *tool* frame.
 
-Robots of inadmissible values do not get here: :class:`armblocks.robot.Robot` refuses them.
+Invalid robots are already rejected by :class:`armblocks.robot.Robot`.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def trace_rne(robot: Robot) -> TracedFunction:
 
 
 def trace_rne_loaded(robot: Robot) -> TracedFunction:
-    """``tau (n,)`` as of ``rne``, while the tip exerts a wrench and the tool carries a payload."""
+    """``tau (n,)`` as ``rne``, with a wrench at the tip and a payload at the tool."""
     tree = regrouped(KinematicTree.of(robot))
 
     def equations(q: SX, qd: SX, qdd: SX, wrench: SX, payload: SX) -> SX:
@@ -171,9 +171,9 @@ def trace_friction(robot: Robot) -> TracedFunction:
 
 
 def trace_accel(robot: Robot) -> TracedFunction:
-    """``qdd (n,)`` that joint torques give: friction and gravity act, rotors are accelerated.
+    """``qdd (n,)`` for given joint torques, with friction, gravity and rotor inertia.
 
-    Raises RobotError, naming the joint, where a joint has nothing to accelerate.
+    Raises RobotError, naming the joint, where the inertia at a joint is zero.
     """
     tree = regrouped(KinematicTree.of(robot))
     check_accelerations_exist(tree)
@@ -187,7 +187,7 @@ def trace_accel(robot: Robot) -> TracedFunction:
 
 
 def trace_accel_loaded(robot: Robot) -> TracedFunction:
-    """``qdd (n,)`` as of ``accel``, while the tip exerts a wrench and the tool carries a payload.
+    """``qdd (n,)`` as ``accel``, with a wrench at the tip and a payload at the tool.
 
     Raises RobotError, naming the joint, where a joint has nothing to accelerate, whatever the payload.
     """

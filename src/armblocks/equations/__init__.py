@@ -1,4 +1,4 @@
-"""The narrow waist: typed sets of equations, and nothing else, pass between modelling and numerics."""
+"""Typed sets of equations: the interface between modelling and numerics."""
 
 from typing import TYPE_CHECKING
 

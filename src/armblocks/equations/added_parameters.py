@@ -1,4 +1,4 @@
-"""A system with more parameters, which move those that it has."""
+"""A system with added parameters that perturb its own parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from armblocks.equations.traced_function import TracedFunction
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AddedParameter:
-    """A parameter that starts at 0: ``changes`` says what is added to others, in the symbols ``symbol``."""
+    """A parameter that starts at 0: ``changes`` are the increments of other parameters, in terms of
+    ``symbol``."""
 
     slot: Slot
     symbol: SX
@@ -25,10 +26,10 @@ class AddedParameter:
 
 
 def with_added_parameters(system: HybridSystem, added: tuple[AddedParameter, ...]) -> HybridSystem:
-    """The same equations with parameters behind those that they have; at 0 they change nothing.
+    """The same equations with parameters appended; at 0 they have no effect.
 
-    A change for a parameter that the system has not is left out. ``derivatives by`` an added parameter are
-    those along the changes that it makes.
+    Changes of parameters that the system does not have are ignored. ``derivatives by`` an added parameter are
+    directional derivatives along its changes.
     """
     old = system.parameters
     layout = Signature((*old.slots, *(entry.slot for entry in added)))

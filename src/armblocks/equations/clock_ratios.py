@@ -1,8 +1,8 @@
-"""Periods and offsets of clocks as exact fractions of a second, by the rule that a run decides ticks by.
+"""Periods and offsets of clocks as exact fractions of a second, consistent with the ticks of a run.
 
-A run takes ticks within 4 units in the last place of each other for one instant. Two sample times therefore
-have the simplest ratio that their doubles allow within that distance: 0.3 s is three times 0.1 s, and 1/3 s
-is 10/3 times 0.1 s, though no double is a third. The common period of any number of clocks follows exactly.
+A run treats ticks within 4 units in the last place as simultaneous. The ratio of two sample times is
+therefore the simplest fraction within that tolerance: 0.3 s is three times 0.1 s, and 1/3 s is 10/3 times 0.1
+s, though no double is a third. The common period of any number of clocks follows exactly.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fractions import Fraction
 from armblocks.equations.hybrid_system import SampleClock
 
 SAME_INSTANT = Fraction(1, 2**50)
-"""Relative distance up to which two instants are one: 4 units in the last place."""
+"""Relative tolerance of simultaneous times: 4 units in the last place."""
 
 
 def ratio(numerator: float, denominator: float) -> Fraction:

@@ -1,9 +1,9 @@
-"""Elementary functions of constants inside expressions, with the same bits on every machine.
+"""Constant folding of elementary functions, with identical results on every machine.
 
-CasADi replaces an operation on constants by its value as soon as it is written, and takes that value from the
-C library, whose last bits differ from machine to machine. The functions here write the value of
-:mod:`armblocks.rounded_functions` instead. Sums, products, quotients and square roots of constants stay with
-CasADi: IEEE 754 defines them to the bit.
+CasADi evaluates an operation on constants when the expression is created, with the C library, whose last bits
+are platform-dependent. The functions here insert the value of :mod:`armblocks.rounded_functions` instead.
+Sums, products, quotients and square roots of constants are evaluated by CasADi, because IEEE 754 defines
+their bits.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _OPERATIONS = {
 def elementary(name: str, *values: SX) -> SX:
     """A function of :data:`armblocks.rounded_functions.FUNCTIONS` of arrays, element by element.
 
-    Scalars are spread over the shape of the others.
+    Scalars are broadcast.
     """
     result = _power(*values) if name == "power" else getattr(casadi, name)(*values)
     if not any(_has_constants(value) for value in values):
@@ -64,7 +64,8 @@ def elementary(name: str, *values: SX) -> SX:
 def _power(base: SX, exponent: SX) -> SX:
     """``base**exponent``, whose derivative by the exponent has the factor ``log base``.
 
-    CasADi works that logarithm out while it differentiates; it does not where it sees no constant.
+    CasADi evaluates that logarithm during differentiation if the base is a constant; here it is hidden from
+    CasADi.
     """
     positive = base.is_constant() and all(float(base[k]) > 0.0 for k in range(base.numel()))
     if positive and not exponent.is_constant():
@@ -79,12 +80,12 @@ def _has_constants(value: SX) -> bool:
 
 
 def has_elementary(function: Function) -> bool:
-    """Whether a function has operations whose values for constants come from the C library."""
+    """Whether a function has operations that CasADi would evaluate with the C library for constants."""
     return any(function.instruction_id(k) in _OPERATIONS for k in range(function.n_instructions()))
 
 
 def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]:
-    """The results, columns, of an SX function for these arguments, which may be constants in part."""
+    """The result columns of an SX function for these arguments, some of which may be constants."""
     if not any(map(_has_constants, arguments)):
         return function.call(list(arguments), True, False)
     whole = [densify(argument) for argument in arguments]
@@ -111,7 +112,7 @@ def call_with_constants(function: Function, arguments: Sequence[SX]) -> list[SX]
 
 
 def _called(function: Function, entries: Sequence[SX]) -> list[SX]:
-    """The entries of all results of a function that is called within another, by those of its arguments."""
+    """The entries of all results of a nested function call, from the entries of its arguments."""
     starts = [0, *accumulate(function.nnz_in(k) for k in range(function.n_in()))]
     arguments = [
         SX(function.sparsity_in(k), vertcat(*entries[starts[k] : starts[k + 1]], SX(0, 1)))
@@ -131,7 +132,7 @@ def _operation(number: int, operands: Sequence[SX]) -> SX:
 
 
 def substituted(expression: SX, symbols: SX, values: SX) -> SX:
-    """The expression with values, which may be constants in part, in the place of symbols."""
+    """The expression with values substituted for symbols; some values may be constants."""
     if not _has_constants(values):
         return substitute(expression, symbols, values)
     others = vertcat(*(entry for entry in symvar(expression) if not depends_on(symbols, entry)), SX(0, 1))

@@ -1,4 +1,4 @@
-"""Systems that only flow, written by hand: no clocks, no events, no implicit equations."""
+"""Hand-written continuous systems without clocks, events or implicit equations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def continuous_system(
     breakpoints: TracedFunction,
     aliases: Mapping[str, str],
 ) -> HybridSystem:
-    """A system that only flows; ``derivative`` and ``signals`` take ``t, x, p``."""
+    """A continuous system; ``derivative`` and ``signals`` take ``t, x, p``."""
     nothing = Signature()
     t, x, p = derivative.arguments
     z, w, m, e = (SX.sym(letter, 0) for letter in "zwme")

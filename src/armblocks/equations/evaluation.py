@@ -1,6 +1,6 @@
-"""Values and exact slopes of a system at single points, by CasADi's own interpreter.
+"""Values and exact derivatives of a system at single points, by CasADi's interpreter.
 
-For the few evaluations of an analysis this is faster than native code, which would first have to be made.
+For the few evaluations of an analysis this is faster than compiling native code.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Point:
-    """Where a system is evaluated: time (s) and the flat vectors of the system's layouts."""
+    """An evaluation point of a system: time (s) and the flat vectors of the system's layouts."""
 
     t: float
     x: Array
@@ -40,7 +40,7 @@ class Point:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Slopes:
     """Derivatives of one function: by the time (m, 1), the states (m, nx), the discrete variables (m, nz),
-    the unknowns (m, nw), and those parameters that were asked for (m, k)."""
+    the unknowns (m, nw), and the selected parameters (m, k)."""
 
     t: Array
     x: Array
@@ -50,21 +50,21 @@ class Slopes:
 
 
 def refuse_called(system: HybridSystem, what: str) -> None:
-    """Raise ``InputError`` where Python works out a part of a system: it has values, but no equations."""
+    """Raise ``InputError`` if Python computes a part of a system: that part has no equations."""
     if system.called:
         raise InputError(
             f"block '{system.called[0]}' calls Python, which has no {what}",
             where=system.name,
             allowed="blocks with equations",
-            fix="take a Python Function that can be traced, or leave the block out",
+            fix="use a traceable Python Function, or remove the block",
         )
 
 
 class EvaluatedSystem:
     """A system's functions and their derivatives as numbers.
 
-    ``parameters``: indices into ``p`` of those that derivatives are taken by; ``signals``: the rows of ``y``
-    that are worked out (``None``: all). Every function is prepared when first used.
+    ``parameters``: indices into ``p`` of the parameters for derivatives; ``signals``: the rows of ``y`` to
+    compute (``None``: all). Every function is prepared when first used.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class EvaluatedSystem:
             by = vertcat(t, x, z, w, chosen)
             slopes = jacobian(self._rows(traced), by)
             function = Function("j", list(traced.arguments), [slopes], {"cse": True})
-            if reads_tables(function):  # whose numbers are worked out column by column
+            if reads_tables(function):  # evaluated column by column
                 function = Function("j", list(traced.arguments), [vec(densify(slopes))], {"cse": True})
             self._slopes[traced.name] = function
         count = self._rows(traced).numel()
@@ -130,7 +130,7 @@ class EvaluatedSystem:
         return self._call(self.system.update, [*point.ends, ticking])
 
     def settled(self, point: Point) -> Array:
-        """``z`` (nz,) with all modes as the values of the moment want them."""
+        """``z`` (nz,) with all modes consistent with the present values."""
         events = np.zeros(len(self.system.guard_directions))
         reset = self._call(self.system.reset, [*point.ends, events])
         return reset[self.system.states.size :]
@@ -144,7 +144,7 @@ class EvaluatedSystem:
         )
         return x, z, w
 
-    # Slopes.
+    # Derivatives.
 
     def derivative_slopes(self, point: Point) -> Slopes:
         """Derivatives of ``x'``."""
@@ -159,21 +159,21 @@ class EvaluatedSystem:
         return self._differentiate(self.system.residual, point.ends)
 
     def update_slopes(self, point: Point, ticking: Array) -> Slopes:
-        """Derivatives of what ``z`` becomes at a tick."""
+        """Derivatives of the new ``z`` at a tick."""
         return self._differentiate(self.system.update, [*point.ends, ticking])
 
     # Delays.
 
     def delay_times(self, point: Point) -> Array:
-        """How long each delayed scalar is delayed (nd,), s."""
+        """The delay of each delayed scalar (nd,), s."""
         return self._call(self._delays.times, point.ends)
 
     def delay_inputs(self, point: Point) -> Array:
-        """What goes into the delays, and its time derivatives (2 nd,)."""
+        """The inputs of the delays, and their time derivatives (2 nd,)."""
         return self._call(self._delays.inputs, point.ends)
 
     def delay_input_slopes(self, point: Point) -> Slopes:
-        """Derivatives of what goes into the delays."""
+        """Derivatives of the inputs of the delays."""
         return self._differentiate(self._delays.inputs, point.ends)
 
     @property
@@ -183,7 +183,7 @@ class EvaluatedSystem:
 
     @cached_property
     def sampled(self) -> NDArray[np.bool_]:
-        """Which entries of ``z`` some clock moves (nz,); the others are modes and wait for events."""
+        """The entries of ``z`` that a clock updates (nz,); the others are modes, which events change."""
         update = self.system.update
         moved = np.zeros(self.system.discrete.size, dtype=np.bool_)
         if self.system.clocks:
@@ -192,7 +192,7 @@ class EvaluatedSystem:
 
 
 def _numbers(function: Function, arguments: Sequence[Array]) -> Array:
-    """The one result of a function at a point, with tables that it reads by index."""
+    """The single result of a function at a point, including tables that are read by index."""
     if reads_tables(function):
         flat = [np.asarray(argument, dtype=np.float64).reshape(-1) for argument in arguments]
         return np.asarray(evaluate_with_reads(function, flat)[0], dtype=np.float64)

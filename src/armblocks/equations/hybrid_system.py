@@ -1,4 +1,4 @@
-"""A whole diagram as equations: the narrow waist between modelling and numerics."""
+"""The equations of a whole diagram: the interface between modelling and numerics."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class SampleClock:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Delays:
-    """Delayed scalars, ``nd`` of them: what goes in, how long it takes, and where in ``z`` it comes out.
+    """The ``nd`` delayed scalars: inputs, delays, and indices of the delayed values in ``z``.
 
-    ``inputs``: from ``t, x, z, w, p`` what is delayed and its exact time derivatives, ``(2 nd,)``. ``times``:
-    from the same how long, ``(nd,)`` s. ``bounds``: from ``p`` the shortest and the longest of each, above 0,
-    ``(2 nd,)`` s. ``values`` and ``slopes``: the places in ``z`` that show the value at ``t - tau``, and its
-    time derivative for a delay that is ``fixed``, whenever an equation is evaluated. They alone of ``z``
-    change while the time flows. Before the start, a signal was what ``initial_discrete`` has in its place.
+    ``inputs``: from ``t, x, z, w, p`` the delayed signals and their exact time derivatives, ``(2 nd,)``.
+    ``times``: from the same arguments the delays, ``(nd,)`` s. ``bounds``: from ``p`` the lower and upper
+    limits of the delays, above 0, ``(2 nd,)`` s. ``values`` and ``slopes``: the indices in ``z`` of the
+    values at ``t - tau``, and of their time derivatives for ``fixed`` delays. They are the only entries of
+    ``z`` that change between instants. Before the start, a signal has its value in ``initial_discrete``.
     """
 
     values: tuple[int, ...]
@@ -54,7 +54,7 @@ class Delays:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearLoops:
-    """Loops ``x = M x + c`` that are solved where they stand, and how to know their condition.
+    """Linear loops ``x = M x + c`` that are solved in place, with the data for their condition numbers.
 
     ``signals``: the names of the unknowns of each. ``matrices``: from ``t, x, z, w, p`` all ``M - 1`` row by
     row, one after another.
@@ -69,30 +69,29 @@ class HybridSystem:
     """Continuous flow, sampled parts, events and implicit equations of one diagram.
 
     ``x' = derivative(t, x, z, w, p)``, ``y = signals(t, x, z, w, p)``, ``x(0) = initial_states(p)``, where
-    ``w`` solves ``0 = residual(t, x, z, w, p)``. ``z`` jumps at instants and is constant in between.
+    ``w`` solves ``0 = residual(t, x, z, w, p)``. ``z`` changes at instants and is constant in between.
 
     The flat vectors ``x`` (states), ``z`` (discrete), ``w`` (algebraic), ``p`` (tunable parameters) and ``y``
     (signals) are laid out by the signatures. Slot names are paths: a signal is ``block/port``, a state
-    ``block/state``, a parameter ``block.parameter``; signals stand in evaluation order, so the first
-    non-finite one is the culprit.
+    ``block/state``, a parameter ``block.parameter``; signals are in evaluation order, so the first non-finite
+    signal is the cause of the others.
 
-    All functions have flat ends. ``derivative``, ``signals``, ``residual``, ``residual_jacobian`` and
-    ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``; one output ``xd (nx,)``,
-    ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``.
-    ``update``: one input more, ``m (nclocks,)``; output ``z (nz,)``: what z becomes at an instant at which
-    the clocks with ``m[k] = 1`` tick. Where ``captures`` is true, it is also asked for with no clock ticking,
-    just before every instant, at a time one unit in the last place earlier: then z keeps left limits.
-    ``reset``: one input more, ``e (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs
-    ``x (nx,)`` and ``z (nz,)``. With all ``e`` zero it gives the consistent modes (of a limiter that starts
-    beyond its limit), with what they entail for states. A run calls it so at the start after the ticks, and
-    whenever no guard fires and some mode contradicts its condition. A breakpoint is an instant like a tick:
-    guards are compared across it.
-    ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode ``z[modes[k]]`` is
-    not consistent with the values of the moment.
-    ``initial_states``, ``initial_discrete``, ``initial_algebraic``: input ``p``; output ``x0``, ``z0``,
-    ``w0``. At the start all clocks without an offset tick, before the first derivative.
-    ``breakpoints``: input ``p``; output ``times (nb,)``: known instants at which signals jump (a step
-    source). A signal is right-continuous: at such an instant, a tick or an event it has its new value.
+    All functions have flat inputs and outputs. ``derivative``, ``signals``, ``residual``,
+    ``residual_jacobian`` and ``guards``: inputs ``t ()``, ``x (nx,)``, ``z (nz,)``, ``w (nw,)``, ``p (np,)``;
+    one output ``xd (nx,)``, ``y (ny,)``, ``r (nw,)``, ``J (nw, nw)``, ``g (ng,)``. ``update``: one input
+    more, ``m (nclocks,)``; output ``z (nz,)``: the new z at an instant at which the clocks with ``m[k] = 1``
+    tick. If ``captures`` is true, it is also evaluated without a ticking clock just before every instant, at
+    a time one unit in the last place earlier: z then stores left limits. ``reset``: one input more, ``e
+    (ng,)``, +1 or -1 where a guard fired upwards or downwards, else 0; outputs ``x (nx,)`` and ``z (nz,)``.
+    With all ``e`` zero it gives the consistent modes (for example of a limiter that starts beyond its limit)
+    and the resulting states. A run calls it in this way at the start after the ticks, and whenever no guard
+    fires and some mode is inconsistent. At a breakpoint, as at a tick, the signs of guards before and after
+    it are compared. ``contradictions``: the inputs of ``guards``; output ``c (nm,)``, not 0 where the mode
+    ``z[modes[k]]`` is not consistent with the present values. ``initial_states``, ``initial_discrete``,
+    ``initial_algebraic``: input ``p``; output ``x0``, ``z0``, ``w0``. At the start all clocks without an
+    offset tick, before the first derivative. ``breakpoints``: input ``p``; output ``times (nb,)``: known
+    times at which signals jump (a step source). Signals are right-continuous: at a breakpoint, a tick or an
+    event they have their new values.
     """
 
     name: str
@@ -127,28 +126,28 @@ class HybridSystem:
     """Other names of signals: the block's bare name where it has one output, and an input port
     (``scope/u``) for the signal that drives it."""
     guard_actions: tuple[str, ...] = ()
-    """For each guard, if there are any: what it does to the run where it is positive. ``stop`` ends it,
-    ``fail`` ends it as a failure, ``warn`` is told at its end, and empty nothing."""
+    """For each guard its effect on the run where it is positive: ``stop`` ends the run, ``fail`` ends it with
+    an error, ``warn`` is reported at its end, empty has no effect."""
     modes: tuple[int, ...] = ()
-    """The places of the modes in ``z``."""
+    """The indices of the modes in ``z``."""
     followers: tuple[bool, ...] = ()
-    """For each mode, whether it is a function of the signals alone."""
+    """For each mode, whether it is a function of the present signals."""
     remembered: tuple[tuple[int, int], ...] = ()
-    """The places in ``z`` of the modes that are functions also of what they were before an instant, or before
-    the latest event at it, and of that."""
+    """Pairs of indices in ``z``: a mode that also depends on its value before an instant (or before the
+    latest event at it), and that value."""
     recaptured: tuple[int, ...] = ()
-    """The places in ``z`` of captured values that go with such modes: they are captured again at events."""
+    """The indices in ``z`` of captured values of such modes, which are captured again at events."""
     locating: tuple[int, ...] = ()
-    """The guards whose zeros only tell when such modes change."""
+    """The guards whose zeros only locate changes of such modes."""
     tangents: tuple[int, int, int] | None = None
-    """From which entries of ``x``, ``z`` and the guards on they belong to derivatives, if any."""
+    """The first indices in ``x``, ``z`` and the guards that belong to derivatives, if any."""
     contradictions: TracedFunction | None = None
-    """Which modes contradict their conditions; ``None`` where there are no modes."""
+    """The inconsistent modes; ``None`` without modes."""
     delays: Delays | None = None
-    """Signals that are looked up in the past."""
+    """The delayed signals."""
     captures: bool = False
-    """Whether some discrete variable keeps how things were just before an instant."""
+    """Whether some discrete variable stores a left limit."""
     called: tuple[str, ...] = ()
-    """Blocks that are no equations: Python works out at each of their ticks what they give."""
+    """Blocks without equations: Python computes their outputs at each of their ticks."""
     loops: LinearLoops | None = None
-    """Loops that are solved already."""
+    """The linear loops that are solved in place."""

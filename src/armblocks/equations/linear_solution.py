@@ -1,10 +1,10 @@
-"""Linear equations inside of traced expressions: one operation, whose pivots are chosen by the numbers.
+"""Linear equations inside traced expressions: one operation with pivoting at run time.
 
-``linear_solution(A, b)`` is a call of a CasADi function of a fixed name, which scalar expressions may hold.
-CasADi differentiates and evaluates it by itself. The compiler makes one operation of it (the tape's
-``SOLVE``), and takes its derivatives apart by the rules that stand here: ``A dx = db - dA x``, and in reverse
-``A' c = seed``, of which ``b`` gets ``c`` and ``A`` gets ``-c x'`` (Giles, *Collected matrix derivative
-results for forward and reverse mode algorithmic differentiation*, 2008, 2.3.1).
+``linear_solution(A, b)`` is a call of a CasADi function with a fixed name inside scalar expressions. CasADi
+can differentiate and evaluate it. The compiler translates it to one operation (the tape's ``SOLVE``), and
+expands its derivatives by these rules: ``A dx = db - dA x``, and in reverse ``A' c = seed``, where the
+adjoint of ``b`` is ``c`` and that of ``A`` is ``-c x'`` (Giles, *Collected matrix derivative results for
+forward and reverse mode algorithmic differentiation*, 2008, 2.3.1).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def linear_solution(A: SX, b: SX) -> SX:
 
 
 def solution_size(name: str) -> int | None:
-    """The count of unknowns of a linear solution, by its name; ``None``: another function."""
+    """The number of unknowns of a linear solution, from its name; ``None`` for other functions."""
     found = _NAME.fullmatch(name)
     return int(found[1]) if found else None
 
@@ -65,7 +65,7 @@ def derivative_rule(name: str) -> Function | None:
 
 @cache
 def _solver(size: int) -> Function:
-    """What CasADi's own interpreter evaluates: QR of the matrix with rows of equal size, corrected once."""
+    """The implementation for CasADi's interpreter: QR of the row-scaled matrix with one refinement step."""
     A, b = MX.sym("A", size, size), MX.sym("b", size)
     weights = 1.0 / mtimes(fabs(A), MX.ones(size, 1))
     scaled = repmat(weights, 1, size) * A

@@ -1,4 +1,4 @@
-"""How a system is to be run: said by a diagram or a caller, obeyed by the simulation."""
+"""The settings of a run."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from armblocks.errors import check_arguments
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationOptions:
-    """Settings of one run. ``None`` leaves the choice to the simulation, which says what it chose.
+    """Settings of one run. ``None`` leaves the choice to the simulation, which reports it.
 
-    ``stop_time`` s; ``solver`` a name of ``armblocks.simulation.tableaux`` or ``"auto"``; ``step`` s: size
-    of a fixed step; ``sample_time`` s: spacing of the recorded instants (they are ``k * sample_time``,
-    computed and never accumulated, and the stop time itself); ``max_step`` s; ``rtol``, ``atol``: an
-    adaptive step is accepted where the error is below ``atol + rtol |x|`` in the root-mean-square norm.
+    ``stop_time`` s; ``solver`` a name of ``armblocks.simulation.tableaux`` or ``"auto"``; ``step`` s: size of
+    a fixed step; ``sample_time`` s: interval of the recorded samples (at ``k * sample_time``, computed by a
+    product, and at the stop time); ``max_step`` s; ``rtol``, ``atol``: an adaptive step is accepted where the
+    error is below ``atol + rtol |x|`` in the root-mean-square norm.
     """
 
     stop_time: float = 10.0

@@ -2,9 +2,9 @@
 
 For ``y(t) = u(t - d)`` the derivative by a parameter is ``y_p = u_p(t - d) - u'(t - d) d_p``: ``u_p`` is a
 delayed signal of its own. A jump of ``u`` at ``s`` arrives where ``t - d = s``, at an instant with the
-derivative ``(s_p + d_p) / (1 - d')``. Three more delayed signals tell of it: the count of jumps, ``s_p`` of
-the last jump, and the value of ``u`` before it. A guard fires where the delayed count changes. Where
-equations read the slope ``u'(t - d)`` too, ``u''`` and the slope before a jump are delayed likewise.
+derivative ``(s_p + d_p) / (1 - d')``. Three additional delayed signals describe it: the number of jumps,
+``s_p`` of the last jump, and the value of ``u`` before it. A guard fires where the delayed count changes.
+Where equations read the slope ``u'(t - d)`` too, ``u''`` and the slope before a jump are delayed likewise.
 
 Source: Bellen and Zennaro, Numerical Methods for Delay Differential Equations, 2003, chapter 2.
 """
@@ -30,17 +30,17 @@ class DelayedSensitivities:
         delays = columns.system.delays
         self.n = 0 if delays is None else len(delays.values)
         self.rate_along = SX.zeros(columns.z.numel())
-        """How z changes with the time, at the places of the delayed values."""
+        """The time derivative of z at the indices of the delayed values."""
         self.tau = columns.value(delays.times) if delays is not None else SX(0, 1)
         self.tau_p = [self._along_parameter(self.tau, k) for k in range(len(columns.names))]
         self.values = [] if delays is None else list(delays.values)
-        """The places of the delayed values in z."""
+        """The indices of the delayed values in z."""
         self.slopes = [] if delays is None else list(delays.slopes)
         self.reads_slopes = delays is not None and self._slopes_are_read()
         self.curvature = columns.add("curvature", self.n if self.reads_slopes else 0)
         """u'' of the time before, where slopes are read."""
         self.Z = [self._corrected(k) for k in range(len(columns.names))]
-        """Sensitivities of z: those of delayed values follow from what is kept of the past."""
+        """Sensitivities of z: those of delayed values are computed from the history."""
         if delays is None:
             return
         n, count = self.n, len(columns.names)
@@ -67,7 +67,7 @@ class DelayedSensitivities:
         return c.along(expression, t=0.0, x=c.S[k], z=c.Z[k], w=c.W[k], p=c.seeds[k])
 
     def _corrected(self, k: int) -> SX:
-        """What is kept at the place of a delayed value is ``u_p(t - d)``."""
+        """At the index of a delayed value, ``u_p(t - d)`` is stored."""
         corrected = SX(self.columns.Z[k])
         for i, (value, slope) in enumerate(zip(self.values, self.slopes)):
             corrected[value] = corrected[value] - self.columns.z[slope] * self.tau_p[k][i]
@@ -116,7 +116,7 @@ class DelayedSensitivities:
     # At an instant.
 
     def begin(self) -> dict[str, SX]:
-        """What is kept of the side before an instant."""
+        """Left limits stored before an instant."""
         return {"left limit": self.u, "left slope": self.du} if self.n else {}
 
     def guards(self, at_instant: SX) -> list[SX]:

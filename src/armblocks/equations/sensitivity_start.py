@@ -19,9 +19,9 @@ from armblocks.errors import InputError
 Array = NDArray[np.float64]
 
 AT_ZERO = 1e-8
-"""A guard that would be 0 within this time (s) is at 0."""
+"""A guard that would be 0 within this time (s) counts as 0."""
 ALIKE = 1e-9
-"""Derivatives of states and signals that differ by less, beside their size, are alike."""
+"""Relative tolerance of equal derivatives of states and signals."""
 
 
 def refuse_moving_start(system: HybridSystem, parameters: Sequence[str]) -> None:
@@ -82,7 +82,7 @@ class _Start:
         return sorted(found)
 
     def held_states(self, entries: slice) -> list[str]:
-        """The blocks that hold a state at the start, whatever these parameters say."""
+        """The blocks whose initial states do not depend on these parameters."""
         system = self.system
         t, x, z, w, p, e = system.reset.arguments
         after = vertcat(*system.reset.results)[: x.numel()]

@@ -1,7 +1,7 @@
-"""How named quantities lie in flat vectors: the only code that knows.
+"""The layout of named quantities in flat vectors.
 
-A ``Slot`` is one named quantity; a ``Signature`` is an ordered set of them. In a flat vector the slots lie
-one after the other, and a matrix lies row by row (C order), so that a NumPy reshape is all that is needed.
+A ``Slot`` is one named quantity; a ``Signature`` is an ordered set of them. In a flat vector the slots are
+contiguous, and matrices are row-major (C order), so that ``numpy.reshape`` converts them.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Slot:
 
     @property
     def size(self) -> int:
-        """Count of scalars."""
+        """Number of scalars."""
         return math.prod(self.shape)
 
     @property
@@ -56,7 +56,7 @@ class Slot:
 
 @dataclass(frozen=True)
 class Signature:
-    """Ordered, uniquely named slots and where each lies in one flat vector."""
+    """Ordered, uniquely named slots and their positions in one flat vector."""
 
     slots: tuple[Slot, ...] = ()
 
@@ -65,7 +65,7 @@ class Signature:
         for slot in self.slots:
             if slot.name in seen:
                 raise InputError(
-                    f"the name '{slot.name}' stands twice in one signature",
+                    f"the name '{slot.name}' occurs twice in one signature",
                     fix="rename one of them",
                     where="signature",
                 )
@@ -83,7 +83,7 @@ class Signature:
 
     @cached_property
     def ranges(self) -> Mapping[str, slice]:
-        """The place of each slot in the flat vector."""
+        """The slice of each slot in the flat vector."""
         places: dict[str, slice] = {}
         start = 0
         for slot in self.slots:
@@ -117,7 +117,7 @@ class Signature:
         )
 
     def pack(self, values: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
-        """Lay named values, shape of their slot each, into a new flat vector of shape ``(size,)``."""
+        """Copy named values, each with the shape of its slot, into a new flat vector of shape ``(size,)``."""
         for name in values:
             if name not in self.ranges:
                 raise UnknownNameError("quantity", name, self.names)

@@ -1,4 +1,4 @@
-"""Symbolic quantities in their natural shapes, and laid flat as a :class:`Signature` says."""
+"""Conversion between symbolic quantities of natural shape and flat columns in :class:`Signature` layout."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from armblocks.errors import InputError
 
 
 def flatten(value: SX, shape: Shape) -> SX:
-    """Lay a symbolic scalar, vector (column) or matrix into a flat column, row by row.
+    """Flatten a symbolic scalar, vector (column) or matrix into a column, row-major.
 
-    A stack ``(k, m, n)`` is given as the ``(k m, n)`` matrix of its members, one under the other.
+    A stack ``(k, m, n)`` is given as the ``(k m, n)`` matrix of its vertically stacked members.
     """
     rows, columns = matrix_shape(shape)
     if value.shape != (rows, columns):
@@ -33,7 +33,7 @@ def unflatten(flat: SX, shape: Shape) -> SX:
 
 
 def matrix_shape(shape: Shape) -> tuple[int, int]:
-    """Rows and columns of the CasADi matrix that carries a quantity of this shape."""
+    """Rows and columns of the CasADi matrix for a quantity of this shape."""
     if len(shape) == 0:
         return 1, 1
     if len(shape) == 1:

@@ -1,13 +1,13 @@
-"""Reading an entry of a table at an index that is only known when the program runs.
+"""Indexed reads of table entries at run time.
 
-CasADi's scalar expressions have no indexed read, so a table of n entries would cost n operations. This one is
-written with its operation ``printme(x, y)``, which is x and which nothing else here uses, as
-``printme(printme(first, -n), index)``: ``first`` is the symbol of the table's first entry. The compiler makes
-one load of it, and nothing is printed. A table has to be an input of the function (a parameter of the
-system), so that its entries lie one after another.
+CasADi's scalar expressions have no indexed read, so a table of n entries would cost n operations. An indexed
+read is represented by CasADi's operation ``printme(x, y)``, whose value is x and which is not used elsewhere,
+as ``printme(printme(first, -n), index)``: ``first`` is the symbol of the table's first entry. The compiler
+translates it to one load, and nothing is printed. A table must be an input of the function (a parameter of
+the system), so that its entries are contiguous.
 
-To CasADi the derivative in the index is 0, which is right: an index is a whole number. It knows of no
-derivative in the entries but the first, so that sensitivities to entries of such tables are not to be had.
+CasADi's derivative by the index is 0, which is correct for an integer. CasADi sees a dependence on the first
+entry only, so sensitivities to entries of such tables are not available.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from numpy.typing import NDArray
 
 
 def read_entry(table: SX, index: SX) -> SX:
-    """Entry ``index`` (a whole number from 0, held within the table) of a vector of symbols."""
+    """Entry ``index`` (an integer from 0, limited to the table) of a vector of symbols."""
     count = table.numel()
     first = SX.binary(casadi.OP_PRINTME, table[0], SX(-float(count)))
     return SX.binary(casadi.OP_PRINTME, first, fmin(fmax(index, 0.0), count - 1.0))
 
 
 def last_at_or_below(table: SX, value: SX, count: int | None = None, stride: int = 1) -> SX:
-    """The index of the last of rising entries that is not above ``value``; -1 below all of them.
+    """The index of the last of ascending entries that is at most ``value``; -1 if there is none.
 
-    A binary search without branches: log2(n) reads. ``count`` and ``stride``: of every how many entries only
-    the first is meant, such as the first column of a table that lies row by row.
+    A binary search without branches: log2(n) reads. ``count`` and ``stride``: only every ``stride``-th entry
+    counts, such as the first column of a row-major table.
     """
     count = count or table.numel()
     step = 1 << (count.bit_length() - 1)
@@ -48,7 +48,7 @@ def last_at_or_below(table: SX, value: SX, count: int | None = None, stride: int
 
 
 def reads_tables(function: Function) -> bool:
-    """Whether the function has such reads, which CasADi's own interpreter gets wrong."""
+    """Whether the function has such reads, which CasADi's interpreter evaluates incorrectly."""
     return any(function.instruction_id(k) == casadi.OP_PRINTME for k in range(function.n_instructions()))
 
 
@@ -79,7 +79,7 @@ def tables_read(function: Function) -> set[tuple[int, int, int]]:
 
 
 def evaluate_with_reads(function: Function, arguments: Sequence[NDArray[np.float64]]) -> list[Any]:
-    """The values of a function that reads tables: every operation by CasADi, every read here. Slow."""
+    """The values of a function that reads tables: operations by CasADi, reads here. Slow."""
     outputs = [np.zeros(function.numel_out(k)) for k in range(function.n_out())]
     places = [function.sparsity_out(k).row() for k in range(function.n_out())]
     work = [0.0] * function.sz_w()

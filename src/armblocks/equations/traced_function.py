@@ -1,4 +1,4 @@
-"""One symbolic map with named ends: what modelling hands to numerics."""
+"""A symbolic function with named inputs and outputs: the result of modelling for numerics."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from armblocks.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class TracedFunction:
-    """``results = f(arguments)``, written once in symbols.
+    """``results = f(arguments)`` in symbols.
 
     ``arguments[i]`` is the flat column of symbols of input slot ``i`` and ``results[j]`` the flat dense
     column of output slot ``j`` (both row by row, see :mod:`armblocks.equations.signatures`).
 
-    ``rounded``: products among the expressions that are numbers of their own, such as signals. Numerics round
-    them, also where a sum follows that could be fused with them. Such a signal has the same bits in every
-    function of a system, and a sum of signals is that of the numbers that are recorded. Products inside a
-    block are still fused where nothing else of the same function needs them.
+    ``rounded``: products that are separate values, such as signals. Numerics round them even if they could be
+    fused with a following sum. Such a signal then has the same bits in every function of a system, and a sum
+    of signals is the sum of the recorded values. Products inside a block may be fused if no other expression
+    of the function uses them.
     """
 
     name: str
@@ -59,7 +59,7 @@ class TracedFunction:
         return cls(name=name, inputs=inputs, outputs=outputs, arguments=symbols, results=results)
 
     def joined(self, other: TracedFunction) -> TracedFunction:
-        """This map with the results of another one of the same inputs behind its own."""
+        """This function with the results of another one with the same inputs appended."""
         *more, rounded = Function("f", list(other.arguments), [*other.results, other.rounded]).call(
             list(self.arguments), True, False
         )
@@ -73,11 +73,11 @@ class TracedFunction:
         )
 
     def casadi_function(self) -> Function:
-        """The same map as a CasADi ``Function``: flat columns in, flat columns out."""
+        """The same function as a CasADi ``Function``: flat columns in, flat columns out."""
         return Function("f", list(self.arguments), list(self.results), {"cse": True})
 
     def __call__(self, *values: ArrayLike) -> tuple[NDArray[np.float64], ...]:
-        """Evaluate through CasADi's own interpreter: slow, and independent of the compiler."""
+        """Evaluate with CasADi's interpreter: slow, and independent of the compiler."""
         flat = [np.asarray(value, dtype=np.float64).reshape(-1) for value in values]
         function = self.casadi_function()
         results = evaluate_with_reads(function, flat) if reads_tables(function) else function.call(flat)

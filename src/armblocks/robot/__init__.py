@@ -1,4 +1,4 @@
-"""Robot descriptions: frozen values, as the user says them, and the same numbered for algorithms."""
+"""Robot descriptions: immutable values, and their numbered form for algorithms."""
 
 from armblocks.robot.dh import DhConvention, DhRow, link_from_dh, modified_dh, serial_chain, standard_dh
 from armblocks.robot.friction_model import FrictionModel

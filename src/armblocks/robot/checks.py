@@ -1,4 +1,4 @@
-"""What makes a robot description contradict itself: every rule, and the text that names the place."""
+"""Consistency rules of robot descriptions, with their error messages."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from armblocks.robot.link import Link, Motor
 from armblocks.spatial import Transform, Vector3
 
 MOST_LINKS = 1000
-"""More links than any arm has: a longer list is a file gone wrong."""
+"""Maximum number of links."""
 
 
 def check_robot(name: str, links: Sequence[Link], frames: Mapping[str, Transform], gravity: Vector3) -> None:
-    """Raise RobotError at the first contradiction; warn (ArmblocksWarning) of friction that drives."""
+    """Raise RobotError for the first inconsistency; warn (ArmblocksWarning) of friction that accelerates."""
     robot = f"robot '{name}'"
     for k, link in enumerate(links):
         check_kind(link, Link, where=f"{robot}, link number {k + 1}")
@@ -54,7 +54,7 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
             )
         if link.name in parents:
             raise RobotError(
-                f"two links are named '{link.name}'", where=robot, allowed="every name once", fix="rename one"
+                f"two links are named '{link.name}'", where=robot, allowed="unique names", fix="rename one"
             )
         parents[link.name] = link.parent
     settled: set[str | None] = {None}
@@ -64,7 +64,7 @@ def _check_tree(robot: str, links: Sequence[Link]) -> None:
         while here not in settled and here is not None:
             if here not in parents:
                 raise RobotError(
-                    f"link '{path[-1]}' hangs on '{here}', which does not exist",
+                    f"link '{path[-1]}' has the parent '{here}', which does not exist",
                     where=robot,
                     allowed=", ".join(parents),
                     fix="name an existing link as parent, or None for the base",
@@ -105,7 +105,7 @@ def _check_joint(where: str, joint: Joint) -> None:
                 f"the {kind} limit is {value:g}",
                 where=where,
                 allowed="above zero, or None where unknown",
-                fix="give its magnitude, or leave it out",
+                fix="give its magnitude, or omit it",
             )
 
 
@@ -127,7 +127,7 @@ def _check_motor(where: str, motor: Motor) -> None:
     plus, minus = motor.coulomb_friction
     if motor.viscous_friction < 0 or plus < 0 or minus > 0:
         warnings.warn(
-            f"{where}: friction drives the joint instead of holding it: viscous B = "
+            f"{where}: friction accelerates the joint instead of braking it: viscous B = "
             f"{motor.viscous_friction:g}, Coulomb Tc+ = {plus:g}, Tc- = {minus:g}. "
             "Allowed: B >= 0, Tc+ >= 0, Tc- <= 0.",
             ArmblocksWarning,

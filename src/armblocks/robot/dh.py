@@ -63,7 +63,7 @@ def standard_dh(
 ) -> Link:
     """A link by standard D-H: ``T = Rz(theta) Tz(d) Tx(a) Rx(alpha)``, angles rad, lengths m.
 
-    Mass properties stand in the frame at the link's far end (kg, m, kg m2).
+    Mass properties are in the frame at the link's distal end (kg, m, kg m2).
     """
     dh = DhRow(alpha=alpha, a=a, d=d, theta=theta, sigma=sigma, offset=offset)
     return link_from_dh(
@@ -98,7 +98,7 @@ def modified_dh(
 ) -> Link:
     """A link by modified D-H: ``T = Rx(alpha) Tx(a) Rz(theta) Tz(d)``, angles rad, lengths m.
 
-    Mass properties stand in the frame on the link's own joint axis (kg, m, kg m2).
+    Mass properties are in the frame on the link's joint axis (kg, m, kg m2).
     """
     dh = DhRow(
         alpha=alpha, a=a, d=d, theta=theta, sigma=sigma, offset=offset, convention=DhConvention.MODIFIED

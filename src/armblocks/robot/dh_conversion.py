@@ -1,12 +1,12 @@
-"""From standard to modified Denavit-Hartenberg rows and back: the same arm, told the other way.
+"""Conversion between standard and modified Denavit-Hartenberg rows of the same arm.
 
-Both conventions say the same product of turns and shifts,
+Both conventions describe the same product of rotations and translations,
 
     Rz(theta1) Tz(d1) · Tx(a1) Rx(alpha1) · Rz(theta2) Tz(d2) · Tx(a2) Rx(alpha2) …
 
-and cut it at different places: a standard row holds what follows its joint, a modified row what goes before.
-So the numbers alpha and a move on by one row; what is left over at the end goes into the tool, or into the
-base. Each link's frame moves, and its centre of mass, inertia and shapes are told in the new one.
+and split it at different places: a standard row has the transforms after its joint, a modified row those
+before it. So alpha and a move by one row; the remainder is added to the tool or the base. The link frames
+change, and centres of mass, inertias and shapes are transformed to the new frames.
 
 Sources: Corke, *Robotics, Vision and Control*, 2nd ed., 7.1.2; Craig, *Introduction to Robotics*, 3.4.
 """
@@ -30,8 +30,8 @@ from armblocks.spatial import Transform, transl, trotx
 def converted(robot: Robot, convention: DhConvention) -> Robot:
     """The same arm in rows of ``convention``: pose of the tool, Jacobian and joint torques stay.
 
-    Frames of the links do change, and so what a wrench in the last link's frame means. Raises RobotError
-    for a robot that is no single chain of D-H rows.
+    The link frames change, and with them the meaning of a wrench in the last link's frame. Raises RobotError
+    for a robot that is not a single chain of D-H rows.
     """
     rows = _rows(robot)
     if all(row.convention is convention for row in rows):
@@ -68,9 +68,9 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
     rows = [link.dh for link in robot.links if link.dh is not None]
     if len(rows) < len(robot.links) or robot.links != serial_chain(robot.links):
         raise RobotError(
-            "it is no single chain of D-H rows",
+            "it is not a single chain of D-H rows",
             where=where,
-            allowed="robots whose every link has a row and hangs on the link before it",
+            allowed="robots in which every link has a row and the previous link as parent",
             fix="build its links with standard_dh or modified_dh",
         )
     if len({row.convention for row in rows}) > 1:
@@ -84,7 +84,8 @@ def _rows(robot: Robot) -> Sequence[DhRow]:
 
 
 def _retold(link: Link, row: DhRow, T_new_old: Transform) -> Link:
-    """The link with another row, its body told in the frame in which the old one has this pose."""
+    """The link with another row, with its body transformed to the new frame, in which the old one has this
+    pose."""
     R = T_new_old.R
     inertia = R @ link.I @ R.T
     geometry = link.geometry

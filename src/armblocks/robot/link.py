@@ -1,4 +1,4 @@
-"""One link of an arm with the joint that carries it and the motor that drives it."""
+"""A link of an arm with its joint and motor."""
 
 from __future__ import annotations
 
@@ -52,13 +52,14 @@ class Motor:
 
     @property
     def reflected_inertia(self) -> float:
-        """``G^2 Jm``: what the joint feels of the rotor, kg m2 (kg for a prismatic joint)."""
+        """``G^2 Jm``: the rotor inertia at the joint, kg m2 (kg for a prismatic joint)."""
         return self.gear_ratio * self.gear_ratio * self.inertia
 
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """A rigid body, and the joint that ties it to ``parent`` (a link's name; ``None`` is the robot's base).
+    """A rigid body, and the joint that connects it to ``parent`` (a link's name; ``None`` is the robot's
+    base).
 
     Pose in the parent's frame: ``T_parent_link = before joint.motion(q + offset) after``. ``dh`` is the
     Denavit-Hartenberg row that the three came from, where they did, and must agree with them

@@ -1,4 +1,4 @@
-"""Inertias that no rigid body can have, told link by link."""
+"""Checks for inertias that no rigid body can have, for each link."""
 
 from __future__ import annotations
 

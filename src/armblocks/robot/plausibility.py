@@ -1,4 +1,4 @@
-"""Numbers of a robot that are legal but look like another unit or another sign, told as questions."""
+"""Plausibility warnings: valid numbers of a robot that probably have a wrong unit or sign."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armblocks.robot.robot import Robot
 WHOLE_TURN = 2 * math.pi * (1 + 1e-6)
 """rad, and a little for limits written with six digits."""
 LARGEST_ANGLE = 4 * math.pi
-"""rad; what begins or ends a motion beyond two whole turns is more often a number of degrees."""
+"""rad; larger start or end angles of a motion are probably degrees."""
 LONGEST_REACH = 20.0
 """m; the largest arms of industry reach 5 m."""
 LARGEST_GYRATION = 3.0
@@ -39,7 +39,7 @@ class Doubt:
 
 
 def doubts(robot: Robot) -> tuple[Doubt, ...]:
-    """What is probably in another unit, or has the wrong sign; nothing of it makes a robot illegal.
+    """Values that probably have a wrong unit or sign; they are warnings, not errors.
 
     Limits of revolute joints beyond a whole turn (degrees?), a reach beyond 20 m and inertias that are far
     too great for the robot's size (millimetres?), gravity that points up.
@@ -61,7 +61,7 @@ def warn_of_degrees(angles: ArrayLike, where: str) -> None:
 
 
 def warn_of_doubts(robot: Robot) -> None:
-    """Warn (ArmblocksWarning) once for every doubt: what loading a robot does."""
+    """Issue an ArmblocksWarning for every finding; called when a robot is loaded."""
     for doubt in doubts(robot):
         warnings.warn(str(doubt), ArmblocksWarning, stacklevel=3)
 
@@ -103,7 +103,7 @@ def _doubts(robot: Robot) -> Iterator[Doubt]:
 
 
 def _reaches(robot: Robot) -> dict[str | None, float]:
-    """How far from the base each link may end, m: the lengths of the links before it, one after the other."""
+    """An upper bound of each link's distance from the base, m: the sum of the lengths up to it."""
     found: dict[str | None, float] = {None: 0.0}
     waiting = list(robot.links)
     while waiting:

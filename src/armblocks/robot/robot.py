@@ -1,4 +1,4 @@
-"""The description of a robot as its user says it: links by name, base, tool, gravity."""
+"""The description of a robot: links by name, base, tool, gravity."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Robot:
     """Links that form a chain or a tree on one base.
 
     ``base`` pose of the base frame in the world; ``tool`` pose of the tool in the frame of the tip, which is
-    the last link; a (4, 4) matrix is taken for either. ``gravity`` m/s2 in the world frame, the acceleration
-    of a falling body (toolbox files say the opposite sign); ``friction_model`` see :class:`FrictionModel`.
-    The joint coordinates q stand in the order of the links that move. A link's joint is called by the link's
+    the last link; both accept a (4, 4) matrix. ``gravity`` m/s2 in the world frame, the acceleration
+    of a falling body (toolbox files have the opposite sign); ``friction_model`` see :class:`FrictionModel`.
+    The joint coordinates q are in the order of the moving links. A link's joint is called by the link's
     name.
 
     A value: two robots are equal, and hash alike, where all their numbers and names are. ``source`` (where
@@ -77,7 +77,7 @@ class Robot:
 
     @property
     def n(self) -> int:
-        """Count of joint coordinates."""
+        """Number of joint coordinates."""
         return len(self.moving_links)
 
     @property

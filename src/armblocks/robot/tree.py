@@ -14,7 +14,7 @@ from armblocks.spatial import Transform, Vector3, rotation_x, rotation_y
 from armblocks.spatial.inertia import RigidInertia
 
 BASE = -1
-"""The index that stands for the robot's immovable base."""
+"""The index of the robot's base."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,13 +38,13 @@ class Body:
 
     @property
     def reflected_inertia(self) -> float:
-        """Motor inertia as the joint feels it, ``G^2 Jm``."""
+        """Motor inertia at the joint, ``G^2 Jm``."""
         return self.motor.reflected_inertia if self.motor else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame:
-    """A frame that rides on a body (or on the base): ``T_body_frame`` is constant."""
+    """A frame that is fixed to a body (or to the base): ``T_body_frame`` is constant."""
 
     body: int
     pose: Transform

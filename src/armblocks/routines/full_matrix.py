@@ -1,7 +1,7 @@
-"""Full square matrices in memory: what the eliminations with pivoting have in common.
+"""Full square matrices in memory: the common part of the eliminations with pivoting.
 
-They choose and keep pivots in their own ways: :mod:`armblocks.compiler.linear_solution` weighs rows and
-exchanges them lane by lane, :mod:`armblocks.integration.pivoted_elimination` factors one matrix for many
+The eliminations differ in pivot selection and storage: :mod:`armblocks.compiler.linear_solution` weighs rows
+and exchanges them lane by lane, :mod:`armblocks.integration.pivoted_elimination` factors one matrix for many
 right sides.
 """
 

@@ -12,9 +12,9 @@ into; the annotations of the others are its signature::
     program = Program()
     length = program.define(norm)          # elsewhere: r.call(length, x, n)
 
-Python runs the function once, and what it does to values is written down: a Python ``if`` decides what is
-written, ``with r.when(condition):`` what happens when the routine runs. A value is valid where the statement
-that computes it has been run on every path; one that differs between paths is kept in a variable.
+Python runs the function once, and its operations on values are recorded: a Python ``if`` selects the recorded
+code, ``with r.when(condition):`` is a branch of the routine. A value is valid where the statement that
+computes it has been run on every path; one that differs between paths is kept in a variable.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ from armblocks.routines.values import (
 )
 
 UNROLL = 8
-"""Loops of at most this many turns are written out, which keeps the vectors of small systems in registers."""
+"""Loops with at most this number of iterations are unrolled, which keeps the vectors of small systems in
+registers."""
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -82,7 +83,7 @@ class Function(Generic[P, R]):
 
 
 def external(write: Callable[Concatenate[Routine, P], R], symbol: str = "") -> Function[P, R]:
-    """A function that stands elsewhere, by its name (or ``symbol``) and annotations; it is never run."""
+    """An external function, declared by its name (or ``symbol``) and annotations; its body is never run."""
     return Function(symbol or write.__name__, write, _results(write))
 
 
@@ -103,7 +104,7 @@ class Program:
         distinct: bool = False,
         rest: Sequence[str] = (),
     ) -> Function[P, R]:
-        """The function that ``write`` writes, under its own name where no ``symbol`` is said.
+        """The function that ``write`` records, with its name unless a ``symbol`` is given.
 
         ``public``: it is called from outside the program. ``inlined``: whether it is written into its
         callers; ``None`` leaves that to the back end. ``distinct``: arrays that are passed to it do not
@@ -159,16 +160,16 @@ class Part:
         self._end = end
 
     def leave(self) -> None:
-        """Go on behind this part."""
+        """Leave this part."""
         self._routine.jump(self._end)
 
     def leave_when(self, condition: Boolean) -> None:
-        """Go on behind this part where the condition holds."""
+        """Leave this part if the condition holds."""
         with self._routine.when(condition):
             self.leave()
 
     def leave_unless(self, condition: Boolean) -> None:
-        """Go on behind this part where the condition fails."""
+        """Leave this part if the condition fails."""
         with self._routine.unless(condition):
             self.leave()
 
@@ -224,7 +225,7 @@ class Routine(Writer):
         return variable
 
     def integer_room(self, count: int) -> Integers:
-        """Room for integers, one after the other, as long as the function runs."""
+        """Memory for contiguous integers during the function call."""
         return Integers(self, Local(Kind.INTEGER, count))
 
     def constant(self, value: float) -> Real:
@@ -265,7 +266,7 @@ class Routine(Writer):
 
     @contextmanager
     def when(self, condition: Boolean, *, rarely: bool = False) -> Generator[None]:
-        """What stands inside happens where the condition holds; ``rarely``: it hardly ever does."""
+        """Run the block if the condition holds; ``rarely``: a hint that it seldom does."""
         statement = tree.When(condition.operand, [], [], rarely)
         self.statements.append(statement)
         with self._inside(statement.yes):
@@ -273,7 +274,7 @@ class Routine(Writer):
 
     @contextmanager
     def unless(self, condition: Boolean) -> Generator[None]:
-        """What stands inside happens where the condition fails, as where it compares with NaN."""
+        """Run the block if the condition fails, also for comparisons with NaN."""
         statement = tree.When(condition.operand, [], [])
         self.statements.append(statement)
         with self._inside(statement.no):
@@ -284,13 +285,13 @@ class Routine(Writer):
         """The other part of the :meth:`when` that ends right before."""
         statement = self.statements[-1] if self.statements else None
         if not isinstance(statement, tree.When) or statement.no:
-            raise SyntaxError("'otherwise' has no 'when' right before it. Fix: put it behind one.")
+            raise SyntaxError("'otherwise' has no 'when' directly before it. Fix: put it after one.")
         with self._inside(statement.no):
             yield
 
     @contextmanager
     def part(self) -> Generator[Part]:
-        """Statements that can be left early, or repeated: at their end they are over."""
+        """A block that can be left early or repeated."""
         region = tree.Region([], Mark("again"), Mark("behind"))
         self.statements.append(region)
         region.start.open = region.end.open = True
@@ -306,9 +307,9 @@ class Routine(Writer):
             part.again()
 
     def each(self, count: int) -> Generator[Integer | int]:
-        """``for i in r.each(n)``: what stands inside, for ``i = 0 … n-1``; a few turns are written out.
+        """``for i in r.each(n)``: run the block for ``i = 0 … n-1``; short loops are unrolled.
 
-        Where the loop is written out, ``i`` is a Python number.
+        In an unrolled loop ``i`` is a Python number.
         """
         if count <= UNROLL:
             yield from range(count)
@@ -322,7 +323,7 @@ class Routine(Writer):
             turn.again_when(following < count)
 
     def range(self, start: Integer | int, stop: Integer | int, step: int = 1) -> Generator[Integer]:
-        """``for i in r.range(a, b)``: what stands inside, for ``i = a … b-1``, as a loop.
+        """``for i in r.range(a, b)``: run the block for ``i = a … b-1``, as a loop.
 
         With a ``step`` above 1 for ``i = a, a + step …`` below ``b``.
         """
@@ -334,7 +335,7 @@ class Routine(Writer):
             index.value = i + step
 
     def stages(self, *names: str) -> Stages:
-        """A part made of stages that follow one another and can be gone to from any of them."""
+        """A block of consecutive stages with jumps between them."""
         return Stages(self, names)
 
     def return_(self, *values: Value) -> None:
@@ -357,12 +358,12 @@ class Routine(Writer):
         return cast("R", results if len(results) > 1 else results[0] if results else None)
 
     def copy(self, source: Reals | Integers, target: Reals | Integers, count: Integer | int) -> None:
-        """Copy so many numbers from one place to another; the two do not overlap."""
+        """Copy numbers between two arrays that do not overlap."""
         size = integer_operand(8 * count if isinstance(count, int) else count * 8)
         self.statements.append(tree.Copy(source.address(0), target.address(0), size))
 
     def jump(self, mark: Mark) -> None:
-        """Go on at a mark of a part around this place."""
+        """Jump to a mark of an enclosing part."""
         assert mark.open, "a part is left or repeated from inside"
         mark.used = True
         self.statements.append(Jump(mark))
@@ -386,8 +387,8 @@ class Routine(Writer):
 class Stages:
     """Stages of a routine, such as those of a run: ``with stages:`` around all of them.
 
-    What stands before the first stage chooses one by :meth:`go`. A stage goes on into the one written behind
-    it, or ends with :meth:`go`.
+    Code before the first stage selects one by :meth:`go`. A stage continues with the next one, or ends with
+    :meth:`go`.
     """
 
     def __init__(self, routine: Routine, names: Sequence[str]) -> None:
@@ -410,12 +411,12 @@ class Stages:
         self._routine.statements = self._around
 
     def begin(self, name: str) -> None:
-        """What follows belongs to this stage."""
+        """Begin this stage."""
         assert self._routine.statements is self._region.body, "a stage is not inside a loop or a condition"
         self._routine.statements.append(tree.Stage(self._marks[name]))
 
     def go(self, name: str) -> None:
-        """Go on at a stage."""
+        """Jump to a stage."""
         self._routine.jump(self._marks[name])
 
 

@@ -1,4 +1,4 @@
-"""Python functions that are called at ticks of a run, which halts for them."""
+"""Python functions that are called at ticks of a run."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ SAME_INSTANT = 1.0 + 2.0**-50
 
 @dataclass(frozen=True, kw_only=True)
 class CalledFunction:
-    """A block that Python works out at the ticks of a clock.
+    """A block whose outputs Python computes at the ticks of a clock.
 
-    ``inputs`` and ``outputs``: place in ``z`` and shape by port; after an update with the tick marked, the
-    places of the inputs hold what reaches them. ``call(t, inputs)`` gives the outputs.
+    ``inputs`` and ``outputs``: index in ``z`` and shape by port; after an update with the tick marked, the
+    entries of the inputs have the input values. ``call(t, inputs)`` returns the outputs.
     """
 
     block: str
@@ -37,11 +37,11 @@ class CalledFunction:
 
 
 class Calls:
-    """The functions of one run, in an order in which none needs a later one at the same tick.
+    """The functions of one run, in dependency order within a tick.
 
-    The native loop halts just before a tick. The tick is worked out aside, to learn what reaches a function;
-    it is called; and the loop, going on, finds what it gave and does the tick. So everything that ticks at
-    that instant sees it, as it would see an equation.
+    The native loop returns just before a tick. The tick is evaluated on a copy to get the inputs of a
+    function, the function is called, and the loop continues with its results and processes the tick. All
+    blocks that tick at that time therefore read the new values, as with an equation.
     """
 
     def __init__(self, compiled: CompiledSystem, functions: Sequence[CalledFunction]) -> None:
@@ -51,10 +51,10 @@ class Calls:
         self._done: dict[int, float] = {}
         self.count = 0
         self.seconds = 0.0
-        """What the functions took, without all that is around them."""
+        """The computing time of the functions alone, s."""
 
     def advance(self, stretch: Stretch, steps: int, pause: float, consume: Consumer | None) -> None:
-        """Take steps as :meth:`Stretch.advance` does; where functions are due on the way, they are called.
+        """Take steps like :meth:`Stretch.advance`; call the functions that are due.
 
         Raises ``SimulationError`` where a function fails.
         """
@@ -70,7 +70,7 @@ class Calls:
                 return
 
     def told(self, wall_time: float) -> str:
-        """What the calls cost, in words."""
+        """A sentence about the cost of the calls."""
         names = ", ".join(f"'{function.block}'" for function in self._functions)
         share = 100.0 * self.seconds / wall_time if wall_time > 0.0 else 0.0
         cost = f"{self.seconds:.3g} s, {share:.0f} % of the run"
@@ -115,7 +115,7 @@ class Calls:
     def _called(
         self, function: CalledFunction, time: float, inputs: Mapping[str, Any]
     ) -> Mapping[str, Array]:
-        """What one function gives, flat; raises ``SimulationError`` where it fails."""
+        """The flat results of one function; raises ``SimulationError`` where it fails."""
         where = f"block '{function.block}' at t = {time:.9g} s"
         began = perf_counter()
         try:
@@ -133,12 +133,12 @@ class Calls:
                     f"'{port}' became {str(value)[:80]}, of shape {array.shape}",
                     where=where,
                     allowed=f"finite numbers of shape {shape}",
-                    fix="correct the function, or say the shapes of its results",
+                    fix="correct the function, or declare the shapes of its results",
                 )
             found[port] = array.ravel()
         return found
 
 
 def _given(values: Array, shape: Shape) -> Any:
-    """An input as the function gets it: a number, or an array of its own."""
+    """An input for the function: a number, or a copied array."""
     return values.reshape(shape).copy() if shape else float(values[0])

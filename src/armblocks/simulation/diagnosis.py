@@ -1,4 +1,4 @@
-"""What went wrong in a run, in the words of the diagram: which signal, which state, when, and what to do."""
+"""Error messages of failed runs in terms of the diagram: signal, state, time and remedy."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from armblocks.simulation.tableaux import STIFF
 Array = NDArray[np.float64]
 
 MANY_STEPS = 20_000
-"""Steps below which stiffness is no matter: the run took milliseconds."""
+"""Number of steps below which stiffness is not reported: the run took milliseconds."""
 
 
 def element_name(layout: Signature, place: int) -> str:
-    """The name of scalar ``place`` of a flat vector: ``arm/q[2]``."""
+    """The name of the scalar at index ``place`` of a flat vector: ``arm/q[2]``."""
     return [name for slot in layout for name in element_names(slot)][place]
 
 
 def first_bad_signal(
     system: CompiledSystem, instants: Array, signals: Array, algebraic: Array
 ) -> tuple[SimulationError, int] | None:
-    """The error for the first signal that is NaN or infinite, and how many instants before it are good.
+    """The error for the first signal that is NaN or infinite, and the number of valid samples before it.
 
-    ``signals`` ``(ny, N)``, ``algebraic`` ``(N, nw)``. First in time, then in evaluation order. Finite
-    signals cost one pass over memory: a sum that is finite proves them so. (Not a dot product: BLAS would
-    start threads for it, which wait for each other for milliseconds where the processors are busy.)
+    ``signals`` ``(ny, N)``, ``algebraic`` ``(N, nw)``. First in time, then in evaluation order. For finite
+    signals one pass over memory suffices, because their sum is finite. (Not a dot product: BLAS would start
+    threads for it, which wait for each other for milliseconds where the processors are busy.)
     """
     if algebraic.size and not np.isfinite(algebraic).all():
         unsolved = int(np.argmin(np.isfinite(algebraic).all(axis=1)))
@@ -65,7 +65,7 @@ def _signal_error(system: CompiledSystem, place: int, value: float, time: float)
 
 
 def ended_by_block(system: CompiledSystem, run: Integration) -> str | SimulationError:
-    """Which block has ended a run: a sentence, or the error of an Assertion whose input has become 0."""
+    """The block that ended a run: a sentence, or the error of an Assertion whose input has become 0."""
     guard = run.positive(system.sizes.stops)[0]
     block = system.guard_names[guard]
     if system.guard_actions[guard] != "fail":
@@ -74,12 +74,12 @@ def ended_by_block(system: CompiledSystem, run: Integration) -> str | Simulation
         f"assertion '{block}' does not hold at {run.time:.9g} s",
         where=system.name,
         allowed="an input that is not 0 at any time",
-        fix=f"look at what feeds '{block}', or let it only warn",
+        fix=f"check the input of '{block}', or set its action to warn",
     )
 
 
 def warnings_of_blocks(system: CompiledSystem, run: Integration) -> list[str]:
-    """What blocks have to say that only warn."""
+    """The messages of assertions with the action ``warn``."""
     found: list[str] = []
     for guard, action in enumerate(system.guard_actions):
         fired = run.last_fired(guard)
@@ -90,7 +90,7 @@ def warnings_of_blocks(system: CompiledSystem, run: Integration) -> list[str]:
 
 
 def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> SimulationError:
-    """Why the native loop gave up."""
+    """The error for a status of the native loop."""
     if run.status is Status.STEP_TOO_SMALL:
         return _step_too_small(system, run)
     if run.status is Status.ENDLESS_EVENTS:
@@ -115,7 +115,7 @@ def integration_failure(system: CompiledSystem, run: Integration, p: Array) -> S
         f"the derivative of state '{name}' is not finite at {time:.9g} s, where it is {state[place]:.6g}",
         where=system.name,
         allowed="finite numbers",
-        fix="the solution may blow up there, or the step may be too long: look at what drives the state",
+        fix="the solution may diverge there, or the step may be too long: check the input of the state",
     )
 
 
@@ -123,11 +123,10 @@ def _unsolved(system: CompiledSystem, time: float) -> SimulationError:
     blocks = sorted({slot.name.rpartition("/")[0] or slot.name for slot in system.algebraic})
     names = ", ".join(f"'{name}'" for name in blocks)
     return SimulationError(
-        f"the implicit equations of the loop through {names} have no solution that can be found "
-        f"at {time:.9g} s",
+        f"the implicit equations of the loop through {names} have no solution that was found at {time:.9g} s",
         where=system.name,
-        allowed="loops with one solution near the one before: the Jacobian must not be singular",
-        fix="look whether the loop has a solution, or infinitely many; a delay or an integrator breaks it",
+        allowed="loops with one solution near the previous one: the Jacobian must not be singular",
+        fix="check whether the loop has a unique solution; a delay or an integrator breaks the loop",
     )
 
 
@@ -137,7 +136,7 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
     verb = "causes" if len(blocks) == 1 else "cause"
     return SimulationError(
         f"{_listed(blocks)} {verb} events without end at {run.time:.15g} s, after {run.events} events in "
-        "all: they follow one another at ever shorter distances, or at one instant (Zeno behaviour or "
+        "all: they occur at ever shorter distances, or at one instant (Zeno behaviour or "
         "chattering)",
         where=system.name,
         allowed=f"{MOST_AT_ONCE} events in a row at distances of {CLOSE:g} t, {MOST_CROWDED} of {CROWD:g} t",
@@ -149,16 +148,16 @@ def _endless_events(system: CompiledSystem, run: Integration) -> SimulationError
 def _inconsistent_modes(system: CompiledSystem, run: Integration) -> SimulationError:
     blocks = _contradicting(system, run)
     return SimulationError(
-        f"no choice of the modes of {_listed(blocks)} is consistent at {run.time:.15g} s: each one leads to "
-        "signals that ask for another",
+        f"no choice of the modes of {_listed(blocks)} is consistent at {run.time:.15g} s: each leads "
+        "to signals that require another one",
         where=system.name,
-        allowed="blocks that switch, in loops that have a solution",
+        allowed="switching blocks in loops that have a solution",
         fix=f"break the loop through '{blocks[0]}' with an integrator, a delay or a hysteresis",
     )
 
 
 def _contradicting(system: CompiledSystem, run: Integration) -> list[str]:
-    """The blocks of the modes that contradict their conditions where the run stands."""
+    """The blocks of the inconsistent modes at the present time."""
     names = [name for slot in system.discrete for name in [slot.name] * slot.size]
     return _unique(names[place].rpartition("/")[0] for place in run.contradicting_modes)
 
@@ -188,7 +187,7 @@ def _step_too_small(system: CompiledSystem, run: Integration) -> SimulationError
         f"state '{name}' is {run.state[worst[0]]:.6g}",
         where=system.name,
         allowed="solutions that stay bounded, and jumps only at known instants",
-        fix=f"look at what drives '{name}': it may grow without bound there, or its derivative may jump",
+        fix=f"check the input of '{name}': the state may grow without bound, or its derivative may jump",
     )
 
 
@@ -198,17 +197,17 @@ def _crawling(system: CompiledSystem, run: Integration) -> SimulationError:
     needs_jacobian = run.integrator.tableau.needs_jacobian
     stiff = "" if needs_jacobian else f"; if it is stiff, solver='{STIFF.name}'"
     return SimulationError(
-        f"the run crawls at {run.time:.6g} s with steps of {run.last_step:.2g} s, {left:.0e} more to go, for "
-        f"changes within the tolerance, of state '{name}' above all",
+        f"the run takes extremely short steps at {run.time:.6g} s: {run.last_step:.2g} s, with {left:.0e} "
+        f"more to go, mainly because of state '{name}'",
         where=system.name,
         allowed="equations that jump at events only",
-        fix=f"see whether a jump in what drives '{name}' answers itself, as dry friction or a sign in a "
-        f"formula: take a block that rests (ArmPlant, StickSlipFriction){stiff}",
+        fix=f"check the input of '{name}' for a jump that depends on the state, such as dry friction or a "
+        f"sign in a formula: use a block with a rest state (ArmPlant, StickSlipFriction){stiff}",
     )
 
 
 def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
-    """A sentence for a person where stability held the steps short, not accuracy; else empty.
+    """A hint where stability, not accuracy, limited the steps; else empty.
 
     The spectral radius of the Jacobian where the run ended, by power iteration on differences of the
     derivative, times the mean step, against the method's stability interval.
@@ -238,7 +237,7 @@ def stiffness_hint(system: CompiledSystem, run: Integration, p: Array) -> str:
     if rate * mean_step < 0.5 * tableau.real_stability:
         return ""
     return (
-        f"this system looks stiff: {tried} steps of {mean_step:.2g} s on average were held short by the "
+        f"this system looks stiff: {tried} steps of {mean_step:.2g} s on average were limited by the "
         f"stability of the explicit method, not by accuracy (fastest rate about {rate:.2g} 1/s). "
-        f"solver='{STIFF.name if tableau.adaptive else ROS5.name}' is made for such systems"
+        f"solver='{STIFF.name if tableau.adaptive else ROS5.name}' is suitable for such systems"
     )

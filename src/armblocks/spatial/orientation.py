@@ -1,9 +1,9 @@
 """Rotations by angles, quaternions and axes over symbols, both ways.
 
 A rotation R = R_ab (3, 3) turns coordinates of frame b into those of frame a. Quaternions are (s, x, y, z),
-the scalar first, as in the toolbox. What a rotation leaves open is said below; everywhere else the way back
-is exact to rounding, also close to the singular orientations, because the last angle is measured after the
-others have been undone.
+the scalar first, as in the toolbox. Singular cases are described below. Otherwise the inverse conversions are
+exact to rounding, also close to singular orientations, because the last angle is computed after removing the
+others.
 
 Sources: Siciliano et al., Robotics, 2009, 2.4 to 2.6; Shepperd, Quaternion from rotation matrix, J. Guidance
 and Control 1(3), 1978; Corke, Robotics Toolbox, releases 7 to 10 (rpy2tr, eul2tr, Quaternion).

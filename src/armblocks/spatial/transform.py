@@ -30,9 +30,9 @@ ORTHONORMALITY = 1e-8
 class Transform:
     """The pose of frame b in frame a: ``p_a = rotation p_b + translation`` (m).
 
-    A value: tuples inside, equal and hashable by content. ``T_ac = T_ab @ T_bc``.
-    Raises InputError where ``rotation`` is no rotation or is a mirror. NaN passes here, so that the robot
-    that holds the transform can name the link.
+    A value: tuples inside, equal and hashable by content. ``T_ac = T_ab @ T_bc``. Raises InputError where
+    ``rotation`` is not a rotation or is a reflection. NaN passes here, so that the robot that holds the
+    transform can name the link.
     """
 
     rotation: Matrix3
@@ -98,7 +98,7 @@ class Transform:
 
     @cached_property
     def is_identity(self) -> bool:
-        """Whether nothing moves."""
+        """Whether the transform is the identity."""
         return self == Transform()
 
     def __matmul__(self, other: Transform) -> Transform:

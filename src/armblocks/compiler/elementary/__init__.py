@@ -1,10 +1,10 @@
-"""Elementary functions as IR, the same operations at every number of lanes.
+"""Elementary functions as IR, with identical operations for every number of lanes.
 
 Each is written once over a :class:`~armblocks.compiler.ir_text.Body` with additions, multiplications, fused
-multiply-adds, divisions, square roots, comparisons and bit operations only, all of which IEEE 754 defines
-to the bit. So one lane, eight lanes and every processor give the same bits, and no C library is called.
-Errors stay below 2 units in the last place (mostly below 1) over the whole range; the tests measure them.
-Zeros keep their sign, infinities, NaN and subnormal numbers are served as C99 (Annex F) says.
+multiply-adds, divisions, square roots, comparisons and bit operations only, all of which IEEE 754 defines to
+the bit. Results are therefore identical for every number of lanes and every processor, and no C library is
+called. Errors stay below 2 units in the last place (mostly below 1) over the whole range; the tests measure
+them. Signed zeros, infinities, NaN and subnormal numbers follow C99 (Annex F).
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _FUNCTIONS: dict[Opcode, Callable[..., str]] = {
 
 
 def call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:
-    """Emit ``opcode`` of ``values``, as a call that LLVM inlines where that pays."""
+    """Emit ``opcode`` of ``values``, as a call that LLVM may inline."""
     if opcode in (Opcode.SIN, Opcode.COS):
         return _FUNCTIONS[opcode](body, *values)
     return _call(body, opcode, values)
@@ -61,7 +61,7 @@ def sine_cosine(body: Body, x: str) -> tuple[str, str]:
 
 
 _WITH_RARE_CASES = frozenset({Opcode.TAN, Opcode.MODULO, Opcode.REMAINDER})
-"""Functions that leave rare arguments (huge angles, huge quotients) to their one-lane form."""
+"""Functions that evaluate rare arguments (huge angles, huge quotients) with one lane only."""
 
 
 def _call(body: Body, opcode: Opcode, values: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""Joint types, one file each. Adding a type is adding a file: every algorithm and every law test follows."""
+"""Joint types, one file each. A new type needs one file; all algorithms and tests use it automatically."""
 
 from armblocks.robot.joints.fixed import Fixed
 from armblocks.robot.joints.joint import Joint, JointLimits

@@ -1,4 +1,4 @@
-"""A joint that holds."""
+"""The fixed joint."""
 
 from __future__ import annotations
 

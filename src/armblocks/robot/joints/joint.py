@@ -1,4 +1,4 @@
-"""What all joints have in common: one axis, along which a joint turns, slides, or both."""
+"""The base class of joints: rotation, translation, or both, about one axis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from armblocks.spatial import Transform, Vector3, rotation_about, vector3
 
 @dataclass(frozen=True, kw_only=True)
 class JointLimits:
-    """What a joint may do; ``None`` where nothing is known.
+    """The limits of a joint; ``None`` where unknown.
 
     ``position`` lowest and highest joint coordinate (rad or m), ``speed`` greatest magnitude (rad/s or m/s),
     ``torque`` greatest magnitude at the joint side (N m or N).

@@ -1,4 +1,4 @@
-"""A joint that slides."""
+"""The prismatic joint."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.robot.joints.joint import Joint
 
 @dataclass(frozen=True, kw_only=True)
 class Prismatic(Joint):
-    """Slides by q m along its axis."""
+    """Translation by q m along the axis."""
 
     letter: ClassVar[str] = "P"
     unit: ClassVar[str] = "m"

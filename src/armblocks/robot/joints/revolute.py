@@ -1,4 +1,4 @@
-"""A joint that turns."""
+"""The revolute joint."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armblocks.robot.joints.joint import Joint
 
 @dataclass(frozen=True, kw_only=True)
 class Revolute(Joint):
-    """Turns by q rad about its axis."""
+    """Rotation by q rad about the axis."""
 
     letter: ClassVar[str] = "R"
     unit: ClassVar[str] = "rad"
