@@ -12,6 +12,7 @@ import armblocks as ab
 from armblocks.blocks import (
     PWM,
     Abs,
+    Backlash,
     Constant,
     Derivative,
     EnabledSubsystem,
@@ -19,6 +20,7 @@ from armblocks.blocks import (
     FirstOrderHold,
     FromFile,
     Gain,
+    HitCrossing,
     Inport,
     Integrator,
     Outport,
@@ -159,6 +161,28 @@ def inside(*, states: bool = True) -> ab.Diagram:
     return builder.build()
 
 
+def pushed() -> ab.Diagram:
+    """Backlash that is switched on and reset beyond its play, with an event behind it at the same instant."""
+    builder = ab.DiagramBuilder("pushed")
+    wave = builder.add("wave", SineWave(frequency=3.0, amplitude=2.0, phase=0.3))
+    control = builder.add("control", SineWave(frequency=2.1, bias=0.2, phase=-0.6))
+    total = builder.add("total", Sum(signs="++"))
+    builder.add("x", Integrator(), total)
+    for number, port in enumerate(("enable", "reset"), start=1):
+        inner = ab.DiagramBuilder("inside")
+        inner.add(
+            "Out1",
+            Outport(),
+            inner.add("play", Backlash(width=0.5 + 0.2 * number), inner.add("In1", Inport())),
+        )
+        kind = EnabledSubsystem if port == "enable" else ResettableSubsystem
+        gear = builder.add(port, kind(diagram=inner.build()), wave)
+        builder.connect(control, gear[port])
+        builder.connect(gear, total[f"u{number}"])
+        builder.add(f"{port} hits", HitCrossing(offset=0.6), gear)
+    return builder.build()
+
+
 def pulses() -> ab.Diagram:
     """Pulses of a width that varies, a sawtooth that is cut, and a step, all into one integrator."""
     builder = ab.DiagramBuilder("pulses")
@@ -202,6 +226,7 @@ def limited_loop() -> ab.Diagram:
             1e-3,
             ["wave.bias", "wave.frequency", "ramp.slope", "enable/gain.gain", "trigger/gain.gain"],
         ),
+        (pushed, 1e-3, ["wave.amplitude", "control.bias", "enable/play.width", "reset/play.width"]),
         (
             pulses,
             1e-4,

@@ -15,6 +15,7 @@ from armblocks.blocks import (
     Clock,
     CompareToConstant,
     Constant,
+    DeadZone,
     Derivative,
     Expression,
     Gain,
@@ -24,7 +25,9 @@ from armblocks.blocks import (
     Ramp,
     Relay,
     Saturation,
+    SecondOrderIntegrator,
     SineWave,
+    Sqrt,
     Step,
     Sum,
     TransportDelay,
@@ -135,6 +138,16 @@ BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "sin(40*u)": lambda t: np.sin(40.0 * t),
 }
 """Signals that no state follows, with slopes that are infinite, nearly so, or change within a step."""
+
+
+def test_a_delayed_signal_is_not_extrapolated_to_before_a_bend(run: Run) -> None:
+    """What leaves its dead zone right after the start has a bend there, and never is below zero."""
+    builder = DiagramBuilder("d")
+    place = builder.add("place", SecondOrderIntegrator(), builder.add("push", Constant()))
+    free = builder.add("free", DeadZone(end=0.0), place["x"])
+    builder.add("root", Sqrt(), builder.add("late", TransportDelay(delay=1.0), free))
+    result = run(builder.build(), 3.0)
+    close(result["root/y"], np.maximum(result.time - 1.0, 0.0) / np.sqrt(2.0), 1e-5)
 
 
 @pytest.mark.parametrize("formula", BENT)

@@ -238,7 +238,9 @@ class _Augmented:
             initial_algebraic=self.start(old.initial_algebraic, "w0"),
             delays=self.delays.delays(),
             captures=old.captures or instants is not None,
-            recaptured=(),  # there are no sensitivities of what is captured between events of one instant
+            recaptured=tuple(
+                k * old.discrete.size + place for k in range(len(c.names) + 1) for place in old.recaptured
+            ),
             loops=None if old.loops is None else self.loops(old.loops),
         )
 

@@ -132,7 +132,7 @@ class Instants:
         c = self.columns
         begins = dot(m, m) == 0.0 if m.numel() else SX(1.0)
         updated = c.value(c.system.update, m)
-        Z = [self.by_parameter(updated, k) for k in range(len(c.names))]
+        Z = [self._captured_by(updated, k) for k in range(len(c.names))]
         near = fabs(self.g) <= LOCATED * fabs(self.g_rate) * fmax(1.0, c.t)
         located = logic_and(near, logic_and(self.g_rate != 0.0, c.t > 0.0))
         fresh = {
@@ -148,6 +148,12 @@ class Instants:
         added = {**c.added, **{name: if_else(begins, new, c.added[name]) for name, new in fresh.items()}}
         added["ticked"] = if_else(begins, 0.0, 1.0)
         return vertcat(updated, *Z, *added.values())
+
+    def _captured_by(self, updated: SX, k: int) -> SX:
+        """The derivative of an update by parameter ``k``; between the events of an instant, along it."""
+        c, instant = self.columns, self.open * self.instant_p[k]
+        z = self.delays.Z[k] + self.delays.rate_along * instant
+        return c.along(updated, t=instant, x=c.S[k], z=z, w=c.W[k], p=c.seeds[k])
 
     # At an instant.
 

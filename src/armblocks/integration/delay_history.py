@@ -119,8 +119,9 @@ class DelayHistory:
         i = low.value
         before = instant < self.time(reals, i)
         with r.when(before | (i >= last)):
-            # A rounding error after the last row, or before the first row: extrapolate linearly.
-            past = instant - self.time(reals, i)
+            # A rounding error after the last row: extrapolate linearly. Before the first row that can be read
+            # the signal has the value of that row: there may be a jump or a bend between them.
+            past = select(before, 0.0, instant - self.time(reals, i))
             known = self.slope(reals, i, line)
             known = select(is_slope(known), known, 0.0)
             value.value = fma(known, past, self.value(reals, i, line))

@@ -141,7 +141,9 @@ class Backlash(Block):
     def mode_values(self, t: SX, x: Signals, u: Signals, p: Signals) -> Signals:
         ahead, half = u["u"] - x["rest"], p["width"] / 2.0
         band = SMALLEST_JUMP * fmax(1.0, fabs(u["u"]))
-        by_place = if_else(ahead - half > 0.0, 1.0, if_else(ahead + half < 0.0, -1.0, 0.0))
+        # Where u turns at an end of the play, rounding must not drive the output the other way again.
+        above, below = if_else(u["u'"] < 0.0, band, 0.0), if_else(u["u'"] > 0.0, -band, 0.0)
+        by_place = if_else(ahead - half > above, 1.0, if_else(ahead + half < below, -1.0, 0.0))
         # A driven part stops where u turns, or has jumped back; it is driven the other way if u has gone on.
         released = logic_or(u["u'"] < 0.0, ahead < half - band)
         released_down = logic_or(u["u'"] > 0.0, ahead > band - half)
