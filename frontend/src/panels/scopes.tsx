@@ -1,0 +1,17 @@
+import { later } from '../later'
+import type { Panel } from '../panel'
+import { useStudio } from '../store'
+
+const Scopes = later(async () => (await import('../scopes/scopes')).Scopes, 'Loading the scopes …')
+
+function ScopesPanel() {
+  const ran = useStudio((s) => s.run !== null)
+  return ran ? <Scopes /> : <p className="empty">Run the model (Ctrl+Enter) to see its scopes here.</p>
+}
+
+export const panel: Panel = {
+  title: 'Scopes',
+  component: ScopesPanel,
+  order: 6,
+  place: { beside: 'canvas', side: 'below', size: Math.min(460, 0.34 * innerHeight) },
+}

@@ -1,0 +1,9 @@
+import type { Panel } from '../../src/panel'
+
+/** A panel that somebody adds: this file is all of it. */
+export const panel: Panel = {
+  title: 'Doubled',
+  component: () => <p>2 × 21 = {2 * 21}</p>,
+  order: 2.5,
+  place: { behind: 'library' },
+}
