@@ -79,7 +79,7 @@ def test_a_checkout_builds_the_page_once_and_says_why_it_cannot(tmp_path: Path) 
     )
     build_in_checkout(lines.append, web, script)
     assert len(lines) == 2
-    assert "has no studio page yet: it is built now" in lines[0]
+    assert "Building the studio page of this checkout" in lines[0]
     script.write_text("raise SystemExit(3)")
     build_in_checkout(lines.append, web, script)  # it is there
     assert built_page(web) == web

@@ -186,7 +186,7 @@ def test_a_library_that_leads_to_itself_is_refused(tmp_path: Path, monkeypatch: 
     )
     with pytest.raises(ArmblocksError) as refused:
         ab.load_diagram("case.json")
-    assert "library blocks that do not hold themselves" in message(refused.value, tmp_path)
+    assert "library blocks that do not contain themselves" in message(refused.value, tmp_path)
 
 
 # -- robots --------------------------------------------------------------------------------------------------

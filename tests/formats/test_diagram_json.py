@@ -373,7 +373,7 @@ FAULTS: list[tuple[bytes, type[ArmblocksError], str]] = [
         "q0 has 1 joints and qf has 2",
     ),
     (altered("blocks", "a/b", value={"type": "Clock"}), DiagramError, "the block name 'a/b' contains '/'"),
-    (altered("blocks", "GAIN", value={"type": "Clock"}), DiagramError, "differs only by case"),
+    (altered("blocks", "GAIN", value={"type": "Clock"}), DiagramError, "differs only in case"),
     (altered("connections", value=["clock -> gain"]), FormatError, "'clock -> gain' is no connection"),
     (altered("connections", value=["clock/y -> gane/u"]), UnknownNameError, "no block named 'gane'"),
     (altered("connections", value=["clock/y -> gain/v"]), UnknownNameError, "no input port named 'v'"),
@@ -535,5 +535,5 @@ def test_faults_inside_a_block_are_told_with_line_and_path() -> None:
 
 def test_too_many_diagrams_inside_each_other_are_refused() -> None:
     start = '{"format": 1, "blocks": {' + '"s": {"type": "Subsystem", "diagram": {"blocks": {' * 110
-    with pytest.raises(FormatError, match="objects and arrays lie too deep in each other"):
+    with pytest.raises(FormatError, match="objects and arrays are nested too deeply"):
         diagram_from_bytes((start + "}" * 332).encode(), "model.json", BLOCKS, load_robot)

@@ -83,8 +83,8 @@ def test_rows_of_numbers_stay_on_one_line() -> None:
         ('{"a": 1,\n"a": 2}', r"a\.json:2: the key 'a' stands twice in one object"),
         ('{"a":\n "\\ud800"}', r"a\.json:2, a: a text is not valid Unicode"),
         ('{"\\udfff": 1}', "a text is not valid Unicode"),
-        ("[" * 70 + "]" * 70, "objects and arrays lie too deep in each other. Allowed: 64 levels"),
-        ("[" * 900, "objects and arrays lie too deep"),
+        ("[" * 70 + "]" * 70, "objects and arrays are nested too deeply. Allowed: 64 levels"),
+        ("[" * 900, "objects and arrays are nested too deeply"),
         (b"\n\xff", r"a\.json:2: the file is not UTF-8 text"),
         ("1 2", "not valid JSON"),
         ("", "not valid JSON"),
@@ -126,7 +126,7 @@ def test_too_deep_a_value_is_not_written() -> None:
     value: list[object] = []
     for _ in range(DEEPEST + 1):
         value = [value]
-    with pytest.raises(FormatError, match="objects and arrays lie too deep in each other"):
+    with pytest.raises(FormatError, match="objects and arrays are nested too deeply"):
         canonical_bytes(value)
 
 

@@ -160,7 +160,7 @@ def cases(folder: Path) -> list[tuple[str, type[ArmblocksError], str]]:
         ("base.json", FormatError, "'base.json' is no entry of a library"),
         ("parts#", FormatError, "'parts#' is no entry of a library"),
         ("parts\x01/a.json#A", FormatError, "there is no such file"),
-        ("code.json#A", FormatError, "parameter 'value'.*no meaning in a formula|is not a formula"),
+        ("code.json#A", FormatError, "parameter 'value'.*is not allowed in a formula|is not a formula"),
         ("value.json#A", FormatError, "the key 'default' is missing"),
         ("kind.json#A", FormatError, "'numbre'.*number, array, integer"),
     ]

@@ -78,7 +78,7 @@ def test_an_edit_of_what_another_page_changed_is_refused(theirs: DiagramEdit, mi
     before = document.diagram
     with pytest.raises(
         InputError,
-        match=r"what you changed was changed in another page meanwhile.*an edit of what this page showed"
+        match=r"your change conflicts with a change from another page.*an edit of what this page showed"
         r".*look at what is there now, and do it again if you still want to",
     ):
         document.perform(change("me", base, mine))
@@ -103,9 +103,9 @@ def test_what_is_inside_a_subsystem_is_looked_at_too() -> None:
     base = document.version
     document.perform(change("other", base, gain("b0", 2.0), "S"))
     document.perform(change("me", base, gain("b1", 2.0), "S"))
-    with pytest.raises(InputError, match="what you changed was changed in another page"):
+    with pytest.raises(InputError, match="your change conflicts with a change from another page"):
         document.perform(change("me", base, gain("b0", 3.0), "S"))
-    with pytest.raises(InputError, match="what you changed was changed in another page"):
+    with pytest.raises(InputError, match="your change conflicts with a change from another page"):
         document.perform(change("me", base, RemoveBlocks(blocks=["S"])))
 
 

@@ -1,6 +1,6 @@
-"""What a block shows on its face: outline, size, and the drawing that says what it does.
+"""Faces of blocks: outline, size, and drawing.
 
-Most blocks show the sign that they declare; here are those whose outline or drawing is their own.
+Most blocks show the sign that they declare; this module draws the blocks with a special outline or drawing.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _SIZES = {
 
 
 def face_size(block: Block) -> tuple[Outline, float, float]:
-    """Outline, width and height in px that suit the face; port names may widen it."""
+    """Outline, width and height (px) of a face; port names may widen it."""
     outline = block.face_outline()
     if isinstance(block, kinds.Goto | kinds.From):
         return outline, tag_width(block), 26.0
@@ -62,7 +62,7 @@ def face_size(block: Block) -> tuple[Outline, float, float]:
 
 
 def face_width(block: Block) -> float:
-    """px that the drawing needs between the names of the ports."""
+    """Width that the drawing needs between the port names, px."""
     shape, width, _ = face_size(block)
     if shape is not Outline.CARD or isinstance(block, kinds.Display):
         return width
@@ -105,7 +105,8 @@ def outline(block: Block, x: float, y: float, width: float, height: float, flipp
 
 
 def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False) -> list[Mark]:
-    """The drawing inside the block, but that of a subsystem and of a switch, which depends on its ports."""
+    """The drawing inside the block, except for subsystems and switches, whose drawing depends on their
+    ports."""
     match block:
         case kinds.Gain() | kinds.SliderGain():
             return _gain(block, room, flipped=flipped)
@@ -116,7 +117,7 @@ def face(block: Block, room: Room, trend: Trend | None, *, flipped: bool = False
         case kinds.Goto() | kinds.From():
             return words(room.shrunk(6.0, 0.0), tag_text(block), size=11.0)
         case kinds.Product():
-            # Where all inputs are factors one sign says it; else the signs stand at the ports.
+            # If all inputs are factors, one sign is drawn; else the signs are drawn at the ports.
             return words(room, "×", size=20) if set(block.operators) == {"*"} else []
         case kinds.Scope():
             return scope(room, trend)
@@ -141,7 +142,7 @@ def face_at_ports(
     *,
     flipped: bool,
 ) -> list[Mark] | None:
-    """The drawing of a block that shows what its ports do; ``None`` for all others.
+    """The drawing of a block that depends on its ports; ``None`` for all others.
 
     ``heights`` (px) of the inputs at the side, ``tops``: names and places (px) of those on the upper edge.
     """
@@ -157,7 +158,7 @@ def face_at_ports(
 
 
 def port_labels(block: Block) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What stands beside the inputs and the outputs: names where a side has several, signs for operators."""
+    """The texts beside the ports: names if a side has several ports, signs for operators."""
     into = tuple(port.name for port in block.input_ports())
     out = tuple(port.name for port in block.output_ports())
     match block:

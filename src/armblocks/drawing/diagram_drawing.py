@@ -1,4 +1,4 @@
-"""A diagram as a drawing: blocks that say what they do, wires around them."""
+"""The drawing of a diagram: blocks with their faces, and routed signal lines."""
 
 from __future__ import annotations
 
@@ -57,11 +57,11 @@ _STUB = 16.0
 def diagram_picture(
     diagram: Diagram, result: SimulationResult | None = None, *, sheet: str = "", rates: bool = False
 ) -> Picture:
-    """A sheet of the diagram, its sinks showing what the run gave them if a result is given.
+    """The drawing of a sheet; with a result, sinks show its data.
 
-    ``sheet``: the path of the subsystem that is drawn instead of the top. A drawing in progress, which cannot
-    be traced yet, has thin wires only. ``rates``: sampled blocks and their wires show their clocks, which a
-    legend names. Raises UnknownNameError for a sheet that is not there, DiagramError for unknown rates.
+    ``sheet``: the path of a subsystem to draw instead of the top level. An incomplete diagram, which cannot
+    be traced, has thin lines only. ``rates``: sampled blocks and their wires show their clocks, which a
+    legend names. Raises UnknownNameError for an unknown sheet, DiagramError for unknown rates.
     """
     carried = _Carried.of(diagram)
     clocks = Rates.of(diagram) if rates else Rates()
@@ -100,7 +100,7 @@ def diagram_picture(
 
 
 def sheets(diagram: Diagram) -> dict[str, tuple[str, ...]]:
-    """The subsystems of a diagram by path, in order, each with the others that are the same inside."""
+    """The subsystems of a diagram by path, in order, each with the others of equal content."""
     found: dict[Diagram, list[str]] = {}
     for path, level in sorted(levels_of(diagram).items(), key=lambda entry: entry[0].split("/")):
         if path:
@@ -111,12 +111,12 @@ def sheets(diagram: Diagram) -> dict[str, tuple[str, ...]]:
 def diagram_svg(
     diagram: Diagram, result: SimulationResult | None = None, *, theme: Theme | None = None
 ) -> str:
-    """:func:`diagram_picture` as an SVG document; ``theme`` ``None`` follows the reader's preference."""
+    """:func:`diagram_picture` as an SVG document; ``theme`` ``None`` follows the viewer's preference."""
     return svg_file(diagram_picture(diagram, result), theme=theme)
 
 
 def block_picture(block: Block) -> Picture:
-    """One block alone, with stubs of its wires: the symbol that stands for it."""
+    """The symbol of one block, with stubs of its connections."""
     box = sized_box("", block)
     marks: list[Mark] = []
     for spot in (*box.inputs, *box.outputs):
@@ -140,7 +140,7 @@ def block_picture(block: Block) -> Picture:
 
 
 def wire_nets(diagram: Diagram, placed: dict[str, Box]) -> tuple[list[Net], dict[PortRef, list[PortRef]]]:
-    """What is to be laid out: a net for every output that is connected, and its targets by source."""
+    """The nets to route: one for every connected output, and its targets by source."""
     wires: dict[PortRef, list[PortRef]] = {}
     for wire in sorted(diagram.connections, key=lambda w: (w.source, w.target)):
         wires.setdefault(wire.source, []).append(wire.target)
@@ -164,7 +164,7 @@ def _end(spots: tuple[PortSpot, ...], port: str) -> WireEnd:
 
 
 def obstacle(box: Box) -> Obstacle:
-    """The room of a block and its name, which wires go around."""
+    """The area of a block and its name, which lines avoid."""
     return Obstacle(box.x, box.y, box.width, box.height, _label(box))
 
 
@@ -194,7 +194,7 @@ def _trend(path: str, view: View | None, result: SimulationResult | None) -> Tre
 def block_marks(box: Box, trend: Trend | None = None) -> list[Mark]:
     """A block without its name: outline, port names and face, where its box stands.
 
-    A block that is turned has its outline turned, and its drawing upright.
+    A rotated block has a rotated outline and an upright drawing.
     """
     shape, block = _shape(box), box.block
     marks: list[Mark] = [_outline(box)]
@@ -244,7 +244,7 @@ def _block(box: Box, trend: Trend | None) -> list[Mark]:
 
 
 def _port_names(box: Box) -> tuple[list[Mark], Room]:
-    """Names inside the edges where a side has more than one port, and the room that they leave."""
+    """Port names inside the edges of sides with several ports, and the remaining area."""
     if not box.upright:
         return _port_names_above_and_below(box)
     marks: list[Mark] = []
@@ -297,7 +297,7 @@ def _signs(box: Box) -> list[Mark]:
 
 
 class WireKind(IntEnum):
-    """What a wire carries."""
+    """The content of a line."""
 
     SCALAR = 0
     VECTOR = 1
@@ -307,7 +307,7 @@ class WireKind(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class _Carried:
-    """The sheets of a diagram, and what their wires carry as far as it is known."""
+    """The sheets of a diagram, and the known contents of their lines."""
 
     levels: Mapping[str, Diagram]
     views: Mapping[str, View]
@@ -325,7 +325,7 @@ class _Carried:
         return cls(form.levels, views, form.carried, outputs)
 
     def kind(self, source: PortRef) -> WireKind:
-        """What leaves an output port of the hierarchy."""
+        """The content of an output port of the hierarchy."""
         carried = self.carried.get(source, source)
         if isinstance(carried, Bus):
             return WireKind.BUS
@@ -424,7 +424,7 @@ def _block_title(name: str, box: Box) -> str:
 
 
 def _in_words(diagram: Diagram) -> str:
-    """The drawing for those who cannot see it: every wire once."""
+    """The text alternative of the drawing: a list of all connections."""
 
     def words(wire: Connection) -> str:
         return f"{wire.source} to {wire.target}"

@@ -1,4 +1,4 @@
-"""A sheet of a diagram as a file: what the command line, Python and the studio export."""
+"""Export of a sheet to a file, for the command line, Python and the studio."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def draw_diagram(
     theme: Theme | None = None,
     rates: bool = False,
 ) -> Path:
-    """Write a sheet as ``….svg``, ``….png`` or ``….pdf``, all or nothing; returns the path.
+    """Write a sheet as ``….svg``, ``….png`` or ``….pdf``, atomically; returns the path.
 
-    What is drawn is said at :func:`drawing_bytes`. Raises UnknownNameError for another suffix or sheet.
+    See :func:`drawing_bytes` for the arguments. Raises UnknownNameError for another suffix or sheet.
     """
     place = Path(path)
     kind = place.suffix.removeprefix(".").lower()
@@ -48,9 +48,9 @@ def drawing_bytes(
     """A sheet in one of ``DRAWING_FORMATS``.
 
     ``sheet``: the path of a subsystem, ``""`` the top. ``result``: what the sinks show. ``rates``: clocks in
-    colours, with a legend. ``theme`` ``None``:
-    SVG follows the reader's preference, the others are light. A drawing in progress, whose inputs are not all
-    connected, is drawn as well. Raises UnknownNameError for another format or sheet.
+    colours, with a legend. ``theme`` ``None``: SVG follows the viewer's preference, other formats are light.
+    Incomplete diagrams with unconnected inputs are drawn, too. Raises UnknownNameError for another format or
+    sheet.
     """
     if kind not in DRAWING_FORMATS:
         raise UnknownNameError("drawing format", kind, DRAWING_FORMATS)

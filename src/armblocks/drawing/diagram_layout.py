@@ -1,4 +1,4 @@
-"""Where blocks and their ports stand: as the diagram says, or in layers from left to right."""
+"""Positions of blocks and ports: from the diagram's layout, or in layers from left to right."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROW_GAP = 26.0
 _COLUMN_GAP = 52.0
 _LANE = 11.0
 _STRAIGHTEN = 13.0
-"""px that a block may be moved to make a wire straight."""
+"""Maximum shift of a block to straighten a line, px."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Box:
 
     @property
     def upright(self) -> bool:
-        """Whether its signals run from side to side."""
+        """Whether its signals run horizontally."""
         return self.rotation % 180 == 0
 
     @property
@@ -63,7 +63,7 @@ class Box:
         return min(text_width(self.name, NAME_SIZE), 168.0)
 
     def at(self, x: float, y: float) -> Box:
-        """The same block elsewhere."""
+        """The box at another position."""
         dx, dy = x - self.x, y - self.y
         return replace(
             self,
@@ -139,7 +139,7 @@ def _standing(box: Box) -> tuple[float, float]:
 
 
 def _straightened(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
-    """Blocks moved up or down by a few px where that makes a wire straight and brings no block too near."""
+    """Blocks shifted vertically by a few px to straighten lines without crowding."""
     moved = dict(placed)
     for name in sorted(placed, key=lambda n: (placed[n].x, placed[n].y, n)):
         box = moved[name]
@@ -181,9 +181,9 @@ def _turned(diagram: Diagram, placed: dict[str, Box]) -> dict[str, Box]:
             if wire.target.block == name
         }
         if len(height) < count:
-            continue  # a drawing in progress: nothing says yet from where the open input will come
+            continue  # an incomplete diagram: the direction of an open input is unknown
         ports = [spot.name for spot in box.inputs]
-        # From behind comes what comes most nearly straight; a loop's return never does.
+        # The straightest line enters from the left, but never the feedback line of a loop.
         behind = {
             wire.target.port: placed[wire.source.block].x < box.x
             for wire in diagram.connections
@@ -236,7 +236,7 @@ def _without_loops(successors: Mapping[str, Sequence[str]]) -> dict[str, list[st
     forward: dict[str, list[str]] = {name: [] for name in successors}
     entered = {target for targets in successors.values() for target in targets}
     colour: dict[str, int] = {}
-    # Blocks that nothing feeds come first: a walk from them follows the signals.
+    # Blocks without inputs come first: a search from them follows the signals.
     for root in sorted(successors, key=lambda name: (name in entered, name)):
         if root in colour:
             continue
@@ -272,7 +272,7 @@ def _layers(forward: Mapping[str, Sequence[str]]) -> dict[str, int]:
             waiting[target] -= 1
             if waiting[target] == 0:
                 ready.append(target)
-    # A source stands right before the first block that it feeds, not at the far left.
+    # A source is placed directly before its first target, not at the far left.
     for name, targets in forward.items():
         if targets and not any(name in others for others in forward.values()):
             layer[name] = min(layer[target] for target in targets) - 1

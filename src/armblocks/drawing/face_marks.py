@@ -1,4 +1,4 @@
-"""How signs are drawn: as large as the room on a face allows, never beyond it."""
+"""Drawing of signs: as large as the area of the face allows."""
 
 from __future__ import annotations
 

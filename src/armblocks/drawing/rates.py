@@ -1,4 +1,4 @@
-"""The clocks of a diagram on its drawing: a colour and a mark for each, and a legend that says its period."""
+"""The clocks of a diagram in its drawing: a colour and a mark for each, and a legend with the periods."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROW = 22.0
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Which clock each sampled block of the flat diagram obeys, the fastest first: D1, D2, …"""
+    """The clock of each sampled block of the flat diagram, fastest first: D1, D2, …"""
 
     clocks: tuple[SampleClock, ...] = ()
     clock_of: Mapping[str, int] | None = None
@@ -29,7 +29,7 @@ class Rates:
         return cls(sampling.clocks, sampling.clock_of)
 
     def mark(self, block: str) -> tuple[str, Tone] | None:
-        """Text and colour for a block of this path; ``None`` for one that works all the time."""
+        """Text and colour for a block of this path; ``None`` for a continuous block."""
         number = (self.clock_of or {}).get(block)
         return None if number is None else (f"D{number + 1}", trace_tone(number))
 

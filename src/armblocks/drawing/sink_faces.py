@@ -1,4 +1,4 @@
-"""The faces of sinks: little screens that show what a run gave, and a sample before there is one."""
+"""Faces of sinks: small screens with the data of a run, or sample data without a run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trend:
-    """What a run gave a sink: ``time`` (N,) and for every input its values (N, k)."""
+    """The data of a run at a sink: ``time`` (N,) and for every input its values (N, k)."""
 
     time: _Array
     inputs: tuple[_Array, ...]
@@ -34,7 +34,7 @@ def _screen(room: Room) -> tuple[Room, Mark]:
 
 
 def scope(room: Room, trend: Trend | None) -> list[Mark]:
-    """Every signal over the time."""
+    """All signals over time."""
     box, screen = _screen(room)
     marks: list[Mark] = [screen]
     if trend is None or len(trend.time) < 2:

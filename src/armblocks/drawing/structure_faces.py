@@ -1,4 +1,4 @@
-"""The faces of what gives a diagram its structure: ends, tags, buses, switches, subsystems."""
+"""Faces of structural blocks: In and Out, tags, buses, switches, subsystems."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.pictures.style import Tone
 from armblocks.pictures.text_width import text_width
 
 CONTROLS = ("enable", "trigger", "reset", "action")
-"""Inputs that say when a subsystem works: they stand on its upper edge, under them their symbol."""
+"""Control inputs of a subsystem, which are on its upper edge with their symbols below."""
 CONTROL_ROOM = 18.0
 """px below the upper edge of a conditional subsystem that the symbol of its control takes."""
 BAR = 6.0
@@ -48,13 +48,13 @@ def control_ports(block: Block) -> tuple[str, ...]:
 
 
 def tag_text(block: kinds.Goto | kinds.From) -> str:
-    """The tag, in brackets that say how far it is known: [local], {scoped}, global; a From does not know."""
+    """The tag, in brackets by its visibility: [local], {scoped}, global; without brackets for a From."""
     scope = block.visibility if isinstance(block, kinds.Goto) else "local"
     return {"local": f"[{block.tag}]", "scoped": f"{{{block.tag}}}", "global": block.tag}[scope]
 
 
 def tag_outline(block: Block, x: float, y: float, width: float, height: float, flipped: bool) -> Mark:
-    """A Goto points to where the signal goes; a From has the notch that the point fits into."""
+    """A Goto has an arrow tip; a From has the matching notch."""
     tip = 9.0
     if isinstance(block, kinds.Goto):
         corners = [(0.0, 0.0), (width - tip, 0.0), (width, height / 2), (width - tip, height), (0.0, height)]
@@ -72,7 +72,8 @@ def bus_bar(block: Block, x: float, y: float, width: float, height: float, flipp
 
 
 def subsystem_marks(block: Block, room: Room, tops: tuple[tuple[str, float], ...]) -> list[Mark]:
-    """A small diagram, or what a mask says; above, symbols of its controls under their ports (name, x)."""
+    """A small diagram, or the text of the mask; above, symbols of the control inputs under their ports (name,
+    x)."""
     down = CONTROL_ROOM if tops else 0.0
     below = Room(room.x, room.y + down, room.width, room.height - down)
     inner: object = block.parameter_value("diagram")
@@ -112,7 +113,7 @@ def _lines(room: Room, texts: Sequence[str]) -> list[Mark]:
 
 
 def _sheet(room: Room) -> list[Mark]:
-    """A small diagram: what is inside a block."""
+    """A small diagram of the content of a block."""
     x, y = room.middle
     boxes = [(x - 17, y - 9), (x + 5, y + 1)]
     wire = [(x - 5, y - 4.5), (x, y - 4.5), (x, y + 5.5), (x + 5, y + 5.5)]
@@ -204,7 +205,7 @@ def bus_outline(
 
 
 def branch_labels(block: kinds.If | kinds.SwitchCase) -> tuple[str, ...]:
-    """What stands beside the outputs: the conditions themselves."""
+    """The texts beside the outputs: the conditions."""
     if isinstance(block, kinds.If):
         texts = [text.strip() for text in block.expressions.split(";")]
         return (*(f"{'else' * (k > 0)}if {text}" for k, text in enumerate(texts)), "else")

@@ -1,8 +1,8 @@
 """Orthogonal wires around blocks: a sparse grid, A* with a price for bends, nets that share their stem.
 
-Grid lines run beside every block and through every port, so the search stays small whatever the sheet's
-size (Hanan 1966 shows that such a grid holds a shortest rectilinear tree). A wire of a net may start
-anywhere on what its net has already, and never lies on another net's wire.
+Grid lines run beside every block and through every port, so the search is small for every sheet size (Hanan
+1966 shows that such a grid contains a shortest rectilinear tree). A wire of a net may branch anywhere from
+its net, and never overlaps another net's wire.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Point = tuple[float, float]
 Node = tuple[int, int]
 
 CLEARANCE = 8.0
-"""px that no wire comes nearer to a foreign block."""
+"""Minimum distance of a wire from other blocks, px."""
 _STUB = 13.0
 _LANES = (13.0, 23.0, 33.0)
 _BEND = 34.0
@@ -64,15 +64,15 @@ class WireEnd:
 
 @dataclass(frozen=True)
 class Net:
-    """One driver and everything that it drives."""
+    """One source and all its targets."""
 
     source: WireEnd
     targets: tuple[WireEnd, ...]
     bends: tuple[tuple[float, ...], ...] = ()
-    """For each target the way that somebody has drawn, see :func:`bent`; empty where the router chooses."""
+    """The user-drawn route for each target, see :func:`bent`; empty for automatic routing."""
 
     def drawn(self) -> dict[WireEnd, tuple[Point, ...]]:
-        """The ways that are drawn and lead from port to port."""
+        """The valid user-drawn routes."""
         found: dict[WireEnd, tuple[Point, ...]] = {}
         for target, bends in zip(self.targets, self.bends):
             if (path := bent(self.source, bends, target)) is not None:
@@ -120,7 +120,7 @@ def _length(net: Net) -> float:
 
 
 class _Router:
-    """The grid with what is laid on it so far."""
+    """The grid with the routes so far."""
 
     def __init__(self, obstacles: Sequence[Obstacle], nets: Sequence[Net]) -> None:
         ends = [end for net in nets for end in (net.source, *net.targets)]
@@ -144,7 +144,7 @@ class _Router:
         self.right = np.ones((rows, columns))
         self.down = np.ones((rows, columns))
         self._block(obstacles)
-        # Before every port a stretch is its own net's, so that others turn away earlier: -1 nobody's.
+        # The cells before every port are reserved for its net, so that others turn earlier: -1 free.
         self.right_reserved = np.full((rows, columns), -1)
         self._reserve(nets)
         # Which net lies on an edge: -1 none.
@@ -221,7 +221,7 @@ class _Router:
             walked = stems[target]
             points = [(self.xs[c], self.ys[r]) for r, c in walked]
             if not walked:
-                # Blocks stand too close for the grid: a plain step is better than no wire.
+                # Blocks are too close for the grid: a simple step is better than no wire.
                 a, b = _ahead(net.source), _behind(target)
                 points = [a, ((a[0] + b[0]) / 2, a[1]), ((a[0] + b[0]) / 2, b[1]), b]
             if not walked or walked[0] == start:
@@ -288,7 +288,7 @@ class _Router:
         goal: Node,
         arriving: tuple[int, int],
     ) -> list[Node] | None:
-        """The cheapest way from the net's tree to the goal, A* over nodes and directions."""
+        """The cheapest route from the net's tree to the goal, A* over nodes and directions."""
         gx, gy = self.xs[goal[1]], self.ys[goal[0]]
         directions = ((0, 1), (1, 0), (0, -1), (-1, 0))  # row, column
 

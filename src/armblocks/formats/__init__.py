@@ -1,5 +1,5 @@
-"""Files and descriptions: robots and diagrams, read and written. Nothing in a file is executed,
-but for Python functions of a diagram that is expressly trusted."""
+"""Reading and writing of robots and diagrams. No code in files is executed, except Python functions of
+explicitly trusted diagrams."""
 
 from typing import TYPE_CHECKING
 

@@ -1,6 +1,6 @@
 """Canonical JSON: the same bytes for the same content, and small differences for small changes.
 
-Keys sorted, two blanks per level, every member on a line of its own, rows of numbers on one line, floats
+Keys sorted, two blanks per level, every member on a separate line, rows of numbers on one line, floats
 with the fewest digits that read back to the same bits, a newline at the end.
 """
 
@@ -18,7 +18,7 @@ from armblocks.formats.json_document import DEEPEST, KeyPath, path_text
 def canonical_bytes(
     value: object, *, one_line: Callable[[KeyPath], bool] = lambda path: False, deepest: int = DEEPEST
 ) -> bytes:
-    """The one way to write a document of dicts, lists, texts, numbers, booleans and ``None``.
+    """The canonical text of a document of dicts, lists, texts, numbers, booleans and ``None``.
 
     ``one_line`` says of the path of an object or array whether it is kept on one line; ``deepest`` caps how
     deep they lie in each other. Raises ``FormatError``
@@ -42,10 +42,10 @@ def _check_depth(value: object, deepest: int) -> None:
     while level:
         if depth > deepest:
             raise FormatError(
-                "objects and arrays lie too deep in each other",
+                "objects and arrays are nested too deeply",
                 allowed=f"{deepest} levels",
                 where="JSON document",
-                fix="put less into each other",
+                fix="reduce the nesting",
             )
         inside: list[object] = []
         for entry in level:

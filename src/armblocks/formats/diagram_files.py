@@ -28,7 +28,7 @@ from armblocks.formats.subsystem_libraries import library_path
 
 @cache
 def example_descriptions() -> Mapping[str, str]:
-    """What the shipped diagrams show, by name: read from their files, without building a diagram."""
+    """The descriptions of the shipped diagrams by name, read from their files without building a diagram."""
     folder = shipped_folder("examples")
     return MappingProxyType({name: _description(folder / f"{name}{SUFFIX}") for name in list_examples()})
 
@@ -49,10 +49,10 @@ def load_diagram(
 ) -> Diagram:
     """A shipped diagram by its name, ``"kr180model"``, or a diagram file by its path.
 
-    What holds a path separator or ends in ``.json`` is a path, everything else a name. Raises
+    A text with a path separator or the suffix ``.json`` is a path, any other text a name. Raises
     ``UnknownNameError`` for a name that is not shipped, else as :func:`read_diagram`. With ``trust`` the
-    files of Python functions that the diagram names are run; without, such a diagram is refused. With
-    ``draft`` the diagram is not checked, which traces no equations: enough for what only draws it.
+    files of Python functions that the diagram names are run; without it, such a diagram is an error. With
+    ``draft`` the diagram is not checked or traced, which is sufficient for drawing.
     """
     text = fspath(name_or_path)
     if not isinstance(name_or_path, str) or "/" in text or "\\" in text or text.lower().endswith(SUFFIX):
@@ -75,9 +75,9 @@ def read_diagram(
     """The diagram of a file, checked unless ``draft``; ``library`` holds the block types that it may use.
 
     ``resolve_robot`` turns a shipped name or a path into a robot; paths in the file are relative to the
-    file's folder. Raises ``FormatError`` for a missing or unreadable file and for what the format forbids,
+    file's folder. Raises ``FormatError`` for a missing or unreadable file and for violations of the format,
     ``UnknownNameError`` for unknown types, parameters, blocks, ports and robots, ``DiagramError`` for a
-    diagram that cannot be built. All name the file, and the line where the fault has one.
+    diagram that cannot be built. All name the file, and the line if known.
     """
     data = read_bounded(fspath(path), MOST_BYTES)
     return diagram_from_bytes(
@@ -88,7 +88,7 @@ def read_diagram(
 def write_diagram(
     path: str | PathLike[str], diagram: Diagram, resolve_robot: ResolveRobot = load_robot
 ) -> Path:
-    """Write the canonical file of a diagram, all or nothing, and return its path.
+    """Write the canonical file of a diagram atomically, and return its path.
 
     Reading it gives an equal diagram. Robots are written as references, the whole robot only where it is
     neither shipped nor from a file. Raises ``FormatError`` where the folder cannot be written or a value has
@@ -117,7 +117,7 @@ def load_library(
 def write_library(
     path: str | PathLike[str], entries: Mapping[str, Diagram], resolve_robot: ResolveRobot = load_robot
 ) -> Path:
-    """Write a library of diagrams by name, all or nothing, and return its path."""
+    """Write a library of diagrams by name atomically, and return its path."""
     target = Path(fspath(path))
     for name in entries:
         check_block_name(name, str(target))

@@ -1,10 +1,10 @@
 """Diagrams as canonical JSON: small differences in a diagram are small differences in its file.
 
-Blocks are keyed by name and sorted, connections are sorted sentences (``"jtraj/q -> fkine/q"``), the layout
-stands apart from the meaning, and nothing derived, no ids and no times are written. So a changed parameter is
-one line, a moved block is one line of the layout, and two people who add different blocks do not collide.
-Among the layout stand also the ways of wires that somebody has drawn, under the wire's sentence, and notes,
-under names that begin with ``/``, as no block's does::
+Blocks are keyed by name and sorted, connections are sorted texts (``"jtraj/q -> fkine/q"``), the layout is
+separate from the content, and no derived values, ids or times are written. A changed parameter is one line, a
+moved block is one line of the layout, and additions of different blocks do not conflict in version control.
+The layout also has user-drawn routes, under the text of the connection, and notes, under names that begin
+with ``/``, which block names cannot::
 
     {
       "blocks": {"sine": {"parameters": {"frequency": 2, …}, "type": "SineWave"}, …},
@@ -16,19 +16,19 @@ under names that begin with ``/``, as no block's does::
       "settings": {"stop_time": 10, …}
     }
 
-A diagram may declare parameters, its ``mask``; a block's ``formulas`` over them stand beside its parameters,
-and the values that follow are not written. What the parameters are is said by the block that holds the
-diagram, among its own, and by the document itself of the outermost one, under ``parameters``.
+A diagram may declare parameters, its ``mask``; a block's ``formulas`` of them are beside its parameters, and
+their values are not written. The values of mask parameters are among the parameters of the subsystem block,
+for the outermost diagram under ``parameters`` of the document.
 
 A block that is linked to an entry of a library has ``library`` in the place of ``diagram``: see
 :mod:`armblocks.formats.subsystem_libraries`.
 
-A block that holds a diagram has it beside its parameters, under ``diagram``, with the same keys, but without
-``format`` and ``robots``, which stand once, and without settings and layout where there is nothing to say.
+A subsystem block has its inner diagram under ``diagram``, with the same keys, except ``format`` and
+``robots``, which occur once, and without empty settings and layout.
 
-Keys that armblocks does not know are kept in ``Diagram.extras`` and written again (by another program, or a
-newer armblocks); a key that is nearly a known one, and an unknown parameter, are refused. Infinite parameters
-are the texts ``"inf"`` and ``"-inf"``; NaN has no place in a file. References to robots: see
+Unknown keys (of another program, or a newer armblocks) are kept in ``Diagram.extras`` and written again. A
+key similar to a known one, and an unknown parameter, are errors. Infinite parameters are the texts ``"inf"``
+and ``"-inf"``; NaN has no place in a file. References to robots: see
 :mod:`armblocks.formats.robot_references`. The JSON Schema is ``formats/schema/diagram.schema.json``.
 """
 
@@ -82,7 +82,7 @@ from armblocks.robot import Robot
 FORMAT_VERSION = 1
 MOST_BYTES = 16 * 2**20
 DEEPEST = 320
-"""Objects and arrays inside each other: a hundred subsystems, and what stands in the innermost."""
+"""Maximum nesting of objects and arrays: a hundred subsystems, and the content of the innermost."""
 
 _INNER_KEYS = ("name", "description", "mask", "blocks", "connections", "logged", "layout", "settings")
 _DOCUMENT_KEYS = ("format", *_INNER_KEYS, "parameters", "robots")
@@ -94,7 +94,7 @@ _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
 _NUMERIC = (ParameterKind.NUMBER, ParameterKind.ARRAY)
 
 Extras = dict[str, dict[str, object]]
-"""Unknown members by the place where they stand: ``""``, ``"blocks"``, ``"layout"``, ``"settings"``."""
+"""Unknown members by location: ``""``, ``"blocks"``, ``"layout"``, ``"settings"``."""
 
 
 def diagram_from_bytes(
@@ -169,7 +169,7 @@ def library_to_bytes(
 
 
 class _Writer:
-    """Says the diagrams of one document as plain values."""
+    """Writes the diagrams of one document as plain values."""
 
     def __init__(self, robots: RobotWriter, folder: Path | None) -> None:
         self.robots = robots
@@ -214,7 +214,7 @@ class _Writer:
         }
 
     def _block(self, block: Block) -> dict[str, object]:
-        """A block; a diagram inside stands beside the parameters, so that depth costs little."""
+        """A block; an inner diagram is beside the parameters, which limits the nesting depth."""
         formulas = dict(block.formulas)
         values = {rule: block.parameter_value(rule.name) for rule in block.own_parameters()}
         plain = {
@@ -238,7 +238,7 @@ class _Writer:
         return {rule.name: self._value(rule, diagram.mask_values[rule.name]) for rule in diagram.mask}
 
     def inside(self, diagram: Diagram) -> dict[str, object]:
-        """A diagram that is not the outermost one: what says nothing is left out."""
+        """An inner diagram; empty members are omitted."""
         document = self.diagram(diagram)
         if diagram.settings == SimulationOptions() and "settings" not in diagram.extras:
             del document["settings"]
@@ -311,7 +311,7 @@ def _joined(node: Node, error: ArmblocksError) -> str:
 
 
 class _Reader:
-    """Makes the diagrams of one document."""
+    """Builds the diagrams of one document."""
 
     def __init__(
         self, library: BlockLibrary, robots: RobotReader, libraries: Libraries, *, draft: bool

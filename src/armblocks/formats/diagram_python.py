@@ -1,8 +1,8 @@
-"""A diagram as the lines of Python that build and run it, as a person would type them.
+"""Generation of a readable Python program that builds and runs a diagram.
 
-Blocks stand after what feeds them where they can, so that a wire is an argument of ``add``; the wires of
-loops follow as ``connect``. Only parameters that differ from their defaults are written. A diagram inside a
-block is built before it, by a builder of its own; a block that is linked is taken from its library.
+Blocks follow the sources of their inputs where possible, so that connections are arguments of ``add``; the
+connections of loops follow as ``connect``. Only parameters that differ from their defaults are written. An
+inner diagram is built before its block, by a separate builder; a linked block is loaded from its library.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a name or a file holds: a robot, a diagram, or a library of subsystems."""
+"""The kind of a name or file: robot, diagram, or library of subsystems."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""JSON read strictly, with messages that give file, line and the path inside the document.
+"""A strict JSON reader, whose messages have file, line and the path inside the document.
 
-UTF-8, at most so many bytes and so deep, no duplicate keys, no NaN or infinity (``json`` alone accepts
-``NaN`` and ``1e999``). Written it is by :mod:`armblocks.formats.canonical_json`.
+It requires UTF-8, limits size and depth, and rejects duplicate keys, NaN and infinity (``json`` alone accepts
+``NaN`` and ``1e999``). :mod:`armblocks.formats.canonical_json` writes JSON.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ def path_text(path: KeyPath) -> str:
 def split_members(node: Node, known: Iterable[str]) -> tuple[dict[str, Node], dict[str, object]]:
     """The known members of an object, and the unknown ones as plain values, which a writer must preserve.
 
-    An unknown key that is nearly a known one is a slip of the pen: it raises ``FormatError``.
+    An unknown key similar to a known one is a typing error and raises ``FormatError``.
     """
     names = list(known)
     members = node.members()
@@ -266,7 +266,7 @@ _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"?|[\[\]{}:,]|\n|[^\s\[\]{}:,"]+', re.DOTA
 
 
 def _check_depth(document: Document, deepest: int) -> None:
-    """Python's parser recurses: refuse before it starts."""
+    """Check the depth before parsing, because Python's parser is recursive."""
     depth, line = 0, 1
     for found in _TOKEN.finditer(document.text):
         token = found.group()
@@ -275,10 +275,10 @@ def _check_depth(document: Document, deepest: int) -> None:
             depth += 1
             if depth > deepest:
                 raise FormatError(
-                    "objects and arrays lie too deep in each other",
+                    "objects and arrays are nested too deeply",
                     where=f"{document.name}:{line}",
                     allowed=f"{deepest} levels",
-                    fix="take levels out",
+                    fix="reduce the nesting",
                 )
         elif token in "]}":
             depth -= 1

@@ -1,4 +1,4 @@
-"""What a robot file format is to the rest: a name, suffixes, and a reader."""
+"""The interface of a robot file format: name, suffixes, reader."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Robots as canonical JSON, ``robot.json``: every field of a ``Robot``, in SI units.
 
-Angles may be written ``"90 deg"`` and angular speeds ``"105 deg/s"``; they are written so where the degrees
-have few digits and read back to the same bits. A link with a ``dh`` row takes its joint and transforms from
-it. Unknown keys are refused with the nearest known one: a robot file in which a slip of the pen is ignored
-is a wrong robot. ``notes`` is for people and not kept.
+Angles may be written ``"90 deg"`` and angular speeds ``"105 deg/s"``; they are written in degrees if these
+have few digits and read back exactly. A link with a ``dh`` row takes its joint and transforms from it.
+Unknown keys are errors with the nearest known key, because an ignored typing error would give a wrong robot.
+``notes`` is a comment and not preserved.
 
 The JSON Schema is ``formats/schema/robot.schema.json``.
 """

@@ -1,4 +1,4 @@
-"""How a diagram file says which robot a block means, and which table of values.
+"""References of a diagram file to robots, tables of values and Python functions.
 
 A block's parameter names a robot: ``"kr180"`` a shipped one; ``"arms/mine.m"`` a robot file, relative to the
 diagram's folder; or a robot of the diagram's own table ``robots``, so that what several blocks share is said

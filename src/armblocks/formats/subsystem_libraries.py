@@ -9,8 +9,8 @@ and a block of a diagram, or of a library, says which one it holds and what its 
     "hip": {"type": "Subsystem", "library": "servos.json#JointServo", "parameters": {"kp": 40}}
 
 The file is a path relative to the folder of the file that names it, or a shipped library by its name. It is
-looked up when the diagram is read, so that a better library betters all that use it; what is read has
-``Diagram.link`` and is not to be changed, unless the link is given up (``link=""``).
+loaded when the diagram is read, so that changes of a library affect all its users. A loaded entry has
+``Diagram.link`` and must not be changed, unless the link is broken (``link=""``).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_BYTES = 16 * 2**20
 DEEPEST = 320
 """Objects and arrays inside each other, as in diagrams."""
 DEEPEST_CHAIN = 40
-"""Library blocks inside library blocks."""
+"""Maximum nesting of library blocks."""
 
 ReadFile = Callable[[Path], bytes]
 """From the resolved path of a library file to its bytes; raises ``FormatError`` for a forbidden one."""
@@ -137,7 +137,7 @@ class Libraries:
             raise FormatError(
                 f"library blocks hold each other in a circle: {' -> '.join(shown[first:])}",
                 where=str(path),
-                allowed="library blocks that do not hold themselves",
+                allowed="library blocks that do not contain themselves",
                 fix="take one of these blocks out of the other",
             )
         if len(self._chain) >= DEEPEST_CHAIN:
@@ -146,7 +146,7 @@ class Libraries:
                 f"{' -> '.join(shown[:3])} -> …",
                 where=str(path),
                 allowed=f"at most {DEEPEST_CHAIN}",
-                fix="put some of them side by side",
+                fix="reduce the nesting",
             )
         root = self._root(path)
         known = root.members()["library"].members()

@@ -1,1 +1,1 @@
-"""Pictures: marks whose colours are tones, written as SVG, PNG or PDF, and how numbers and texts look."""
+"""Pictures: marks with theme colours (tones), written as SVG, PNG or PDF; formatting of numbers and texts."""

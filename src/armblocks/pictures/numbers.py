@@ -1,4 +1,4 @@
-"""Numbers for people: ticks, steps, SI prefixes, typographic minus."""
+"""Formatting of numbers for display: ticks, steps, SI prefixes, typographic minus."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The studio: diagrams drawn, run and watched in the browser."""
+"""The studio: editing and running of diagrams in the browser."""

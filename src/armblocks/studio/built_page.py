@@ -1,6 +1,6 @@
-"""The built page of the studio: where it lies, and how a checkout gets it when it is first asked for.
+"""The built page of the studio: its folder, and its build in a checkout at first use.
 
-Wheels bring the page. A checkout does not keep it; ``frontend/build_page.py`` builds it there.
+Wheels contain the page. A checkout does not; ``frontend/build_page.py`` builds it there.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ def build_in_checkout(notify: Callable[[str], None], folder: Path = WEB, script:
     """
     if (folder / "index.html").is_file() or not script.is_file():
         return
-    notify("This checkout has no studio page yet: it is built now, once (about a minute).")
+    notify("Building the studio page of this checkout, once (about a minute).")
     done = subprocess.run([sys.executable, str(script)], stdin=subprocess.DEVNULL, stdout=sys.stderr.fileno())
     if done.returncode != 0:
         raise FormatError(
-            "the page of the studio could not be built; the reason stands above",
+            "the page of the studio could not be built; the reason is printed above",
             where=str(script),
             allowed="Node.js 20.19 or newer, or pip to fetch it; and a connection to the npm registry",
             fix="install Node.js, or install armblocks from a wheel, which has the page",

@@ -1,4 +1,4 @@
-"""Runs the statements of a script over plain values. No code of the script's choosing is ever executed."""
+"""Interprets the statements of a script on plain values. No Python code is executed."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """From the characters of a script to tokens.
 
-MATLAB's own difficulties are settled here: the quote that is a transpose after an operand and a string
-elsewhere, line continuation, block comments, newlines that end a statement outside brackets and a row
-inside them, and command syntax (``clear L``). One tolerance goes beyond MATLAB, for statements that were
-broken over lines on a printed page: a line that cannot end where it ends (after ``=`` or an operator) goes
-on, and a line that starts with ``=`` belongs to the one before. MATLAB rejects both, so no script that
-MATLAB accepts is read differently.
+This module handles the special cases of MATLAB's syntax: the quote that is a transpose after an operand and a
+string elsewhere, line continuation, block comments, newlines that end a statement outside brackets and a row
+inside them, and command syntax (``clear L``). It is more tolerant than MATLAB for statements that were broken
+over lines on a printed page: a line that cannot end where it ends (after ``=`` or an operator) goes on, and a
+line that starts with ``=`` belongs to the one before. MATLAB rejects both, so no script that MATLAB accepts
+is read differently.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
-"""Scripts copied from a printed page: statements that ran into a comment are found again.
+"""Scripts copied from a printed page: recovery of statements that were merged into a comment line.
 
-A page breaks lines where it is full. Where a comment's line was filled up with the statements that followed
-it, MATLAB would take them for comment::
+A page breaks lines at its margin. If a comment line was filled with the following statements, MATLAB would
+treat them as comment::
 
     % Inertia of the segment L{1}.Jm =
     200e-6; L{2}.Jm = 200e-6;
 
-Such a line is known by three marks together: it is a comment, its last statement is an unfinished assignment
+Such a line is recognised by three criteria: it is a comment, its last statement is an unfinished assignment
 to a field of an element, and the next line is its rest (it starts with a number, a sign or a bracket, or with
 ``=``), with which no statement of a script begins. Commented-out statements that are whole stay comments.
 """

@@ -1,4 +1,4 @@
-"""Links and robots while a script is still changing them: the only mutable robots there are."""
+"""Mutable links and robots during the interpretation of a script."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a script computes with: matrices, text, cell arrays, links, robots; and arithmetic with caps."""
+"""Values of scripts: matrices, text, cell arrays, links, robots; and arithmetic with limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_ELEMENTS = 100_000
 MOST_LINKS = 1000
 """Elements of one cell array or array of links."""
 MOST_WORK = 20_000_000
-"""Elements that one script may compute: a bound on time and memory that no robot script comes near."""
+"""Maximum number of elements that one script may compute, which limits time and memory."""
 ROUNDED_WORK = 1000
 """What a sine or a power costs beside a sum."""
 

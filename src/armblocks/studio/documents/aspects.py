@@ -1,4 +1,4 @@
-"""What an edit touches, so that two edits made at the same time can be told to be about different things.
+"""The objects that an edit changes, for the detection of conflicts between concurrent edits.
 
 An aspect is a tuple: the names of subsystems and block on the way, and last what of it was changed: ``""``
 that it is there at all, ``place``, ``u <- wire``, or a parameter's name. For a diagram itself ``/`` stands in
@@ -15,7 +15,7 @@ Aspect = tuple[str, ...]
 
 
 def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[Aspect]:
-    """All that is different between two diagrams. What both hold as the same objects is not looked at."""
+    """All differences between two diagrams; identical objects are skipped."""
     if before is after:
         return set()
     found: set[Aspect] = set()
@@ -44,7 +44,7 @@ def changed_aspects(before: Diagram, after: Diagram, path: Aspect = ()) -> set[A
 
 
 def clash(mine: Iterable[Aspect], theirs: Set[Aspect]) -> bool:
-    """Whether both are about one thing. A block that comes or goes is about all that it has and holds."""
+    """Whether two aspects conflict. Adding or removing a block concerns all its parts."""
     mine = set(mine)
     if mine & theirs:
         return True

@@ -1,4 +1,4 @@
-"""What pages edit: a value with its past, its future, and who made which version of it."""
+"""An edited value with undo and redo history, and the author page of each version."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Edited(History[Value], ABC):
                 self._check_kind(request.edit)
                 title, after, gesture = self.outcome(request)
                 if others and clash(self.aspects(self.value, after), others):
-                    raise self._overtaken("what you changed was changed in another page meanwhile")
+                    raise self._overtaken("your change conflicts with a change from another page")
                 self.replace(title, after, gesture)
             elif others:
                 raise self._overtaken(f"the {self.noun} was changed in another page meanwhile")

@@ -1,4 +1,4 @@
-"""The past and the future of something that is edited by replacing it: undo and redo for frozen values."""
+"""Undo and redo history of frozen values, which are edited by replacement."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Step(Generic[Value]):
 class History(Generic[Value]):
     """The present form of a frozen value, what it was before, and what was undone.
 
-    Forms share their parts, so the past costs next to nothing.
+    Values share their parts, so the history needs little memory.
 
     ``version`` grows with every change, undo and redo included, and never returns: two pages that show the
     same version show the same value. ``saved`` is the form that the file holds, ``None`` where no file holds

@@ -1,4 +1,4 @@
-"""What is typed is not lost: an append-only record of a drawing or a robot beside its last save.
+"""Journals: append-only records of the unsaved edits of a diagram or a robot.
 
 One file for each of them that was edited, in the studio's own folder and not in the project. A record is a
 line of JSON behind its length and CRC-32, so that a record torn by a crash is recognised and left out::

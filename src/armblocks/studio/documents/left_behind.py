@@ -1,4 +1,4 @@
-"""Journals that earlier servers left: what they give back waits until somebody wants it, or wants it gone."""
+"""Journals of earlier servers, whose unsaved work can be recovered or discarded."""
 
 from __future__ import annotations
 

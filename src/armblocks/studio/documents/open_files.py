@@ -1,8 +1,8 @@
-"""The drawings or the robots that a studio has open: where each comes from, its file, its journal.
+"""The open diagrams or robots of a studio: origin, file and journal of each.
 
-Nothing that was edited is lost: every change is in the journal before it is answered, and on the disk within
-:data:`~armblocks.studio.documents.journal.SYNC_SECONDS`. Nothing is overwritten silently: a file that
-somebody else has written is noticed, and what a journal gives back is offered, not put in the file's place.
+Every change is written to the journal before the reply, and is on the disk within
+:data:`~armblocks.studio.documents.journal.SYNC_SECONDS`. Files are not overwritten silently: changes by other
+programs are detected, and recovered work is offered, without replacing the file.
 """
 
 from __future__ import annotations

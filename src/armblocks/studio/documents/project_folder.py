@@ -1,4 +1,4 @@
-"""The folder that a studio works in: the only files that it reads or writes."""
+"""The project folder: the only files that a studio reads or writes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the studio keeps for itself, outside of the project folder and readable by its user alone.
+"""Private files of the studio, outside the project folder and readable by its user only.
 
 One folder for each project folder holds the journals of what is drawn, the files used last, and the secret by
 which a page is known again after the server was started anew.

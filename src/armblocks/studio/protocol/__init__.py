@@ -1,1 +1,1 @@
-"""What front end and server say to each other (messages, frames of samples), and the connected pages."""
+"""The protocol between front end and server (messages, frames of samples), and the connected pages."""
