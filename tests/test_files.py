@@ -1,4 +1,4 @@
-"""Whole files: written all or nothing, read within a cap."""
+"""Atomic writing of files, and reading up to a size limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Python functions that are called at ticks: as equations would be, told of, refused where they fail."""
+"""Python functions that are called at ticks: equivalence to equations, reports, and errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the switching blocks refuse, and what their guards look like for vectors."""
+"""Errors of switching blocks, and their guards for vectors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blocks that a signal sets anew: sampled ones against recurrences, continuous ones against closed forms."""
+"""Blocks with external reset: sampled ones against recurrences, continuous ones against closed forms."""
 
 from __future__ import annotations
 

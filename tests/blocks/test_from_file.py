@@ -1,4 +1,4 @@
-"""Tables played back: values and integrals against NumPy, in fixed and adaptive runs, short and long."""
+"""Playback of tables: values and integrals against NumPy, in fixed and adaptive runs, short and long."""
 
 from __future__ import annotations
 

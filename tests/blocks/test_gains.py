@@ -1,4 +1,4 @@
-"""Gains and waves with a meaning of their own, in fixed and adaptive runs."""
+"""Slider gain, sample time arithmetic and sine wave function, in fixed and adaptive runs."""
 
 from __future__ import annotations
 

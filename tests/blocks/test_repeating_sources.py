@@ -1,4 +1,4 @@
-"""Sources that repeat themselves, and lags behind them, against closed forms, in fixed and adaptive runs."""
+"""Periodic sources, and lags after them, against closed forms, in fixed and adaptive runs."""
 
 from __future__ import annotations
 

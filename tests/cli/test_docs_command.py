@@ -1,4 +1,4 @@
-"""``armblocks docs`` opens a page, builds the pages in a checkout, and says in words why it cannot."""
+"""``armblocks docs`` opens a page, builds the pages in a checkout, and reports why it cannot."""
 
 from __future__ import annotations
 

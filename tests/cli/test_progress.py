@@ -1,4 +1,4 @@
-"""What a person is told during a long run."""
+"""Progress output of a long run."""
 
 import io
 

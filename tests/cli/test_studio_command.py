@@ -1,4 +1,4 @@
-"""``armblocks studio`` says in words why it cannot start; exit code 2."""
+"""``armblocks studio`` reports why it cannot start; exit code 2."""
 
 from __future__ import annotations
 

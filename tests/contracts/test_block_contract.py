@@ -1,4 +1,4 @@
-"""What every block of the library promises: a new block is tested by existing."""
+"""Contract tests of all blocks of the library; new blocks are tested automatically."""
 
 from __future__ import annotations
 

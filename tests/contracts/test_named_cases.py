@@ -1,4 +1,4 @@
-"""What a diagram or a robot may not be, or is asked about: one message for each case.
+"""Invalid or implausible diagrams and robots: one message for each case.
 
 The settings of a run and sample times have a table of their own, ``test_run_input``.
 """

@@ -1,4 +1,4 @@
-"""What a run may be asked for: one message for each thing that cannot be, and what holds at the edges."""
+"""Input of runs: one message for each invalid value, and behaviour at the limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Building diagrams: what the builder takes, and the message for everything that it refuses."""
+"""The diagram builder: accepted input, and the message for each error."""
 
 from __future__ import annotations
 

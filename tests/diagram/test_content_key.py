@@ -1,4 +1,4 @@
-"""The key by which the disk cache knows a diagram: it changes with all that equations depend on."""
+"""The content key of the disk cache: it changes with everything that the equations depend on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Flattening: what a hierarchy means is what the same blocks mean when they lie side by side."""
+"""Flattening: a hierarchy is equivalent to its blocks in one flat diagram."""
 
 from __future__ import annotations
 

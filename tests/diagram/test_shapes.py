@@ -1,4 +1,4 @@
-"""Shapes spread through a diagram, round loops too; ends that disagree are both named."""
+"""Shape inference, also in loops; errors name both ends of a connection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drawings of diagrams: no wire through a block, no block on another, every wire there."""
+"""Drawings of diagrams: no wire crosses a block, no blocks overlap, all wires are drawn."""
 
 import dataclasses
 import itertools

@@ -1,4 +1,4 @@
-"""How named quantities lie in flat vectors, for numbers and symbols alike."""
+"""The layout of named quantities in flat vectors, for numbers and symbols."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arm that users hold: shapes, batches, options, and the words of its errors."""
+"""The class ``Arm``: shapes, batches, options, and error messages."""
 
 import pickle
 import re

@@ -1,4 +1,4 @@
-"""What an earlier process has compiled is run without being traced."""
+"""Models that an earlier process has compiled run without tracing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the script interpreter does not know is refused with file, line, text and what is supported."""
+"""Unsupported script code is an error with file, line, text and the supported subset."""
 
 from __future__ import annotations
 

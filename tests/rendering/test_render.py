@@ -1,4 +1,4 @@
-"""The renderer: what is near hides what is far, and a ball covers the disc that it should."""
+"""The renderer: hidden surfaces, and the projection of a ball."""
 
 import math
 

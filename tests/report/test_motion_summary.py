@@ -1,4 +1,4 @@
-"""What a motion asks of its arm, against closed forms."""
+"""Motion summaries against closed forms."""
 
 import math
 

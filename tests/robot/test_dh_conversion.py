@@ -1,4 +1,4 @@
-"""Telling an arm in the other D-H convention changes its rows and nothing that it does."""
+"""Conversion to the other D-H convention changes the rows but not the kinematics and dynamics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn of a robot: closed, well-turned surfaces that follow the kinematics."""
+"""The geometry of robots: closed, correctly oriented surfaces that follow the kinematics."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Inertias that no body can have are found and told."""
+"""Inertias that no rigid body can have are reported."""
 
 import numpy as np
 import pytest

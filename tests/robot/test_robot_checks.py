@@ -1,4 +1,4 @@
-"""Every contradiction in a description is told with robot, link and field."""
+"""Every inconsistency of a description is reported with robot, link and field."""
 
 import re
 import warnings

@@ -1,4 +1,4 @@
-"""Runs that cannot go on: what is named, when, and what is kept; and options that are refused."""
+"""Failed runs: messages, times and partial results; and invalid options."""
 
 from __future__ import annotations
 

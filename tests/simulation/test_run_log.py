@@ -1,4 +1,4 @@
-"""Runs that are written to a file while they go on: the same numbers, flat memory, nothing lost."""
+"""Runs with a log file: equal values, constant memory, no lost samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs that go on where others ended: bit for bit as if they had not."""
+"""Continued runs equal uninterrupted runs exactly."""
 
 from __future__ import annotations
 

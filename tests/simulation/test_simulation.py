@@ -1,4 +1,4 @@
-"""Runs that are paused, looked at, tuned and taken up again."""
+"""Runs that are paused, inspected, tuned and continued."""
 
 from __future__ import annotations
 

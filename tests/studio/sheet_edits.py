@@ -1,4 +1,4 @@
-"""Edits of every kind, made of what stands on a sheet, so that most of them can be carried out."""
+"""Random edits of every kind, generated from the content of a sheet, most of which are valid."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NEW_NAMES = tuple(f"new {k}" for k in range(12))
 
 
 class Sheet:
-    """One sheet of a drawing and a source of chance."""
+    """One sheet of a diagram and a random generator."""
 
     def __init__(self, diagram: Diagram, chance: random.Random) -> None:
         self.diagram = diagram

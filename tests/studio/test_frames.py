@@ -1,4 +1,4 @@
-"""What a page gets of a run: all samples, or of very many the extremes."""
+"""The samples that a page receives: all, or the extremes of very many."""
 
 from __future__ import annotations
 

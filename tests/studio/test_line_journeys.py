@@ -1,4 +1,4 @@
-"""The line goes and comes back, the page is loaded anew: in the middle of edits and of drags."""
+"""Lost connections and page reloads during edits and drags."""
 
 from __future__ import annotations
 

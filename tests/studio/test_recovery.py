@@ -1,4 +1,4 @@
-"""What was drawn comes back after a crash, and never in the place of what somebody else wrote."""
+"""Recovery of diagrams after a crash, without replacing files that were changed by other programs."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def test_the_paper_s_script_is_dropped_looked_at_and_pictured(page: Page) -> Non
     for preset in ("From the front", "From above", "From the tool", "From a corner"):
         view.get_by_role("button", name="Camera").click()
         page.get_by_role("menuitem", name=preset).click()
-    view.get_by_role("button", name="What is shown").click()
+    view.get_by_role("button", name="Display options").click()
     page.get_by_role("menuitemcheckbox", name="Ranges of the joints").click()
     page.keyboard.press("Escape")
     stage = editor.get_by_role("application")

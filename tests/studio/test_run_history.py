@@ -1,4 +1,4 @@
-"""A run that goes back and on again is the run that never went back, bit for bit."""
+"""A run that returns to an earlier time and continues equals the original run exactly."""
 
 from __future__ import annotations
 

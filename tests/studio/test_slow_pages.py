@@ -1,4 +1,4 @@
-"""A page that does not listen keeps nobody waiting, takes no memory without end, and loses nothing."""
+"""A slow page does not block the server, uses bounded memory, and loses no messages."""
 
 from __future__ import annotations
 

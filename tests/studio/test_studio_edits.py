@@ -1,4 +1,4 @@
-"""Whatever is done to a drawing can be undone, to the last byte of its file."""
+"""Every edit of a diagram can be undone exactly."""
 
 from __future__ import annotations
 

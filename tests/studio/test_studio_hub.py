@@ -1,4 +1,4 @@
-"""Documents, files and pages: what is saved, what is refused, what every page is told."""
+"""Documents, files and pages: saving, errors, notifications."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever happens to the process of a run, it is told, the editor lives on, and the next run works."""
+"""Failures of a run's process are reported; the editor and the next run work."""
 
 from __future__ import annotations
 

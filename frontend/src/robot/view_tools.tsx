@@ -81,7 +81,7 @@ export function ViewTools({
       />
       <Menu position="bottom-end" shadow="md">
         <Menu.Target>
-          <Button label="What is shown" icon={IconEye} />
+          <Button label="Display options" icon={IconEye} />
         </Menu.Target>
         <Menu.Dropdown>
           {offered.map(([option, label]) => (

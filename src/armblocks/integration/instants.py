@@ -1,19 +1,20 @@
 """The course of a system with clocks, events, delays or implicit equations: pieces between instants.
 
-At an instant (a tick, an event, a breakpoint, the start) things happen in this order, all in native code:
+At an instant (a tick, an event, a breakpoint, the start) the loop does the following, in native code:
 
-1. the flow is integrated up to it with the old values; the step ends exactly there, and where something
-   keeps left limits, ``update`` is called for that with no clock marked;
+1. the flow is integrated up to it with the old values; the step ends exactly there, and where states store
+left limits, ``update`` is called without a marked clock;
 2. all clocks that tick now are marked and ``update`` gives ``z``;
 3. modes that follow the signals become consistent; then guards whose sign the jump has changed fire, and so
    do those whose zero was located here, and ``reset`` gives ``x`` and ``z``; where none fires, other modes
-   that contradict their conditions take their consistent values; all this is repeated until nothing changes;
+   that contradict their conditions take their consistent values; this is repeated until nothing changes;
 4. the instant is recorded: signals are right-continuous;
-5. the integration starts anew. The first step after an event is at most a hundredth of the time since the
-   event before it, and later ones grow tenfold at most: no step leaps over a bounce that is getting shorter.
+5. the integration restarts. The first step after an event is at most a hundredth of the time since the
+   event before it, and later ones grow tenfold at most: so that no step passes over bounces of decreasing
+   length.
 
-Instants that are not more than four units in the last place apart are one instant: so 3 times 0.1 s and 0.3 s
-coincide although their doubles differ, and a breakpoint or a recorded instant coincides with a tick likewise.
+Times within four units in the last place are equal: so 3 times 0.1 s and 0.3 s coincide although their
+doubles differ, and a breakpoint or a recorded instant coincides with a tick likewise.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What every one-step method does in a step, whichever its stages are: error norm, first step, dense output.
+"""The common part of one-step methods: error norm, first step, dense output.
 
 Everything is written for vectors of ``n`` states that lie in the workspace: the old state ``x``, the new one
 ``y`` and the rows of ``K``. Nothing here decides; the loop around it does.

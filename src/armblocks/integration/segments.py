@@ -1,4 +1,4 @@
-"""The course of a system that only flows: segments between breakpoints."""
+"""The course of a system without ticks and events: segments between breakpoints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Colours, type and sizes of every figure: the one place.
+"""Colours, fonts and sizes of all figures.
 
 A figure never names a colour, it names a :class:`Tone`; each tone has a light and a dark value. Text tones
 keep a contrast of at least 4.5:1 on page and surface, trace tones at least 3:1 (WCAG 2.2, 1.4.3 and 1.4.11).

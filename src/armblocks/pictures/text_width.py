@@ -1,4 +1,4 @@
-"""How wide a text will be, without a font library.
+"""Widths of texts, without a font library.
 
 The advance widths are those of DejaVu Sans (Bitstream Vera licence), in thousandths of the type size. It is
 one of the widest sans serifs, so a layout made with these widths never overlaps in the font that a reader's

@@ -1,4 +1,5 @@
-"""Drawings of an arm: one pose, or moments of a motion with the tool's path (the paper's Figures 10, 11)."""
+"""Drawings of an arm: one pose, or several poses of a motion with the tool's path (the paper's Figures 10,
+11)."""
 
 from __future__ import annotations
 

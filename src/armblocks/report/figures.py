@@ -1,4 +1,4 @@
-"""Which figures a run asks for: those of its arms, and one for every sink of the diagram."""
+"""The figures of a run: those of its arms, and one for every sink of the diagram."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a motion asks of its arm: ranges, peaks, loads, work, and every limit that it breaks.
+"""Summary of an arm's motion: ranges, peaks, loads, work, and exceeded limits.
 
 Signals are taken as straight between their samples, and integrals of that are exact: a linear power that
 changes sign, for instance, gives its positive and its negative work without error.

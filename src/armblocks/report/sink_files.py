@@ -1,4 +1,4 @@
-"""The files that To File blocks ask for: written after a run, into a folder that the caller gives."""
+"""The files of To File blocks: written after a run, into a folder that the caller gives."""
 
 from __future__ import annotations
 

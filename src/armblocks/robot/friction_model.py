@@ -1,4 +1,4 @@
-"""How motor friction comes through the gear, by release of the Robotics Toolbox for MATLAB."""
+"""Motor friction at the joint side of the gear, by release of the Robotics Toolbox for MATLAB."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum
 
 
 class FrictionModel(Enum):
-    """The joint torque against which friction works, ``tau = rigid body + G^2 Jm qdd + friction(qd)``.
+    """The friction formula of the joint torque, ``tau = rigid body + G^2 Jm qdd + friction(qd)``.
 
     ``G`` gear ratio (its sign says which way the motor turns), ``B`` viscous and ``Tc`` Coulomb friction,
     both at the motor; ``Tc`` is ``Tc+`` where the *joint* speed ``qd`` is positive, ``Tc-`` (a negative
@@ -23,7 +23,7 @@ class FrictionModel(Enum):
     """``G^2 (B qd + Tc)``: release 6."""
 
     def factors(self, gear_ratio: float) -> tuple[float, float]:
-        """What multiplies ``B qd`` and ``Tc``."""
+        """The factors of ``B qd`` and ``Tc``."""
         G = gear_ratio
         match self:
             case FrictionModel.SQUARED_GEAR:

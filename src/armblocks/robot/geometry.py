@@ -1,11 +1,11 @@
-"""What a robot looks like: the links' own shapes, or castings made from the kinematics.
+"""The geometry of a robot: shapes of the links, or castings derived from the kinematics.
 
 A link without ``geometry`` gets a body that follows its joint axes. From the joint that carries the link the
 body runs along that axis to the common normal of the two axes, along the normal, and along the next axis to
 the next joint: for a standard D-H row these are d and a, so that the drawing is the table made visible.
 Each joint that turns gets a motor drum, each that slides a rail and a carriage, the tip a flange.
 
-The sizes are a matter of looks alone; nothing here enters the dynamics.
+The sizes affect the appearance only, not the dynamics.
 """
 
 from __future__ import annotations

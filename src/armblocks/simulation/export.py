@@ -1,4 +1,4 @@
-"""Results as tables and files: the only place that knows pandas, pyarrow and SciPy's MAT files.
+"""Export of results to tables and files; the only module that uses pandas, pyarrow and SciPy's MAT files.
 
 ======== ================================================================ =========================
 suffix   holds                                                            how the run went
@@ -10,7 +10,7 @@ suffix   holds                                                            how th
 ======== ================================================================ =========================
 
 Parquet needs pyarrow, MAT needs SciPy: the extra ``data``. CSV files have the same bytes with and without
-pyarrow, which only writes them faster. A file is there completely or not at all
+pyarrow, which only writes them faster. Files are written atomically
 (:func:`armblocks.files.write_atomically`).
 """
 

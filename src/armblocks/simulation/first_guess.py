@@ -1,4 +1,4 @@
-"""Where Newton's method can begin: another guess for implicit equations where the given one is singular."""
+"""Start values of Newton's method: another guess for implicit equations whose given guess is singular."""
 
 from __future__ import annotations
 

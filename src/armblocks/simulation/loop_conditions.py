@@ -1,4 +1,4 @@
-"""How much accuracy the linear loops of a run have lost: their condition at instants spread over the run."""
+"""The loss of accuracy in linear loops: their condition numbers at times spread over the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A result as a notebook shows it: one small picture a signal, in plain HTML and SVG that need nothing else.
+"""The notebook view of a result: one small figure for each signal, in self-contained HTML and SVG.
 
 The page's own text colour and font are kept, so the view fits light and dark notebooks; traces are colours of
 Okabe and Ito (2008) that stand out on both.

@@ -1,4 +1,4 @@
-"""What a run will do, worked out and checked before its first step: integrator, instants, tolerances."""
+"""The plan of a run, checked before its first step: integrator, sample times, tolerances."""
 
 from __future__ import annotations
 

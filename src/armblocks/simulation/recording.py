@@ -1,4 +1,4 @@
-"""What a run has recorded: all of it in memory, or one window of it there and the rest in a file."""
+"""The recorded samples of a run: all in memory, or one window in memory and the rest in a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run gives its user: its data, tables and files of them, and how they look."""
+"""The result of a run: its data, with methods for tables, files and display."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The data of a run: time, every signal by its path, and how the run went."""
+"""The data of a run: time, every signal by its path, and the statistics of the run."""
 
 from __future__ import annotations
 

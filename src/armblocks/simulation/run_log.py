@@ -1,8 +1,8 @@
-"""Runs that write their signals to a file while they go on, and keep a view of them in memory.
+"""Runs that write their signals to a file during the run, and keep a view of them in memory.
 
-However long the run, it holds one window of instants, what the writer is writing, and the view: so many rows
-that a figure shows nothing less than all of them would. The view keeps whole rows, never mixtures: of each
-stretch of instants the first row and those in which some signal is lowest or highest.
+Independent of the duration, the memory contains one window of samples, the data being written, and the view,
+which has enough rows for figures without visible differences. The view has complete rows: of each interval
+the first row, and the rows in which some signal has its minimum or maximum.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""By which method a run goes, where it starts from, and its change to the other method of two on the way."""
+"""The integration method of a run, its start, and the change between two methods during the run."""
 
 from __future__ import annotations
 

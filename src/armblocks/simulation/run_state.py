@@ -1,10 +1,10 @@
-"""Where a run stands: what another run needs to go on, in memory or as a file.
+"""The state of a run, from which another run continues, in memory or as a file.
 
-A run that ends at a time has to cut its last step short there; a longer run would not. So besides the values
-at its end a state holds the native loop's own arrays from before that last step, and a run that goes on with
-the same solver, settings and parameters repeats it at its natural length: what it records is bit for bit what
-the uninterrupted run would have recorded. With other settings or parameters, or other values put into the
-state, a run starts anew from the values at ``time``.
+A run that ends at a given time has to shorten its last step; a longer run would not. Besides the values at
+the end, a state therefore holds the native loop's arrays from before that last step. A run that continues
+with the same solver, settings and parameters repeats the step with its natural length, so that its samples
+are identical to those of the uninterrupted run. With other settings or parameters, or changed values, a run
+restarts from the values at ``time``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A run that can be paused, looked at, tuned and taken up again: what :func:`simulate` does in one go."""
+"""A run that can be paused, inspected, tuned and continued; :func:`simulate` uses it for a whole run."""
 
 from __future__ import annotations
 

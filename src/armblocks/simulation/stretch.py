@@ -1,4 +1,4 @@
-"""A run between two changes of its parameters, and what is held of its recorded instants."""
+"""A part of a run with constant parameters, and its recorded samples in memory."""
 
 from __future__ import annotations
 

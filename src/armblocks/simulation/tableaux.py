@@ -1,4 +1,4 @@
-"""Every integrator, as data: adding one is adding one table to ``TABLEAUX``.
+"""The integrators as data; a new integrator is one table in ``TABLEAUX``.
 
 Names are matched without regard to case; Simulink's and SciPy's names are accepted as aliases. A
 fixed-step method up to order 4 gets the cubic Hermite polynomial between its steps, which keeps its order;

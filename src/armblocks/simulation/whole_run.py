@@ -1,4 +1,4 @@
-"""Run a compiled system in one go, from the start or from where another run ended."""
+"""Run a compiled system, from the start or from the state of another run."""
 
 from __future__ import annotations
 

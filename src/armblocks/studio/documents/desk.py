@@ -1,4 +1,4 @@
-"""The open documents of every kind: what pages ask to be done with them, and what pages are told."""
+"""The open documents of both kinds: requests of pages, and notifications to pages."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from armblocks.studio.protocol.page import Page, Pages
 
 
 class DocumentDesk:
-    """Carries out the requests about documents, and tells every page that shows one what became of it."""
+    """Handles the requests about documents, and notifies all pages that show a changed document."""
 
     def __init__(
         self, folder: ProjectFolder, pages: Pages, presenters: Mapping[say.DocumentKind, Presenter[Any]]
@@ -30,7 +30,7 @@ class DocumentDesk:
         self._presenters = presenters
 
     def register(self, answers: Answers) -> None:
-        """Register what answers the requests about documents."""
+        """Register the handlers of the requests about documents."""
         answers.on(say.Open, self._open)
         answers.on(say.OpenShipped, self._open_shipped)
         answers.on(say.Drop, self._drop)
@@ -51,7 +51,7 @@ class DocumentDesk:
         return self._found(key)[1]
 
     def states(self) -> list[say.DocumentState]:
-        """Where every open document stands."""
+        """The states of all open documents."""
         return [found.state() for presenter in self._presenters.values() for found in presenter.files]
 
     def recoveries(self) -> list[say.Recovery]:
@@ -60,13 +60,13 @@ class DocumentDesk:
         return sorted(offers, key=lambda offer: -offer.last)
 
     def watch(self) -> list[asyncio.Task[None]]:
-        """Look after the files of all documents from now on."""
+        """Start watching the files of all documents."""
         loop = asyncio.get_running_loop()
         watches = (presenter.files.watch(self.tell_state) for presenter in self._presenters.values())
         return [loop.create_task(watch) for watch in watches]
 
     def end(self) -> None:
-        """Leave the documents so that nothing is lost."""
+        """Close all documents without loss of data."""
         for presenter in self._presenters.values():
             presenter.files.end()
 
@@ -90,7 +90,7 @@ class DocumentDesk:
         return found.key
 
     async def replace(self, found: OpenFile[Any], title: str, value: Any) -> None:
-        """Put another value in the place of that of a document, as one step of undo."""
+        """Replace the value of a document, as one undo step."""
         before, number = found.document.value, found.document.version
         self._presenters[found.document.kind].files.replace(found, title, value)
         await self._tell_change(found, before, number)
@@ -176,14 +176,15 @@ class DocumentDesk:
                 return presenter, presenter.files[key]
         raise UnknownNameError("open document", key, [state.document for state in self.states()])
 
-    # -- telling ---------------------------------------------------------------------------------------------
+    # -- notifications
+    # ---------------------------------------------------------------------------------------------
 
     async def tell_list(self) -> None:
-        """Tell every page which documents are open or wait to be recovered."""
+        """Notify all pages of the open and recoverable documents."""
         await self._pages.tell(say.Documents(documents=self.states(), recoveries=self.recoveries()))
 
     async def tell_state(self, found: OpenFile[Any]) -> None:
-        """Tell the pages that show a document where it stands; its content is as it was."""
+        """Notify the pages of a document of its state, without a change of content."""
         await self._tell_versions(found, found.document.value, found.document.version)
 
     async def _tell_change(self, found: OpenFile[Any], before: Any, number: int) -> None:
@@ -191,7 +192,7 @@ class DocumentDesk:
         self._presenters[found.document.kind].changed(found)
 
     async def _tell_versions(self, found: OpenFile[Any], before: Any, number: int) -> None:
-        """Tell the pages that show a document what changed on the part that each of them shows."""
+        """Notify the pages of a document of the changes in the part that each page shows."""
         presenter = self._presenters[found.document.kind]
         for page in self._pages.showing(found.key):
             try:

@@ -1,4 +1,4 @@
-"""What carries out the edits of one kind of document: a function and a title for each class of edits."""
+"""The functions and titles of the edits of one kind of document."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the journal of a drawing or a robot says, and what it gives back.
+"""The records of the journal of a diagram or a robot, and its recovery.
 
 Records, one JSON object each; ``version`` is the one after it, ``at`` when it was made (s since 1970):
 

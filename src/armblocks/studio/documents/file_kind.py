@@ -1,6 +1,6 @@
-"""What differs between the kinds of files that the studio edits: how each is begun, read and written.
+"""The interface of a kind of file (diagram or robot): creation, reading and writing.
 
-All else is the same for every kind: journal, recovery, saving, what is noticed of the disk.
+Journal, recovery, saving and detection of changes on disk are common to all kinds.
 """
 
 from __future__ import annotations

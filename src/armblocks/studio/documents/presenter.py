@@ -1,4 +1,4 @@
-"""What differs between the kinds of documents in how pages open and show them.
+"""The interface for opening and displaying one kind of document.
 
 The requests themselves are carried out by :class:`~armblocks.studio.documents.desk.DocumentDesk`, in the same
 way for every kind.

@@ -1,4 +1,4 @@
-"""Which part of the server answers which request."""
+"""The handlers of the requests."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Answers:
         self._handlers: dict[type[Request[Any]], Answer[Any]] = {}
 
     def on(self, request: type[RequestT], answer: Answer[RequestT]) -> None:
-        """Register what answers the requests of a class: its value goes into the reply."""
+        """Register the handler of a class of requests; its result is the value of the reply."""
         self._handlers[request] = answer
 
     async def to(self, page: Page, request: Request[ReplyT]) -> ReplyT:
@@ -30,5 +30,5 @@ class Answers:
 
     @property
     def handlers(self) -> Mapping[type[Request[Any]], Answer[Any]]:
-        """What answers each class of requests."""
+        """The handler of each class of requests."""
         return self._handlers

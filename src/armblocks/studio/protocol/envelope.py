@@ -1,4 +1,4 @@
-"""What goes over the websocket as text: requests with their numbers, their replies, and events.
+"""The text messages of the websocket: numbered requests, their replies, and events.
 
 A front end sends a :class:`Request` with a number of its own choosing; the server answers each with a
 :class:`Reply` of the same number, and sends an :class:`Event` whenever something happened: also to the other

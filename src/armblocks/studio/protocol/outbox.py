@@ -1,4 +1,4 @@
-"""What a page is still to be sent: who speaks to a page that does not listen waits for nobody."""
+"""The queue of messages to one page. A slow page never blocks the server."""
 
 from __future__ import annotations
 

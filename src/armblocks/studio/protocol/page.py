@@ -1,4 +1,4 @@
-"""The pages that are connected: how to reach each, and what it shows."""
+"""The connected pages, with their connections and displayed documents."""
 
 from __future__ import annotations
 

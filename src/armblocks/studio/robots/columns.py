@@ -1,4 +1,4 @@
-"""What can be typed of a robot: each column of its tables declared once, for page and edits alike.
+"""The columns of the robot editor's tables, declared once for page and edits.
 
 The tables are those of the paper: ``kinematics`` is its Table 1 (D-H row, ranges, speeds), ``dynamics`` its
 Table 2 (mass, centre, inertia, motor), both in :mod:`armblocks.studio.robots.link_columns`; what a robot has

@@ -1,4 +1,4 @@
-"""What pages ask about the motion of robots: of those in the editor, and of those of blocks."""
+"""Requests about the motion of robots, in the editor and in blocks."""
 
 from __future__ import annotations
 

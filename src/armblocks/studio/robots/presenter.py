@@ -1,4 +1,4 @@
-"""How robots are opened and shown: whole, with what was said when their file was read."""
+"""Opening and display of robots, with the notes from reading their file."""
 
 from __future__ import annotations
 

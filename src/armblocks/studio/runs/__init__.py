@@ -1,1 +1,1 @@
-"""Runs in the studio: one process each, what it has said, pace, history, settings, reports."""
+"""Runs in the studio: processes, records, pace, history, settings, reports."""

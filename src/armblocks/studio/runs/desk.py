@@ -1,4 +1,4 @@
-"""The runs of the open diagrams: at most one of each, in a process of its own."""
+"""The runs of the open diagrams: at most one for each diagram, in a separate process."""
 
 from __future__ import annotations
 

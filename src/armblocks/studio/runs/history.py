@@ -1,4 +1,4 @@
-"""A run that can go back: it remembers where it stood, and goes on from there as if it had never gone on.
+"""A run with checkpoints: it can return to one and continue with identical results.
 
 Simulink's Step Back works the same way: it restores a snapshot. Here the instants between two marks can be
 reached as well, because a run from a mark to there repeats the same steps bit for bit. Tuned values are not

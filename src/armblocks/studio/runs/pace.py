@@ -1,4 +1,4 @@
-"""How fast a run is shown: so many simulated seconds for each second of the clock, or as fast as it gets."""
+"""The pace of a run: a real-time factor, or as fast as possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run in a process of its own: what it does to itself, the editor survives.
+"""A run in a separate process, whose failures do not affect the editor.
 
 The hub's side of it. The worker is :mod:`armblocks.studio.runs.worker`; between them runs a pipe of bytes:
 the first byte of a message says whether JSON (``J``) or a frame of samples (``S``) follows.

@@ -1,4 +1,5 @@
-"""What a run has said, for pages that come later: after a reload, after a lost line, or as a second page.
+"""The stored messages of a run, for pages that connect later: after a reload or a lost connection, or as a
+second page.
 
 It lies in a file without a name, which the system removes with the process: a long run costs no memory. Where
 the disk is full no more samples are taken; that the run ends thereby is still kept.

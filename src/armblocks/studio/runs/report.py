@@ -1,4 +1,4 @@
-"""The report of a run, as one page: the command line's, made in a process of its own.
+"""The report of a run, as from the command line, written in a separate process.
 
 The model is run again with the values with which the run began; the same steps give the same numbers. What
 was tuned or stopped on the way is not repeated.

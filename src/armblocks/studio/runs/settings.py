@@ -1,4 +1,4 @@
-"""What can be said of how a model is run: the settings and the solvers, for the page's dialog."""
+"""The run settings and solvers for the dialog of configuration parameters."""
 
 from __future__ import annotations
 

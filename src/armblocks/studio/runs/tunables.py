@@ -1,4 +1,4 @@
-"""Which parameters of a diagram a page may change while it runs, with what their blocks say of them."""
+"""The tunable parameters of a diagram, with the rules of their blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The process that runs one model: started ahead of time, given one job, gone when the run has ended.
+"""The worker process of one run: started in advance, given one job, ended with the run.
 
 A job is JSON: ``diagram`` (a canonical document), ``folder`` (for the robot files that it names), ``run``
 and ``document`` (keys), ``speed`` (simulated seconds per second, ``null`` as fast as possible), ``tuned``

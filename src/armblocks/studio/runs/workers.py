@@ -1,4 +1,4 @@
-"""Processes for runs: each is used once, and the next one is ready before it is asked for.
+"""The pool of worker processes: each is used once, and the next one is started in advance.
 
 On Linux a worker is a copy of a process that has imported all that a run needs and does nothing else
 (Python's fork server): it is there in some milliseconds and shares that memory. Elsewhere every worker

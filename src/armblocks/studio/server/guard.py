@@ -1,4 +1,4 @@
-"""Who may speak to the studio: checked before anything else, on HTTP and websockets alike.
+"""Access control of the studio: checked first, for HTTP and websockets.
 
 Everything is refused but what passes all of this; the only routes open without a session are those of
 ``Guard.OPEN``:

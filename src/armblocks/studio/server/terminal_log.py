@@ -1,4 +1,4 @@
-"""What the studio's server says about itself in its terminal: where something broke, and nobody's secrets.
+"""The terminal log of the studio's server: locations of errors, without secrets.
 
 A terminal is copied into reports and its log kept by others, so no key stands in it but the login link that
 ``armblocks studio`` prints itself, and no content of files: of an error its place and its type are said, and

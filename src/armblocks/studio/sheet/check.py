@@ -1,4 +1,4 @@
-"""What is wrong with a drawing in progress, said at its blocks and ports; it forbids nothing."""
+"""Checks of an incomplete diagram: findings at blocks and ports, without preventing edits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is copied travels as a diagram file: into another window, a mail, a file, and back onto a sheet.
+"""Copy and paste: the clipboard contains the text of a diagram file.
 
 So a copy has all that a file keeps: what is inside of subsystems, links to libraries, formulas, robots, the
 ways that wires were led, notes.

@@ -1,4 +1,4 @@
-"""Diagrams inside blocks: how one is found, put back when it was edited, and made from other blocks."""
+"""Inner diagrams: access by path, replacement after an edit, and grouping of blocks."""
 
 from __future__ import annotations
 

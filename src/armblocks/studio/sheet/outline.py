@@ -1,4 +1,4 @@
-"""The whole model at a glance: its tree of sheets, and where something is found in it."""
+"""The outline of a model: its tree of sheets, and search."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Between what a person types into a parameter's field and the value that the block keeps.
+"""Conversion between the text of a parameter's field and the value of the block.
 
 Numbers and arrays may be typed as formulas, ``2*pi``, ``[1 2; 3 4]``, ``45*deg``, in the one language of all
 formulas, :mod:`armblocks.diagram.expression_language`: nothing is evaluated by Python.

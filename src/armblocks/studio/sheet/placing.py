@@ -1,4 +1,4 @@
-"""Every block of a drawing in progress has a place: its own, or one that the report would give it."""
+"""Positions of the blocks of an incomplete diagram: stored ones, or those of the automatic layout."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""A diagram as the page draws it: boxes, ports, faces, wires; and what changed since another diagram."""
+"""The drawing data of a diagram for the page: boxes, ports, faces, wires; and differences to another
+diagram."""
 
 from __future__ import annotations
 

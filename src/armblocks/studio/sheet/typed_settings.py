@@ -1,4 +1,4 @@
-"""From what is typed into the dialog of configuration parameters to a run's options, and its faults."""
+"""Conversion of the typed configuration parameters into run options, and their errors."""
 
 from __future__ import annotations
 
