@@ -13,6 +13,14 @@ export function listed(poses: number[][][]): Poses {
   return (row, k) => poses[row]![k >> 2]![k & 3]!
 }
 
+/**
+ * Poses for the bodies of a scene. There are none while the poses have more or fewer rows: after a link is
+ * added or removed, bodies and poses arrive one after the other.
+ */
+export function fitting(scene: RobotScene | null, poses: number[][][] | undefined): Poses | undefined {
+  return scene && poses?.length === scene.rows ? listed(poses) : undefined
+}
+
 export function matrixAt(poses: Poses, row: number, into: Matrix4): Matrix4 {
   const at = (k: number) => poses(row, k)
   return into.set(

@@ -2,7 +2,7 @@ import { useCallback, useEffect, useRef, useState } from 'react'
 import { Refusal } from '../../connection'
 import { changed } from '../../frames'
 import { ask, line } from '../../store'
-import { listed, type Poses, type RobotScene } from '../scene'
+import { fitting, type RobotScene } from '../scene'
 import { Stage } from '../stage'
 import { useDesk } from './desk'
 
@@ -11,7 +11,7 @@ export default function ArmPanel() {
   const current = useDesk((s) => s.current)
   const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
   const [scene, setScene] = useState<RobotScene | null>(null)
-  const poses = useRef<Poses | undefined>(undefined)
+  const poses = useRef<number[][][]>(undefined)
   const moves = useRef(0)
   const version = shown?.state.version
 
@@ -32,7 +32,7 @@ export default function ArmPanel() {
         try {
           const found = await line.ask({ kind: 'pose', document: current, q })
           if (!alive) break
-          poses.current = listed(found)
+          poses.current = found
           moves.current++
           changed()
         } catch (error) {
@@ -54,7 +54,7 @@ export default function ArmPanel() {
     }
   }, [current, version])
 
-  const posesNow = useCallback((): Poses | undefined => poses.current, [])
+  const posesNow = useCallback(() => fitting(scene, poses.current), [scene])
   const state = useCallback(() => `${current} ${moves.current}`, [current])
   const drawing = useCallback(async () => {
     const { joints } = useDesk.getState()
