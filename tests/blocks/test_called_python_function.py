@@ -201,7 +201,7 @@ def test_what_has_no_equations_has_no_slopes() -> None:
     from armblocks.simulation import simulate
 
     with pytest.raises(
-        InputError, match=r"nothing says what Python calls for 'controller'[\s\S]*armblocks\.simulate"
+        InputError, match=r"no function is given for the blocks 'controller'[\s\S]*armblocks\.simulate"
     ):
         simulate(compile_system(trace_diagram(diagram)), SimulationOptions(stop_time=1.0))
 

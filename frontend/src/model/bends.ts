@@ -1,8 +1,8 @@
 import { corners, type Point, type RoutedNet } from './router'
 
 /**
- * Ways that a person draws: a wire's straight pieces are dragged, and what they are then is kept as `bends`,
- * the coordinates of the pieces in turn (see `bent` in the router).
+ * User-drawn routes: the dragged segments of a wire are stored as `bends`, the alternating coordinates of
+ * the segments (see `bent` in the router).
  */
 
 const STUB = 15

@@ -1,11 +1,11 @@
 import type { RunSamples, Signal } from './run_samples'
 import { valueAt } from './trace'
 
-/** How far one run is from another in one element of a signal. */
+/** The difference between two runs in one element of a signal. */
 export interface Difference {
   time: Float64Array
   values: Float64Array
-  /** The greatest |difference|, and when. */
+  /** The maximum of |difference|, and its time. */
   largest: number
   at: number
 }
@@ -57,7 +57,7 @@ function between(a: Signal, b: Signal, element: number): Difference {
   return { time: Float64Array.from(times), values: Float64Array.from(values), largest, at }
 }
 
-/** Of all elements of a signal, the one that is farthest apart. */
+/** The element of a signal with the largest difference. */
 export function farthest(
   baseline: RunSamples,
   compared: RunSamples,

@@ -19,9 +19,8 @@ export interface Surface {
 const WIDTH = 1.5
 
 /**
- * Draws onto a plot what a run has added since: the cost of a frame is that of its new samples, and not that
- * of all that stands there already. What it draws looks as uPlot draws it, which draws all anew wherever
- * anything else changes.
+ * Draws the new samples of a run onto an existing plot: the cost of a frame is that of its new samples. The
+ * lines look like those of uPlot, which redraws the whole plot when anything else changes.
  */
 export class Growing {
   /** Of each trace the row that was drawn last, and how far its dashes have come (px). */
@@ -33,7 +32,7 @@ export class Growing {
     private readonly strokes: Stroke[],
   ) {}
 
-  /** The plot shows all of this now. */
+  /** Set the state after a complete redraw. */
   shows([, ...columns]: Drawn, ends: number[]): void {
     this.rows = columns.map((column, k) => lastBefore(column, ends[k]!))
     this.lengths = columns.map(() => 0)
@@ -84,7 +83,7 @@ export class Growing {
   }
 }
 
-/** The last row before `end` that has a value; -1 if none has. */
+/** The last row before `end` with a value; -1 if there is none. */
 function lastBefore(column: Drawn[number], end: number): number {
   let row = Math.min(end, column.length) - 1
   while (row >= 0 && typeof column[row] !== 'number') row--

@@ -1,7 +1,7 @@
 import { firstAfter } from './instants'
 import { valueAt } from './trace'
 
-/** What is measured of one trace in a window of time. `NaN`: it makes no sense there. */
+/** The measures of one trace in a time window. `NaN`: undefined. */
 export interface Measures {
   least: number
   greatest: number
@@ -10,7 +10,7 @@ export interface Measures {
   peakToPeak: number
   /** From 10 to 90 % of the way from the first to the last value, s. */
   riseTime: number
-  /** How far beyond the last value, as a part of the way. */
+  /** Overshoot beyond the last value, relative to the step. */
   overshoot: number
 }
 
@@ -63,7 +63,7 @@ export function measures(
   }
 }
 
-/** Rise time and overshoot, where the trace ends settled elsewhere than it began. */
+/** Rise time and overshoot, if the trace settles at another value than its first. */
 function step(
   time: Float64Array,
   values: Float64Array,
@@ -87,7 +87,7 @@ function step(
   }
 }
 
-/** When the trace first reaches a level, going the way it goes as a whole. */
+/** The first time at which the trace reaches a level, in the direction of the step. */
 function crossing(time: Float64Array, values: Float64Array, level: number, way: number): number {
   for (let k = 1; k < values.length; k++) {
     const a = values[k - 1]!

@@ -2,17 +2,17 @@ import type { SheetBlock, Wire } from '../protocol'
 import { blockOf, wireKey, type Places } from './wires'
 import type { Point } from './router'
 
-/** Blocks taken out of their wires and put into others: what becomes of the wires of a sheet. */
+/** Removal of blocks from wires and insertion into wires: the changes of a sheet's wires. */
 
 /** px from a wire at which a block that is dropped goes into it. */
 const INTO_WIRE = 12
 /** px of wire beside a block that make it stand in the middle where there are no more. */
 const ROOM = 60
 
-/** Whether a block can stand in a wire. */
+/** Whether a block can be inserted into a wire. */
 const passes = (block: SheetBlock): boolean => block.inputs.length > 0 && block.outputs.length > 0
 
-/** Whether a block has no wire, so that it goes into one that it is dropped on. */
+/** Whether a block has no wires, so that it can be inserted into a wire by dropping it there. */
 export function isLoose(block: SheetBlock, wires: Wire[]): boolean {
   return (
     passes(block) &&
@@ -37,7 +37,7 @@ export function takenOut(blocks: SheetBlock[], wires: Wire[]): Wire[] {
   return [...left, ...driven.map(({ target }) => ({ source: driver.source, target }))]
 }
 
-/** The wires with a block in one of them, by its first input and its first output. */
+/** The wires after the insertion of a block into one of them, by its first input and first output. */
 export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
   const [input, output] = [block.inputs[0], block.outputs[0]]
   if (!input || !output) return wires
@@ -49,7 +49,7 @@ export function putInto(block: SheetBlock, wire: Wire, wires: Wire[]): Wire[] {
   ]
 }
 
-/** What an edit says that makes one list of wires of another. */
+/** The edit that turns one list of wires into another. */
 export function rewired(before: Wire[], after: Wire[]): { wires: Wire[]; instead: Wire[] } {
   const [old, next] = [new Set(before.map(wireKey)), new Set(after.map(wireKey))]
   return {
@@ -77,7 +77,7 @@ interface DrawnWire {
   data?: { path: readonly Point[] }
 }
 
-/** The level piece that passes under a point, of the wires that are on the sheet already. */
+/** The horizontal segment under a point, of the existing wires. */
 export function wireAt(
   at: { x: number; y: number },
   edges: readonly DrawnWire[],
@@ -85,7 +85,7 @@ export function wireAt(
 ): Piece | undefined {
   const present = new Set(wires.map(wireKey))
   for (const { id, source, sourceHandle, target, targetHandle, data } of edges) {
-    // What has just closed behind a block does not take it in again.
+    // A wire that has just been reconnected does not take the block again.
     if (!present.has(id)) continue
     const path = data?.path ?? []
     for (let k = 1; k < path.length; k++) {

@@ -7,7 +7,7 @@
 
 export type Point = readonly [x: number, y: number]
 
-/** A block and the room of its name, which wires avoid if they can. */
+/** A block and the area of its name, which wires avoid if possible. */
 export interface Obstacle {
   x: number
   y: number
@@ -16,7 +16,7 @@ export interface Obstacle {
   label: readonly [x: number, y: number, width: number, height: number]
 }
 
-/** Where a wire meets a block, and the direction of the signal there. */
+/** The end of a wire at a block, and the direction of the signal. */
 export interface WireEnd {
   x: number
   y: number
@@ -165,7 +165,7 @@ class NetRouter {
         Math.min(a[1], b[1]) < low &&
         Math.max(a[1], b[1]) > top,
     )
-    // A window full of blocks gets fewer lanes rather than a slow search.
+    // A window with many blocks gets fewer lanes, to limit the search.
     const lanes = near.length > 60 ? LANES.slice(0, 1) : LANES
     this.xs = merged(
       [...stubs, ...turns].map(([x]) => x),
@@ -275,7 +275,7 @@ class NetRouter {
     if (lw > 0) forbid(lx - 3, ly, lx + lw + 3, ly + lh, 1 + LABEL_PRICE)
   }
 
-  /** Another net's wire: nothing may lie on it, lying beside it is dear, and so is crossing it. */
+  /** Another net's wire: overlap is forbidden, adjacency and crossings are expensive. */
   private occupy({ a, b }: Segment): void {
     const flat = a[1] === b[1]
     const [along, across] = flat ? [this.xs, this.ys] : [this.ys, this.xs]
@@ -420,7 +420,7 @@ const direction = ({ dx, dy }: WireEnd) => DIRECTIONS.findIndex(([dr, dc]) => dr
 const bottom = (o: Obstacle) => Math.max(o.y + o.height, o.label[1] + o.label[3])
 const distance = (a: WireEnd, b: WireEnd) => Math.abs(a.x - b.x) + Math.abs(a.y - b.y)
 
-/** Where blocks stand too close for the grid, a plain step is better than no wire. */
+/** If blocks are too close for the grid, a simple step is better than no wire. */
 const plain = (a: Point, b: Point): Point[] => [a, [(a[0] + b[0]) / 2, a[1]], [(a[0] + b[0]) / 2, b[1]], b]
 
 function link(tree: Map<number, Set<number>>, a: number, b: number): void {

@@ -1,7 +1,7 @@
 import type { Channel } from '../protocol'
 import { firstAfter } from './instants'
 
-/** Where the numbers of one signal lie among the columns of a frame. */
+/** The columns of one signal in a frame. */
 interface Columns {
   first: number
   count: number
@@ -25,7 +25,7 @@ let versions = 0
 export class RunSamples {
   version = ++versions
   count = 0
-  /** How often the run has gone back. */
+  /** The number of times that the run has stepped back. */
   returns = 0
   time = new Float64Array(FIRST_ROOM)
   private data: Float64Array[]
@@ -69,20 +69,20 @@ export class RunSamples {
     this.version = ++versions
   }
 
-  /** Only the first samples are still true: the run has gone back. */
+  /** Drop the samples after the first ones, because the run has stepped back. */
   truncate(count: number): void {
     this.count = Math.min(this.count, count)
     this.returns++
     this.version = ++versions
   }
 
-  /** The run has ended: no more room than is needed. */
+  /** The run has ended: release unused memory. */
   close(): void {
     this.time = this.time.slice(0, this.count)
     this.data = this.data.map((column) => column.slice(0, this.count))
   }
 
-  /** What people call a signal: its block where that has no other output. */
+  /** The display name of a signal: its block, if that has no other output. */
   title(name: string): string {
     const block = name.slice(0, name.lastIndexOf('/'))
     return this.aliases[block] === name ? block : name

@@ -1,7 +1,7 @@
 import { firstAfter } from './instants'
 import type { RunSamples } from './run_samples'
 
-/** One line of a plot. The arrays are asked for at each frame, because a run that goes on has longer ones. */
+/** One line of a plot. The arrays are read at each frame, because they grow during a run. */
 export interface Trace {
   /** The same for the same line whatever else is shown. */
   key: string

@@ -30,11 +30,11 @@ interface ArmProps {
   rows: number
   bodies: Body[]
   poses: () => Poses | undefined
-  /** A ghost: the colour of a pose that the arm has left or will reach. */
+  /** The colour of a ghost, a past or future pose of the arm. */
   ghost?: string
 }
 
-/** The bodies where the poses of the moment say. */
+/** The bodies at the present poses. */
 export function Arm({ rows, bodies, poses, ghost }: ArmProps) {
   const groups = useRef<(Group | null)[]>([])
   const matrix = useMemo(() => new Matrix4(), [])

@@ -5,7 +5,7 @@ import { Box3, BufferGeometry, Matrix4, Mesh, Vector3, type Object3D, type Persp
 import { matrixAt, type Poses, type RobotScene } from './scene'
 import { useViewOptions } from './view_options'
 
-/** Directions from which an arm is looked at; "tool" stands behind the tool and rides with it. */
+/** Camera directions; "tool" is behind the tool and moves with it. */
 export const PRESETS = {
   iso: [0.62, -0.68, 0.42],
   front: [1, 0, 0.06],
@@ -15,7 +15,7 @@ export const PRESETS = {
 
 export type Preset = keyof typeof PRESETS | 'tool'
 
-/** What the buttons of a view ask its camera. */
+/** Commands of the view's buttons to its camera. */
 export interface CameraHandle {
   look: (preset: Preset) => void
   fit: () => void

@@ -10,15 +10,15 @@ interface RunArmProps {
   /** The block whose recorded poses move the arm. */
   path: string
   scene: RobotScene
-  /** Where the arm stands as long as nothing is recorded. */
+  /** The pose of the arm without recorded samples. */
   rest: Poses
-  /** The drawing that stands in where there is no WebGL. */
+  /** The drawing for browsers without WebGL. */
   drawing: () => Promise<string | undefined>
-  /** Buttons of its own that stand before the others. */
+  /** Additional buttons, before the others. */
   children?: React.ReactNode
 }
 
-/** The arm as the samples of the run say it at the time cursor. */
+/** The arm in the pose of the run at the time cursor. */
 export function RunArm({ path, scene, rest, drawing, children }: RunArmProps) {
   const whole = useStudio((s) => (s.run?.state === 'done' ? s.run.run : ''))
   const has = useStudio((s) =>
@@ -90,7 +90,7 @@ function posesAt(path: string, rows: number, index: number): Poses | undefined {
 
 const EXTENT_SAMPLES = 60
 
-/** Where the links go in all of the run, at instants spread over it. */
+/** Poses of the links, at times spread over the whole run. */
 function extentOf(path: string, rows: number): [number, number, number][] {
   const found = poseSignal(path, rows)
   if (!found || !samples.count) return []
@@ -104,7 +104,7 @@ function extentOf(path: string, rows: number): [number, number, number][] {
   return points
 }
 
-/** Play the run from its start; done when it has come to its end, or is held. */
+/** Play the run from its start; resolves at its end or when it is paused. */
 function playOnce(): Promise<void> {
   useCursor.setState({ time: samples.time[0] ?? 0, playing: false, loop: false })
   play()

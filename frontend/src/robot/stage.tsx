@@ -55,7 +55,7 @@ interface StageProps {
   extent?: () => [number, number, number][]
   /** Changes when the extent is complete. */
   whole?: string
-  /** The drawing that stands in where there is no WebGL. */
+  /** The drawing for browsers without WebGL. */
   drawing: () => Promise<string | undefined>
   /** Changes when the drawing would; one that says nothing is drawn once. */
   drawn?: () => string
@@ -63,14 +63,14 @@ interface StageProps {
    * Plays what is to be filmed from its beginning and tells when it has ended; without one there is no film.
    */
   film?: () => Promise<void>
-  /** Buttons of its own that stand before the others. */
+  /** Additional buttons, before the others. */
   children?: React.ReactNode
 }
 
 const TURN = Math.PI / 24
 const once = () => ''
 
-/** An arm on its floor, with light, shadow, camera and the tools of a view. */
+/** An arm on a floor, with light, shadow, camera and view tools. */
 export function Stage(props: StageProps) {
   const { scene, poses, state, drawing, drawn, film, children } = props
   const scheme = useComputedColorScheme('light')
@@ -303,7 +303,7 @@ function Pedestal({
   )
 }
 
-/** Draws a frame when something moved, and none while all stands still. */
+/** Renders a frame only when something has moved. */
 function useDrawnWhenChanged(state: () => string): void {
   const invalidate = useThree((s) => s.invalidate)
   useEffect(() => {

@@ -9,7 +9,7 @@ interface StaticArmProps {
   children?: React.ReactNode
 }
 
-/** What is shown where the browser has no WebGL: words, and a drawing that the server makes. */
+/** The view without WebGL: a text, and a drawing from the server. */
 export function StaticArm({ name, drawing, state, children }: StaticArmProps) {
   const [svg, setSvg] = useState<string>()
   useEffect(() => {

@@ -1,6 +1,6 @@
 import { create } from 'zustand'
 
-/** What is shown beside the bodies. */
+/** The displayed items besides the bodies. */
 export interface ViewOptions {
   frames: boolean
   axes: boolean
@@ -28,7 +28,7 @@ function kept(): Partial<ViewOptions> {
   }
 }
 
-/** How arms are shown, in every view alike and the next time too. */
+/** Display options of arms, shared by all views and stored. */
 export const useViewOptions = create<ViewOptions>(() => ({ ...START, ...kept() }))
 
 export function toggle(option: keyof ViewOptions): void {

@@ -41,7 +41,7 @@ interface ViewToolsProps {
   children?: React.ReactNode
 }
 
-/** Camera, what is shown, picture and film: the buttons over an arm. */
+/** The buttons over an arm: camera, display options, picture and film. */
 export function ViewTools({
   camera,
   shot,

@@ -4,7 +4,7 @@ import { samples } from '../samples'
 import { useStudio } from '../store'
 
 interface Cursor {
-  /** The instant (s) that every view shows; null follows the end of the run. */
+  /** The time (s) that all views show; null follows the end of the run. */
   time: number | null
   playing: boolean
   loop: boolean
@@ -16,7 +16,7 @@ export const useCursor = create<Cursor>(() => ({ time: null, playing: false, loo
 
 const reached = () => samples.time[samples.count - 1] ?? 0
 
-/** The instant to show now. */
+/** The displayed time. */
 export function shownTime(): number {
   return useCursor.getState().time ?? reached()
 }
@@ -56,7 +56,7 @@ export function stepCursor(by: number): void {
   if (index >= 0) useCursor.setState({ time: samples.time[index]!, playing: false })
 }
 
-/** Whether the run has ended: nothing is left but to look at it. */
+/** Whether the run has ended. */
 export function ended(): boolean {
   const { run } = useStudio.getState()
   return run !== null && run.state !== 'running' && run.state !== 'paused'

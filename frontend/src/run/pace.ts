@@ -1,6 +1,6 @@
 /**
- * What merely follows a run is drawn as often as the machine can: where pictures take long to get to the
- * screen, there is a pause after each, so that what people press and type is answered meanwhile.
+ * Views that follow a run are drawn as often as the machine allows. If rendering is slow, a pause follows
+ * each frame, so that user input is handled in between.
  */
 
 /** ms that two pictures may take without a pause. */

@@ -5,14 +5,14 @@ import type { ViewOf } from '../protocol'
 import { RunSamples } from '../model/run_samples'
 import { samples, showSamples } from '../samples'
 
-/** A parameter that got another value while a run went on. */
+/** A parameter that was changed during a run. */
 export interface Tuning {
   time: number
   parameter: string
   value: unknown
 }
 
-/** A run that the page remembers: its samples, and what was other than in the model. */
+/** A stored run: its samples, and the values that differed from the model. */
 export interface KeptRun {
   key: string
   document: string
@@ -26,7 +26,7 @@ export interface KeptRun {
   reason: string
   samples: RunSamples
   views: ViewOf[]
-  /** Values that were tried from the start. */
+  /** Trial values at the start. */
   tried: Record<string, unknown>
   tunings: Tuning[]
 }
@@ -46,7 +46,7 @@ interface Runs {
   remove: (key: string) => void
 }
 
-/** Every run since the page was opened, the latest last; the oldest go when there are too many. */
+/** All runs since the page was opened, latest last; the oldest are dropped if there are too many. */
 export const useRuns = create<Runs>((set) => ({
   runs: [],
   tried: {},
@@ -119,7 +119,7 @@ export function progressed({ run, state, solver, reason }: EventOf<'run_progress
   update(run, () => ({ state, solver, reason }))
 }
 
-/** Another document is shown: what was tried and run belongs to the one before. */
+/** Another document is shown: trial values and runs of the previous one are dropped. */
 export function forget(): void {
   showSamples(new RunSamples('', [], {}))
   useRuns.setState({ tried: {} })

@@ -79,7 +79,7 @@ export function Timeline({ wires = false }: { wires?: boolean }) {
   )
 }
 
-/** Takes a paused run back to the instant that the views show. */
+/** Returns a paused run to the displayed time. */
 function GoBack() {
   const run = useStudio((s) => s.run)
   const time = useCursor((s) => s.time)

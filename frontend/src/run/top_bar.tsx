@@ -200,7 +200,7 @@ function Tool({
   )
 }
 
-/** How far a run has come, along the lower edge of the bar. */
+/** The progress of a run, along the lower edge of the bar. */
 function RunProgress() {
   const run = useStudio((s) => s.run)
   if (run?.state !== 'running' && run?.state !== 'paused') return null

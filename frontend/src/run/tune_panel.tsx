@@ -121,7 +121,7 @@ function drop(paths: string[], tunables: Map<string, Tunable>): void {
   }))
 }
 
-/** Put all that is tried into the model, as one step that can be undone. */
+/** Keep all trial values in the model, as one undo step. */
 async function keep(): Promise<void> {
   const { document } = useStudio.getState()
   const { tried } = useRuns.getState()

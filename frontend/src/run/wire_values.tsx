@@ -20,12 +20,12 @@ interface Shown {
   pinned: ReadonlySet<string>
 }
 
-/** Which values stand on the wires; a wire under the pointer shows its own anyway. */
+/** The values shown on wires; a wire under the pointer always shows its value. */
 export const useValues = create<Shown>(() => ({ all: false, pinned: new Set() }))
 
 const MOST_ELEMENTS = 4
 
-/** What a signal is at an instant, as people read it. */
+/** The display text of a signal's value at a time. */
 export function valueAtInstant(path: string, time: number): string {
   const found = samples.signal(path)
   const index = samples.indexAt(time)
@@ -226,7 +226,7 @@ function WireTools({
 const length = (path: Point[], k: number) =>
   path[k + 1] ? Math.abs(path[k + 1]![0] - path[k]![0]) + Math.abs(path[k + 1]![1] - path[k]![1]) : 0
 
-/** The output whose wire the mouse is on; empty where it is on none. */
+/** The output of the wire under the mouse; empty if there is none. */
 function useHovered(flow: HTMLElement | null): string {
   const [hovered, setHovered] = useState('')
   useEffect(() => {

@@ -50,7 +50,7 @@ interface Box {
 
 const FONT = 11
 
-/** Round numbers in a range, so many or fewer. */
+/** Round numbers in a range, at most a given number. */
 export function ticks(min: number, max: number, most: number): number[] {
   const raw = (max - min) / Math.max(most, 1)
   const size = 10 ** Math.floor(Math.log10(raw))
@@ -67,7 +67,7 @@ function tickText(value: number, step: number): string {
   return value.toFixed(places).replace('-', '−')
 }
 
-/** A range with some air around it. */
+/** A range with a margin. */
 export function aired(min: number, max: number): [number, number] {
   if (!(max >= min)) return [0, 1]
   if (max - min <= 1e-12 * Math.max(Math.abs(min), Math.abs(max))) {

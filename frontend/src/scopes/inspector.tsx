@@ -14,7 +14,7 @@ import { DASHES, MOST_TRACES, tracesOf, type Trace } from '../model/trace'
 
 interface Inspector {
   signals: ReadonlySet<string>
-  /** Runs that are not shown; new ones are. */
+  /** Hidden runs; new runs are visible. */
   hidden: ReadonlySet<string>
   search: string
   comparing: boolean
@@ -39,7 +39,7 @@ function toggled(set: ReadonlySet<string>, key: string): Set<string> {
   return next
 }
 
-/** All runs and all their signals: several in one plot, or two compared. */
+/** All runs and their signals: several in one plot, or two compared. */
 export function SignalInspector() {
   const document = useStudio((s) => s.document?.state.document)
   const all = useRuns((s) => s.runs)
@@ -60,7 +60,7 @@ export function SignalInspector() {
   )
 }
 
-/** Values that a run had and the model has not: tried from the start, or tuned on the way. */
+/** Values of a run that differ from the model: trial values at the start, or tuned values. */
 function changesOf({ tried, tunings }: KeptRun): string[] {
   return [
     ...Object.entries(tried).map(([parameter, value]) => `${parameter} = ${valueText(value)}`),
@@ -144,7 +144,7 @@ function RunName({ run, onName }: { run: KeptRun; onName: (name: string) => void
   )
 }
 
-/** Which two runs are compared: the last two, until somebody chooses. */
+/** The two compared runs: the last two by default. */
 function pair(runs: KeptRun[], baseline: string, compared: string): [KeptRun, KeptRun] {
   const find = (key: string) => runs.find((run) => run.key === key)
   return [find(baseline) ?? runs.at(-2)!, find(compared) ?? runs.at(-1)!]

@@ -33,7 +33,7 @@ function useRefresh(): void {
   }, [])
 }
 
-/** What is read off the traces of one plot: values at the cursors, and measures over what is shown. */
+/** The measures of one plot's traces: values at the cursors, and measures of the visible range. */
 export function MeasureTable({ traces }: { traces: Trace[] }) {
   useRefresh()
   const cursors = useWindow((s) => s.cursors)

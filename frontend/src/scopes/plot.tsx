@@ -6,7 +6,7 @@ import type { Trace } from '../model/trace'
 import type { Figure } from './figure'
 import { LivePlot, type SeenValues } from './live_plot'
 
-/** What a plot shows now, for those beside it: measures and exports. */
+/** The present content of a plot, for measures and exports. */
 export interface PlotHandle {
   figure: () => Figure
 }

@@ -1,7 +1,7 @@
 import { create } from 'zustand'
 import { changed } from '../frames'
 
-/** How people read a quantity: its number times `factor` has this unit. */
+/** The display unit of a quantity: its number times `factor` has this unit. */
 export interface Reading {
   factor: number
   unit: string
@@ -25,7 +25,7 @@ const spell = (unit: string) =>
     .replaceAll('*', ' ')
     .replace(/\^?([23])\b/g, (_, power: string) => (power === '2' ? '²' : '³'))
 
-/** Angles in degrees for people; radians on request. */
+/** Angles are shown in degrees by default, in radians on request. */
 export const useUnits = create<{ radians: boolean }>(() => ({ radians: false }))
 useUnits.subscribe(changed)
 

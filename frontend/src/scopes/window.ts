@@ -4,19 +4,19 @@ import { samples } from '../samples'
 import { useStudio } from '../store'
 
 interface Window {
-  /** The stretch of time (s) that every time plot shows; null is the whole run. */
+  /** The visible time range (s) of all time plots; null is the whole run. */
   range: [number, number] | null
-  /** Two instants (s) to measure between; null where nobody measures. */
+  /** The two measuring cursors (s); null without measurement. */
   cursors: [number, number] | null
-  /** Whether the tables of measures stand beside the plots. */
+  /** Whether the tables of measures are shown beside the plots. */
   measuring: boolean
 }
 
-/** Zoom and measuring cursors: the same for all time plots. */
+/** Zoom and measuring cursors, shared by all time plots. */
 export const useWindow = create<Window>(() => ({ range: null, cursors: null, measuring: false }))
 useWindow.subscribe(changed)
 
-/** The whole run: to its stop time while it goes on, and to where it came when it has ended. */
+/** The range of the whole run: to its stop time while it is running, else to its last sample. */
 export function wholeRun(): [number, number] {
   const { run } = useStudio.getState()
   const reached = samples.time[samples.count - 1] ?? 0
@@ -24,7 +24,7 @@ export function wholeRun(): [number, number] {
   return [Math.min(samples.time[0] ?? 0, reached), reached || 1]
 }
 
-/** What is shown now. */
+/** The visible range. */
 export function shownWindow(): [number, number] {
   return useWindow.getState().range ?? wholeRun()
 }
@@ -35,7 +35,7 @@ export function zoomTo(from: number, to: number): void {
   if (to - from > LEAST_SPAN * Math.max(1, Math.abs(to))) useWindow.setState({ range: [from, to] })
 }
 
-/** Zoom about an instant that stays where it is. */
+/** Zoom about a time that keeps its position. */
 export function zoomBy(factor: number, about: number): void {
   const [from, to] = shownWindow()
   const [first, last] = wholeRun()
@@ -49,7 +49,7 @@ export function pan(by: number): void {
   useWindow.setState({ range: [from + by, to + by] })
 }
 
-/** Two cursors, at a third and two thirds of what is shown; or none. */
+/** Two cursors, at a third and two thirds of the visible range; or none. */
 export function toggleCursors(): void {
   const [from, to] = shownWindow()
   useWindow.setState((s) => ({

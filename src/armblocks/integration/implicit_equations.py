@@ -2,10 +2,10 @@
 
 ``0 = residual(t, x, z, w, p)`` is solved for ``w`` wherever the system is evaluated, with the exact Jacobian,
 dense elimination with row pivoting, and halved steps while the residual does not fall. It starts from the
-``w`` of the last accepted step, so a step that is tried twice gives the same bits.
+``w`` of the last accepted step, so a repeated step gives identical results.
 
-Where it does not converge, or the Jacobian is singular, ``w`` becomes NaN: a step that meets this is tried
-shorter, and if nothing helps the run ends there like at any other NaN, and the cause is looked up then.
+If it does not converge, or the Jacobian is singular, ``w`` becomes NaN: the step is repeated with a shorter
+length, and if this fails the run ends as for any other NaN, and the cause is then diagnosed.
 """
 
 from __future__ import annotations

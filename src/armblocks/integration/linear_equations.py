@@ -2,10 +2,9 @@
 
 ``E`` is one for the rows of the flow and zero for those of implicit equations. A large sparse matrix is
 eliminated in the order of :mod:`armblocks.integration.elimination_plan`, with its pivots on the diagonal and
-work in proportion to its entries. Its first solution is judged by what it leaves over, each row beside
-the sizes of its own terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409: no scaling of states or equations
-changes that). Where this is too much, and for small or full matrices always, the whole matrix is eliminated
-with row pivoting instead.
+work in proportion to its entries. The residual of its first solution is checked, each row relative to its
+terms (Oettli, Prager, *Numer. Math.* 6 (1964) 405-409: no scaling of states or equations changes that). If it
+is too large, and always for small or full matrices, the whole matrix is eliminated with row pivoting instead.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from armblocks.routines.routine import Function, Program, Routine
 from armblocks.routines.values import Boolean, Integer, Real
 
 SMALL = 8
-"""Up to this size the whole matrix is eliminated with pivoting: nothing else is faster."""
+"""Up to this size the whole matrix is eliminated with pivoting, which is fastest."""
 FULL = 0.5
-"""So it is where L and U have this part of all its entries."""
+"""The same applies if L and U have this fraction of all entries."""
 SCALING_ROUNDS = 6
 """Rounds in which the bound of the rates comes down to within a factor of about two, for most matrices."""
 LEFT_OVER = 1e-7
-"""A relative remainder that makes the elimination without pivoting count as failed. A Rosenbrock method with
+"""Relative residual above which the elimination without pivoting counts as failed. A Rosenbrock method with
 a Jacobian this wrong is still far more accurate than the tolerances that it is chosen for."""
 
 
@@ -84,7 +83,7 @@ class LinearEquations:
 
     @property
     def rate_bound(self) -> Function[[Reals], Real]:
-        """No less than the magnitude of any eigenvalue of ``J``.
+        """An upper bound of the magnitudes of the eigenvalues of ``J``.
 
         For any positive v, that is ``max_i (|J| v)_i / v_i`` (Collatz, Wielandt; Horn, Johnson, Matrix
         Analysis, 8.1.31 and 8.1.18). A few rounds of ``v = sqrt(v |J| v)`` make v fit the scales of the

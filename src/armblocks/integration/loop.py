@@ -5,10 +5,10 @@ and restarts at breakpoints, without returning to Python. All of its state lies 
 (:mod:`armblocks.integration.workspace`), so a run can stop after any number of steps and go on with the same
 bits.
 
-The loop is composed: a :class:`~armblocks.integration.method.Method` takes a step,
+The loop has these parts: a :class:`~armblocks.integration.method.Method` takes a step,
 :class:`~armblocks.integration.step_control.Steps` chooses its length, a
-:class:`~armblocks.integration.course.Course` says where steps end and what happens there. A system that only
-flows has :class:`~armblocks.integration.segments.Segments`, any other
+:class:`~armblocks.integration.course.Course` determines where steps end and the actions there. A system
+without ticks and events has :class:`~armblocks.integration.segments.Segments`, any other
 :class:`~armblocks.integration.instants.Instants` with its clocks, events and delayed signals.
 """
 
@@ -61,7 +61,7 @@ def define_loop(
 ) -> None:
     """Define the loop of a method for a system; its result is a ``Status``.
 
-    The system's functions (:mod:`armblocks.integration.system_functions`) stand elsewhere. The linear
+    The system's functions (:mod:`armblocks.integration.system_functions`) are external. The linear
     equations of a Rosenbrock method lie in ``space``.
     """
 
@@ -104,7 +104,7 @@ def define_loop(
 
 
 class _Loop:
-    """Puts the parts together and writes them in the order in which they run."""
+    """Combines the parts and emits them in order of execution."""
 
     def __init__(self, frame: Frame, tableau: Tableau, space: LinearSpace | None) -> None:
         self.frame = frame

@@ -1,7 +1,7 @@
 """The common part of one-step methods: error norm, first step, dense output.
 
 Everything is written for vectors of ``n`` states that lie in the workspace: the old state ``x``, the new one
-``y`` and the rows of ``K``. Nothing here decides; the loop around it does.
+``y`` and the rows of ``K``. The enclosing loop makes all decisions.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ Index = Integer | int
 
 
 class Method(ABC):
-    """Writes the arithmetic of the steps of a ``tableau`` into the routine of a loop."""
+    """Emits the arithmetic of the steps of a ``tableau`` into the routine of a loop."""
 
     short_checks: int
-    """Checks that find a step short without need before a run counts as held at its minimum step."""
+    """Number of checks with a needlessly short step after which a run counts as limited to its minimum
+    step."""
 
     def __init__(self, frame: Frame, tableau: Tableau, evaluation: Evaluation) -> None:
         self.frame = frame
@@ -54,7 +55,7 @@ class Method(ABC):
     # The step.
 
     def prepare(self, time: Real) -> None:  # noqa: B027  # most methods need nothing
-        """What a step needs that does not depend on its length."""
+        """The part of a step that does not depend on its length."""
 
     @abstractmethod
     def stages(self, time: Real, h: Real, new_time: Real) -> None:
@@ -62,11 +63,11 @@ class Method(ABC):
 
     @property
     def has_extra_stages(self) -> bool:
-        """Whether the dense output needs stages of its own."""
+        """Whether the dense output needs extra stages."""
         return False
 
     def extra_stages(self, time: Real, h: Real) -> None:  # noqa: B027
-        """The stages that only the dense output needs; y keeps its value."""
+        """The extra stages of the dense output; y keeps its value."""
 
     def error_norm(self, h: Real, error: Row) -> Real:
         """Weighted root-mean-square norm of the error estimate of the step to y."""
@@ -77,10 +78,10 @@ class Method(ABC):
         return self.norm(h, change_to(self.tableau.end_row))
 
     def watch(self, h: Real) -> None:  # noqa: B027
-        """Now and then, check whether another method does better; pause where one does."""
+        """Check at intervals whether another method is faster; pause if so."""
 
     def set_point(self, time: Real) -> Reals:
-        """The time of an evaluation: before a breakpoint the old value of a jump holds."""
+        """The time of an evaluation, clamped before a breakpoint, where the old value of a jump is valid."""
         self._point.value = minimum(time, self.frame.clamp.value)
         return self._point.memory
 
@@ -120,7 +121,7 @@ class Method(ABC):
     def first_step(self, time: Real, interval: Real, max_step: Real) -> tuple[Real, Boolean]:
         """Length of a segment's first step: Hairer, Norsett, Wanner I, II.4, as SciPy does it.
 
-        And whether the interval's length, the end of the run perhaps, has had a part in it.
+        Also returns whether the length of the interval limits it.
         """
 
         def weighted(value: Callable[[Index], Real]) -> Callable[[Index], Real]:
@@ -165,11 +166,11 @@ class Method(ABC):
     # Sums.
 
     def scale(self, magnitude: Real) -> Real:
-        """What an error is measured by: ``atol + rtol magnitude``."""
+        """The error tolerance: ``atol + rtol magnitude``."""
         return fma(magnitude, self._rtol, self._atol)
 
     def combination(self, weights: Row, i: Index) -> Real:
-        """``sum_j weights[j] K[j][i]``, zeros left out."""
+        """``sum_j weights[j] K[j][i]``, without zero terms."""
         total: Real | None = None
         for row, weight in enumerate(weights):
             if weight != 0.0:

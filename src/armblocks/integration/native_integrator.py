@@ -30,17 +30,18 @@ Integers = NDArray[np.int64]
 
 _ADVANCE = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * POINTERS, ctypes.c_int64)
 SAME_INSTANT = 1.0 + 2.0**-50
-"""Two times within this factor of one another are one instant, here as in the native loop."""
+"""Two times within this factor are equal, as in the native loop."""
 
 FIRST_ROOM = 2 * ROWS_OF_A_STEP
-"""Rows of the past that a run begins with room for."""
+"""Initial capacity of the delay history, rows."""
 NO_NUMBERS: Vector = np.empty(0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunPoint:
-    """Where a run stands: time (s), states, discrete variables, unknowns of the implicit equations, and the
-    past of what is delayed (rows of :mod:`armblocks.integration.delay_history`; none at the start of a run).
+    """The state of a run: time (s), states, discrete variables, unknowns of the implicit equations, and the
+    history of delayed signals (rows of :mod:`armblocks.integration.delay_history`; none at the start of a
+    run).
 
     ``begun``: the ticks at this time have happened already.
     """
@@ -54,7 +55,7 @@ class RunPoint:
 
 
 class NativeIntegrator:
-    """``x' = f(t, x, z, w, p)`` of one tape, with what happens at instants, stepped in machine code."""
+    """The compiled integrator of ``x' = f(t, x, z, w, p)``, including ticks and events."""
 
     def __init__(
         self,
@@ -84,7 +85,7 @@ class NativeIntegrator:
                 module.add(symbol, text)
             return module.text
 
-        # The code object must outlive every call into it.
+        # The code object must stay alive during every call.
         shape = "" if pattern is None else repr((pattern.rows, pattern.columns))
         self.key = ("runge_kutta", tableau.content, repr(sizes), shape, *(digests[name] for name in names))
         self._code = load_code(self.key, write)
@@ -151,9 +152,9 @@ class NativeIntegrator:
         return run
 
     def take_over(self, run: Integration) -> Integration:
-        """Go on by this method where another one of the same system stands, between two of its steps.
+        """Continue with this method from the state of another method of the same system, between two steps.
 
-        What is recorded goes into the same arrays.
+        Samples are recorded into the same arrays.
         """
         old, here = run.integrator.workspace, self.workspace
         new = Integration(self, *run.course, records=(run.states, run.discrete, run.algebraic))
@@ -167,7 +168,7 @@ class NativeIntegrator:
         return new
 
     def advance(self, addresses: tuple[int, ...], max_steps: int) -> Status:
-        """The native call. The interpreter's lock is released while it works."""
+        """The native call. It releases the interpreter lock."""
         return Status(self._advance(*addresses, max_steps))
 
 
@@ -187,7 +188,7 @@ def needed_tapes(sizes: LoopSizes) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """The arrays of a run before the step that its end cut short, and the name of their method."""
+    """The arrays of a run before the step that its end shortened, and the name of the method."""
 
     reals: Vector
     counts: Integers
@@ -195,7 +196,7 @@ class Checkpoint:
 
 
 class Integration:
-    """One run: all of its state is in two arrays, so any chunking of the steps gives the same bits."""
+    """One run: its whole state is in two arrays, so results do not depend on the division into calls."""
 
     def __init__(
         self,
@@ -220,7 +221,7 @@ class Integration:
         self.record(samples, records)
 
     def record(self, samples: Vector, records: tuple[Vector, Vector, Vector] | None = None) -> None:
-        """Record these instants from here on, (N,) s, in new arrays if none are given."""
+        """Record at these times from now on, (N,) s, into new arrays if none are given."""
         sizes, (p, _, ends, clamps) = self.integrator.sizes, self.course
         if records is None:
             x, z, w = (np.empty((samples.size, n)) for n in (sizes.states, sizes.discrete, sizes.algebraic))
@@ -234,7 +235,7 @@ class Integration:
         self._take_addresses()
 
     def make_room(self, numbers: int) -> None:
-        """Give the past of delayed signals room for so many numbers, at least."""
+        """Enlarge the memory of the delay history to at least this size."""
         if numbers <= self._room:
             return
         more = np.zeros(numbers - self._room)
@@ -251,7 +252,7 @@ class Integration:
         self._addresses = tuple(array.ctypes.data for array in arrays)
 
     def place(self, start: RunPoint, *, step: float, first: bool) -> None:
-        """Put the run at a point; at the ``first`` the ticks there are still to happen."""
+        """Set the run to a point; with ``first`` the ticks at that time are pending."""
         places, sizes = self.integrator.workspace, self.integrator.sizes
         self.reals[Scalar.TIME] = start.time
         self.reals[Scalar.STEP] = step
@@ -275,7 +276,7 @@ class Integration:
             self.counts[Count.END + clock] = number
 
     def _place_past(self, start: RunPoint) -> None:
-        """What the delayed signals were: as the point says, or what they begin with, all the time before."""
+        """The initial history: that of the point, or the constant initial values."""
         places, lines = self.integrator.workspace, self.integrator.sizes.delays
         past = start.past
         if not past.size:
@@ -290,7 +291,7 @@ class Integration:
         self.counts[first + len(lines) :] = -1
 
     def cut_at(self, time: float) -> None:
-        """Let a step end exactly at a time (s), later than that reached, and the run start anew there."""
+        """Let a step end exactly at a later time (s), and restart there."""
         p, samples, *bounds = self.course
         ends, clamps = (bound[self.counts[Count.SEGMENT] :] for bound in bounds)
         place = int(np.searchsorted(ends, time))
@@ -307,16 +308,16 @@ class Integration:
 
     @property
     def waiting(self) -> bool:
-        """Whether the ticks and events of the instant reached are still to come."""
+        """Whether the ticks and events at the present time are pending."""
         return bool(self.counts[Count.STARTED] == Stage.INSTANT)
 
     def next_tick(self, clock: int) -> float:
-        """When a clock ticks next, s; while the run is :attr:`waiting`, that may be now."""
+        """The time of the next tick, s; this may be now while the run is :attr:`waiting`."""
         period, offset = self.integrator.sizes.clocks[clock]
         return float(self.counts[Count.END + clock]) * period + offset
 
     def put_discrete(self, places: slice, values: Vector) -> None:
-        """Give some of the discrete variables other values, where the run stands."""
+        """Set some discrete variables at the present time."""
         self._vector(self.integrator.workspace.z, self.integrator.sizes.discrete)[places] = values
 
     def advance(self, max_steps: int, pause: float = np.inf) -> Status:
@@ -331,13 +332,13 @@ class Integration:
 
     @property
     def checkpoint(self) -> Checkpoint | None:
-        """From where a longer run would go on; ``None`` if there is no such place yet."""
+        """The checkpoint from which a longer run would continue; ``None`` if there is none yet."""
         if np.isnan(self._saved.reals[Scalar.TIME]):
             return None
         return _checkpoint(self, self._saved.reals.copy(), self._saved.counts.copy())
 
     def back_to(self, checkpoint: Checkpoint) -> None:
-        """Stand where :meth:`now` was taken, with what is recorded since forgotten."""
+        """Return to the state of :meth:`now`, and drop later samples."""
         self.make_room(checkpoint.reals.size - self.integrator.workspace.size)
         self.reals[: checkpoint.reals.size] = checkpoint.reals
         self.counts[:] = checkpoint.counts
@@ -351,7 +352,7 @@ class Integration:
 
     @property
     def point(self) -> RunPoint:
-        """Where the run stands: copies."""
+        """Copies of the present state."""
         places, sizes = self.integrator.workspace, self.integrator.sizes
         z, w = self._vector(places.z, sizes.discrete), self._vector(places.w, sizes.algebraic)
         past = np.empty(0)
@@ -399,12 +400,12 @@ class Integration:
         return int(self.counts[Count.EVENTS])
 
     def positive(self, guards: Sequence[int]) -> list[int]:
-        """Which of some guards are positive where the run stands."""
+        """The guards among some that are positive at the present time."""
         signs = self._vector(self.integrator.workspace.signs, len(self.integrator.sizes.directions))
         return [guard for guard in guards if signs[guard] > 0.0]
 
     def last_fired(self, guard: int) -> float:
-        """When a guard fired last, s; minus infinity if it never did."""
+        """The last time at which a guard fired, s; minus infinity if it never did."""
         return float(self.reals[self.integrator.workspace.last + guard])
 
     @property
@@ -416,7 +417,7 @@ class Integration:
 
     @property
     def contradicting_modes(self) -> list[int]:
-        """The places in ``z`` of the modes that contradict their conditions."""
+        """The indices in ``z`` of the inconsistent modes."""
         places, modes = self.integrator.workspace, self.integrator.sizes.modes
         found = self.reals[places.contradictions : places.contradictions + len(modes)]
         return [place for place, contradicts in zip(modes, found) if contradicts]
@@ -446,7 +447,7 @@ class Integration:
 
     @property
     def recorded(self) -> int:
-        """How many sample instants are written."""
+        """The number of recorded samples."""
         return int(self.counts[Count.SAMPLE])
 
     @property
@@ -456,7 +457,7 @@ class Integration:
 
     @property
     def rejected(self) -> int:
-        """Steps tried and thrown away, because their error was too large."""
+        """Rejected steps, because their error was too large."""
         return int(self.counts[Count.REJECTED])
 
     @property

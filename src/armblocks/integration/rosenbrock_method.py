@@ -22,12 +22,12 @@ from armblocks.routines.memory import Reals
 from armblocks.routines.values import Real
 
 STABLE_BELOW, STABLE_CHECKS = 2.0, 16
-"""A step that times the fastest rate is less than this is one that an explicit method could take as well; so
-many checks in a row, four times as many after each return, and one does."""
+"""Bound of step times fastest rate below which an explicit method could take the same step, and the number of
+consecutive checks (times four after each return) after which it takes over."""
 
 
 class RosenbrockMethod(Method):
-    """Writes the steps of a Rosenbrock tableau, whose linear equations lie in ``space``."""
+    """Emits the steps of a Rosenbrock tableau, whose linear equations are in ``space``."""
 
     short_checks = 512
 
@@ -65,7 +65,7 @@ class RosenbrockMethod(Method):
             self._right(source, stage, h)
             r.call(self.equations.solve, self.scratch)
             if stage == 0 and self.equations.solved_well:
-                # If the elimination without pivoting went wrong, another one with it.
+                # If the elimination without pivoting failed, repeat it with pivoting.
                 with r.unless(r.call(self.equations.solved_well, self.scratch, h)):
                     r.call(self.equations.factor_whole, self.scratch, h)
                     r.call(self.equations.solve, self.scratch)
@@ -99,7 +99,7 @@ class RosenbrockMethod(Method):
         return select(between < ends, ends, between + ends * 0.0)
 
     def watch(self, h: Real) -> None:
-        """Check whether an explicit method could take as long steps; pause where it long could.
+        """Check whether an explicit method could take equally long steps; pause if it could for long.
 
         With implicit equations the rates are not those of the flow's Jacobian, and nothing returns.
         """

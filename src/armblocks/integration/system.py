@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 ENDING = ("stop", "fail")
-"""What guards do that end a run where they are positive."""
+"""The actions of guards that end a run where they are positive."""
 _OF_PARAMETERS = ("initial_states", "initial_discrete", "initial_algebraic", "breakpoints")
 _FUNCTIONS = (
     *("derivative", *_OF_PARAMETERS, "signals", "residual", "residual_jacobian"),
@@ -43,9 +43,9 @@ _SIGNALS_LAYOUT = BatchLayout(
 
 
 def compile_system(system: HybridSystem) -> CompiledSystem:
-    """The system, ready to be run. Machine code is made, or found in the disk cache, when first needed.
+    """The system, ready to be run. Machine code is compiled, or loaded from the disk cache, at first use.
 
-    Raises :class:`~armblocks.errors.CompileError` if the equations use an operation that tapes do not know.
+    Raises :class:`~armblocks.errors.CompileError` if the equations use an unsupported operation.
     """
     tapes = {name: tape_of(function) for name, function in _functions(system).items()}
     return CompiledSystem(_describe(system, tapes), tapes.__getitem__, lambda: system)
@@ -54,9 +54,9 @@ def compile_system(system: HybridSystem) -> CompiledSystem:
 def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem:
     """The system that ``key`` identifies, from the disk cache where an earlier process compiled it.
 
-    ``key`` must say everything that the equations depend on, parameters' values included; the sources of this
-    package are added to it. ``trace()`` is only called when the cache does not know the key: otherwise there
-    is no tracing, no CasADi and no LLVM optimiser. Raises what ``trace`` and :func:`compile_system` raise.
+    ``key`` must cover everything that the equations depend on, including parameter values; the sources of
+    this package are added to it. ``trace()`` is only called if the key is not in the cache: otherwise neither
+    tracing nor CasADi nor the LLVM optimiser is used. Raises what ``trace`` and :func:`compile_system` raise.
     """
     if cache.folder() is None:
         return compile_system(trace())
@@ -71,7 +71,7 @@ def recall_system(key: str, trace: Callable[[], HybridSystem]) -> CompiledSystem
 
             return CompiledSystem(description, tape, trace)
         except (ValueError, KeyError, TypeError):
-            pass  # a record of another make is made anew
+            pass  # a record of another version is recomputed
     system = trace()
     tapes = {name: tape_of(function) for name, function in _functions(system).items()}
     description = _describe(system, tapes)
@@ -104,9 +104,9 @@ class CompiledSystem:
         self.guard_names: tuple[str, ...] = tuple(description["guard_names"])
         self.guard_actions: tuple[str, ...] = tuple(description["guard_actions"])
         self.called: tuple[str, ...] = tuple(description["called"])
-        """Blocks that Python works out at their ticks."""
+        """Blocks whose outputs Python computes at their ticks."""
         self.loops: tuple[tuple[str, ...], ...] = tuple(tuple(names) for names in description["loops"])
-        """The signals of each loop that is linear and solved where it stands."""
+        """The signals of each linear loop that is solved in place."""
         self.sizes = LoopSizes(
             states=self.states.size,
             discrete=self.discrete.size,

@@ -9,27 +9,27 @@ from armblocks.integration.rosenbrock_tableau import Tableau
 
 
 class Status(IntEnum):
-    """Why the native loop returned."""
+    """The status of the native loop when it returns."""
 
     DONE = 0
     PAUSED = 1
     """The asked number of steps is taken: call again."""
     STEP_TOO_SMALL = 2
-    """The error stays too large however short the step."""
+    """The error is too large even with the minimum step."""
     NON_FINITE = 3
-    """A derivative or state became NaN or infinite, however short the step (fixed step: in this step)."""
+    """A derivative or state became NaN or infinite, even with the minimum step (fixed step: in this step)."""
     NON_FINITE_START = 4
     """The derivative at the start of a segment is NaN or infinite."""
     ENDLESS_EVENTS = 5
-    """Events follow one another without end: at one instant, or at ever shorter distances."""
+    """Endless events: at one instant, or at ever shorter distances."""
     HISTORY_FULL = 6
-    """The history of delayed signals needs more room: give it, and call again."""
+    """The history of delayed signals needs more memory: enlarge it and call again."""
     STOPPED = 7
-    """A guard that ends the run is positive; what holds then is recorded."""
+    """A guard that ends the run is positive; the present values are recorded."""
     MINIMUM_STEP = 8
     """Steps so short that what changes in one is within the tolerance, and far more to come."""
     INCONSISTENT_MODES = 9
-    """No choice of the modes is consistent with the signals that follow from it."""
+    """No choice of the modes is consistent."""
 
 
 class Scalar(IntEnum):
@@ -46,7 +46,7 @@ class Scalar(IntEnum):
     BOUND = 6
     """The next step is not longer: steps begin short after an event and grow again."""
     LAST_EVENT = 7
-    """When the last event was, of whatever guard."""
+    """Time of the last event of any guard."""
     SPAN = 8
     """Events are told apart beside ``max(time, 1e-6 SPAN)``: about the length of the run."""
     SCAN = 9
@@ -66,7 +66,7 @@ class Count(IntEnum):
     """
 
     SAMPLE = 0
-    """The next sample instant to be written."""
+    """Index of the next sample to record."""
     SAMPLES = 1
     SEGMENT = 2
     SEGMENTS = 3
@@ -98,11 +98,11 @@ class Count(IntEnum):
     """0: the run keeps its method. Else it wants to be told where another one does better, and pauses
     there; 1 and the number of changes so far."""
     AT_START = 18
-    """Whether the run is at its start: its modes are still to be made consistent."""
+    """Whether the run is at its start, before the first mode iteration."""
     HISTORY_ROWS = 19
     """Rows of the history of delayed signals."""
     HISTORY_ROOM = 20
-    """Rows that there is room for."""
+    """Capacity in rows."""
     SHORT = 21
     """Checks that found a step short without need, less some for every check that did not."""
     CROWDED = 22
@@ -111,7 +111,7 @@ class Count(IntEnum):
 
 
 class Stage(IntEnum):
-    """What the loop does when it is entered."""
+    """The stage at which the loop is entered."""
 
     INSTANT = 0
     """Ticks and events at the time reached, then the start."""
@@ -132,7 +132,7 @@ class DelaySlots:
 
 @dataclass(frozen=True, kw_only=True)
 class LoopSizes:
-    """What of a system a loop is written for: lengths of its vectors, its clocks and guards.
+    """The properties of a system for which a loop is generated: lengths of vectors, clocks and guards.
 
     ``clocks`` are pairs of period and offset, s; ``directions`` those of the guards, ``stops`` the numbers of
     those that end the run where they are positive. ``captures``: whether ``update`` is also called just
@@ -160,12 +160,12 @@ class LoopSizes:
 
     @property
     def hybrid(self) -> bool:
-        """Whether there is more than a flow."""
+        """Whether the system has ticks, events, delays or implicit equations."""
         return bool(self.discrete or self.algebraic or self.delays or self.clocks or self.directions)
 
 
 class Workspace:
-    """Where each vector begins in the array of doubles.
+    """The position of each vector in the array of doubles.
 
     ``x`` the state of the last accepted step, ``y`` that at the end of the step being tried (and, before it,
     at each stage), ``slope(row)`` the stage derivatives; then what only hybrid systems have: ``z`` and ``w``

@@ -41,11 +41,11 @@ class Address(Value):
 
     @property
     def is_null(self) -> Boolean:
-        """Whether it points nowhere."""
+        """Whether it is the null address."""
         return self == Address(self.writer, Constant(Kind.ADDRESS, None))
 
     def after(self, offset: int) -> Address:
-        """The address so many bytes further."""
+        """The address plus an offset in bytes."""
         place = self.writer.locate(self.operand, Constant(Kind.INTEGER, offset), Kind.BYTE)
         return Address(self.writer, place)
 
@@ -75,10 +75,10 @@ class Address(Value):
 
 
 class Array(Value):
-    """Numbers of one kind that follow one another in memory, from an address on.
+    """A contiguous array of numbers of one type in memory.
 
-    The view begins ``first`` elements after its operand, so that a vector of a workspace costs no address of
-    its own until one of its elements is used.
+    The view begins ``first`` elements after its operand, so that a vector of a workspace needs no separate
+    address until one of its elements is used.
     """
 
     __slots__ = ("first",)
@@ -157,12 +157,12 @@ class Integers(Array):
         return Integers(self.writer, self.address(index))
 
     def fetch_add(self, index: Integer | int, value: Integer | int) -> Integer:
-        """Add to an element that other threads write too, in one step; gives what it was before."""
+        """Add atomically to an element; returns the previous value."""
         before = self.writer.fetch_add(integer_operand(value), self.address(index))
         return Integer(self.writer, before)
 
     def acquire(self, index: Integer | int) -> Integer:
-        """Read an element that other threads write; all that they wrote before it is seen from here on."""
+        """Read an element that other threads write, with acquire ordering."""
         return Integer(self.writer, self.writer.load(self.address(index), Kind.INTEGER, acquiring=True))
 
 
@@ -202,7 +202,7 @@ class NumberVariable(Variable, Generic[NumberT]):
 
     @property
     def value(self) -> NumberT:
-        """The value that was written last."""
+        """The present value."""
         return self.number(self.writer, self.writer.load(self.local, self.number.kind))
 
     @value.setter
@@ -228,7 +228,7 @@ class IntegerVariable(Variable):
 
     @property
     def value(self) -> Integer:
-        """The value that was written last."""
+        """The present value."""
         return Integer(self.writer, self.writer.load(self.local, Kind.INTEGER))
 
     @value.setter
@@ -243,7 +243,7 @@ class BooleanVariable(Variable):
 
     @property
     def value(self) -> Boolean:
-        """The value that was written last."""
+        """The present value."""
         return Boolean(self.writer, self.writer.load(self.local, Kind.BOOLEAN))
 
     @value.setter
@@ -258,7 +258,7 @@ class AddressVariable(Variable):
 
     @property
     def value(self) -> Address:
-        """The value that was written last."""
+        """The present value."""
         return Address(self.writer, self.writer.load(self.local, Kind.ADDRESS))
 
     @value.setter

@@ -3,7 +3,7 @@
 A function is a tree of statements: operations in their order, conditional parts, and regions that may be left
 or repeated. :class:`~armblocks.routines.Routine` builds the tree; a back end such as
 :mod:`armblocks.routines.llvm` turns it into text. A value that differs between two paths lives in a
-:class:`Local`, so nothing merges where paths meet.
+:class:`Local`, so the tree needs no phi nodes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from enum import Enum
 
 
 class Kind(Enum):
-    """Type of a value; what an ``ADDRESS`` points to is said by the operation that uses it."""
+    """Type of a value. The operation that uses an ``ADDRESS`` determines the type of its target."""
 
     REAL = "real"
     """An IEEE double."""
@@ -24,15 +24,15 @@ class Kind(Enum):
     INT32 = "int32"
     """A 32-bit signed integer: in memory, and between functions."""
     BYTE = "byte"
-    """In memory alone: addresses count by bytes."""
+    """A byte, in memory only."""
     LANES = "lanes"
-    """A double in each lane: so many as the program has."""
+    """A double in each lane of the program."""
     MASK = "mask"
     """A condition in each lane."""
 
 
 class Operation(Enum):
-    """An operation without side effects. Real operations round once, to nearest, in every lane alike."""
+    """An operation without side effects. Real operations round once, to nearest, in every lane."""
 
     ADD = "add"
     SUBTRACT = "subtract"
@@ -72,7 +72,7 @@ class Operation(Enum):
     TO_REAL = "to real"
     """An integer as a double."""
     TO_INTEGER = "to integer"
-    """A double cut to an integer, a 32-bit integer, a Boolean as 0 or 1."""
+    """A double truncated to an integer, a 32-bit integer as an integer, a Boolean as 0 or 1."""
     TO_INT32 = "to int32"
     """The lower half of an integer."""
     BITS = "bits"
@@ -91,7 +91,7 @@ class Temporary:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Local:
-    """A variable of a function, or so many one after the other; as an operand it is their address."""
+    """A variable of a function, or an array of variables; as an operand it is the address."""
 
     kind: Kind
     count: int = 1
@@ -107,9 +107,9 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Constants of the program under a symbol; as an operand it is their address.
+    """Constants of the program under a symbol; as an operand it is the address.
 
-    ``filled_in``: not constants, but values that whoever loads the program writes there.
+    ``filled_in``: values that are written when the program is loaded, instead of constants.
     """
 
     symbol: str
@@ -144,7 +144,7 @@ class Locate:
 class Load:
     """``result`` is the number at an address.
 
-    ``acquiring``: other threads write it, and what they wrote before is seen from here on.
+    ``acquiring``: a load with acquire ordering, of a value that other threads write.
     """
 
     result: Temporary
@@ -162,9 +162,9 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class FetchAdd:
-    """Add to an integer that other threads write too, in one step; ``result`` is what it was before.
+    """Atomic addition to an integer; ``result`` is the previous value.
 
-    What stands before it in one thread is seen by the threads that come to it later.
+    It has acquire-release ordering.
     """
 
     result: Temporary
@@ -174,7 +174,7 @@ class FetchAdd:
 
 @dataclass(frozen=True, slots=True)
 class Copy:
-    """Copy so many bytes from one address to another; the two do not overlap."""
+    """Copy bytes between two addresses; the regions do not overlap."""
 
     source: Operand
     target: Operand
@@ -183,7 +183,7 @@ class Copy:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Call a function of the program, one that the program only names, or the one at an address."""
+    """Call a function of the program, an external function, or a function at an address."""
 
     results: tuple[Temporary, ...]
     function: str | Operand
@@ -199,25 +199,26 @@ class Return:
 
 @dataclass(slots=True, eq=False)
 class Mark:
-    """A place of the tree that a :class:`Jump` can go to: the start or the end of a region, or a stage."""
+    """A target of a :class:`Jump`: the start or the end of a region, or a stage."""
 
     name: str
     open: bool = False
-    """Whether statements that are written now may jump to it."""
+    """Whether statements at the present position may jump to it."""
     used: bool = False
     """Whether a statement jumps to it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """Go on at a mark of a region around this statement."""
+    """Jump to a mark of an enclosing region."""
 
     mark: Mark
 
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """Run one of two parts, either of which may be empty. ``rarely``: the condition hardly ever holds."""
+    """Run one of two parts, either of which may be empty. ``rarely``: a hint that the condition seldom
+    holds."""
 
     condition: Operand
     yes: list[Statement]
@@ -227,7 +228,8 @@ class When:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Statements whose start and end are marks. The end of the body goes on behind the region."""
+    """Statements with marks at their start and end. After the end of the body, execution continues after the
+    region."""
 
     body: list[Statement]
     start: Mark
@@ -236,8 +238,8 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """A mark between the statements of a region: jumps of the same region go here, and so does what stands
-    before it."""
+    """A mark between the statements of a region: a target of jumps in the region; execution also falls
+    through to it."""
 
     mark: Mark
 
@@ -249,7 +251,7 @@ Statement = Compute | Locate | Load | Store | FetchAdd | Copy | Call | Return | 
 class Function:
     """One function.
 
-    ``public``: its address is asked for from outside. ``inlined``: whether it is written into its callers;
+    ``public``: it is called from outside. ``inlined``: whether it is inlined into its callers;
     ``None`` leaves that to the back end. ``distinct``: its addresses never point to the same numbers.
     """
 

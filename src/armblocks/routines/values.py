@@ -1,9 +1,9 @@
 """Typed values of a routine: numbers and conditions with operators.
 
-Each operation appends a statement to the routine that the value belongs to, at the place where Python
-evaluates it. Python numbers stand for constants. The types are those of the routine: a type checker tells a
-double from an integer and both from an array (:mod:`armblocks.routines.memory`). Python's ``if`` refuses a
-:class:`Boolean`, whose value is not known yet.
+Each operation appends a statement to the routine that the value belongs to, at the position where Python
+evaluates it. Python numbers are constants. The types are those of the routine: a type checker tells a double
+from an integer and both from an array (:mod:`armblocks.routines.memory`). Python's ``if`` raises an error for
+a :class:`Boolean`, because its value is not known yet.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from armblocks.routines.tree import (
 
 
 class Writer:
-    """Where statements are appended; ``statements`` is the part of the tree that is being written."""
+    """The present position for new statements; ``statements`` is the present part of the tree."""
 
     def __init__(self) -> None:
         self.statements: list[Statement] = []
@@ -44,7 +44,7 @@ class Writer:
         return result
 
     def fetch_add(self, value: Operand, address: Operand) -> Temporary:
-        """Append an addition that other threads see in one step; gives what was there before."""
+        """Append an atomic addition; returns the previous value."""
         result = Temporary(Kind.INTEGER)
         self.statements.append(FetchAdd(result, address, value))
         return result
@@ -61,7 +61,7 @@ class Writer:
 
 
 class Value:
-    """A value of a routine, at the place where it was computed."""
+    """A value of a routine."""
 
     __slots__ = ("operand", "writer")
     kind: ClassVar[Kind]
@@ -99,7 +99,7 @@ class Condition(Value):
 
 
 class Boolean(Condition):
-    """A condition: it decides what a routine does."""
+    """A condition of a routine, for branches."""
 
     __slots__ = ()
     kind = Kind.BOOLEAN
@@ -118,7 +118,7 @@ class Number(Value, Generic[ConditionT]):
 
     __slots__ = ()
     condition: ClassVar[type[Condition]]
-    """What comparisons give."""
+    """The type of comparisons."""
 
     def __add__(self, other: Self | float) -> Self:
         return self.compute(Operation.ADD, self, other)
@@ -186,7 +186,7 @@ class Number(Value, Generic[ConditionT]):
 
     @classmethod
     def constant(cls, writer: Writer, value: float) -> Self:
-        """A constant, for where a Python number does not do."""
+        """A constant, where a Python number is not possible."""
         return cls(writer, Constant(cls.kind, float(value)))
 
     @classmethod
@@ -209,7 +209,7 @@ class Real(Number[Boolean]):
     kind, condition = Kind.REAL, Boolean
 
     def to_integer(self) -> Integer:
-        """Cut to an integer, which must be within 64 bits."""
+        """Truncate to an integer, which must fit into 64 bits."""
         return Integer(self.writer, self.writer.compute(Kind.INTEGER, Operation.TO_INTEGER, self.operand))
 
     def bits(self) -> Integer:
@@ -218,8 +218,8 @@ class Real(Number[Boolean]):
 
 
 class Integer(Value):
-    """A 64-bit signed integer. Sums and products wrap around; ``//`` cuts toward zero, and ``>>`` keeps the
-    sign."""
+    """A 64-bit signed integer. Sums and products wrap around; ``//`` truncates toward zero, and ``>>`` keeps
+    the sign."""
 
     __slots__ = ()
     kind = Kind.INTEGER
@@ -258,11 +258,11 @@ class Integer(Value):
         return self._integer(Operation.SHIFT_RIGHT, self, places)
 
     def unsigned_quotient(self, divisor: Integer | int) -> Integer:
-        """The quotient where both are read as numbers without a sign."""
+        """The unsigned quotient."""
         return self._integer(Operation.DIVIDE_UNSIGNED, self, divisor)
 
     def unsigned_remainder(self, divisor: Integer | int) -> Integer:
-        """What is left over by :meth:`unsigned_quotient`."""
+        """The remainder of :meth:`unsigned_quotient`."""
         return self._integer(Operation.REMAINDER_UNSIGNED, self, divisor)
 
     def __lt__(self, other: Integer | int) -> Boolean:

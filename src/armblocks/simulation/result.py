@@ -19,9 +19,9 @@ class SimulationResult(RunData):
 
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
     ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
-    its end where there were ``parameter_changes``; ``final_state`` what a run needs to go
-    on from here, ``None`` where it failed. Of a run that was logged to a file it holds the rows that show all
-    extremes of the logged signals; the rest is in ``log``.
+    its end where there were ``parameter_changes``; ``final_state`` the state from which another run
+    continues, ``None`` for a failed run. For a run with a log file, the result has a selection of rows with
+    all extremes of the logged signals; ``log`` has the path of the file.
     """
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -29,7 +29,7 @@ class SimulationResult(RunData):
         return to_dataframe(self)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a file by its suffix: ``.csv``, ``.parquet``, ``.npz`` or ``.mat``; all of it or nothing.
+        """Write a file by its suffix: ``.csv``, ``.parquet``, ``.npz`` or ``.mat``; atomically.
 
         Raises ``UnknownNameError`` for another suffix and ``FormatError`` where the file cannot be written.
         """

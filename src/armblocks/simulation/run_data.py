@@ -36,15 +36,14 @@ def signal_path(name: str, layout: Signature, aliases: Mapping[str, str], where:
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """How a run went.
+    """The statistics of a run.
 
-    ``solver`` the integrator's name, ``"none"`` where there was nothing to integrate; ``reason`` why it was
-    taken. ``steps`` accepted, ``rejected`` thrown away, ``evaluations`` of the derivative. ``ticks``:
-    instants at which a clock ticked; ``events``: guards that fired. ``calls`` of Python functions at their
-    ticks, and the ``call_time`` s spent in them. ``preparation_time`` s for the native
-    code to be compiled or loaded, next to nothing when it is there; ``wall_time`` s of the run itself;
-    ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop time was reached;
-    ``message``: what a person should know (why it stopped, stiffness), else empty.
+    ``solver`` the integrator's name, ``"none"`` without integration; ``reason`` of its choice. ``steps``
+    accepted, ``rejected`` steps, ``evaluations`` of the derivative. ``ticks``: instants at which a clock
+    ticked; ``events``: guards that fired. ``calls`` of Python functions at their ticks, and the ``call_time``
+    s spent in them. ``preparation_time`` s for the native code to be compiled or loaded; ``wall_time`` s of
+    the run itself; ``real_time_factor`` simulated seconds per second of it. ``complete``: whether the stop
+    time was reached; ``message``: remarks for the user (reason of the end, stiffness), else empty.
     """
 
     solver: str
@@ -73,7 +72,7 @@ class ParameterChange:
 
 @dataclass(frozen=True, kw_only=True)
 class LoggedFile:
-    """The file that holds all ``rows`` of a run of which the result shows only some."""
+    """The log file with all ``rows`` of a run, of which the result has a selection."""
 
     path: Path
     rows: int
@@ -85,9 +84,9 @@ class RunData:
 
     ``time`` ``(N,)`` s; ``signals_layout`` the names, shapes and units of the ``ny`` rows of ``signals``
     ``(ny, N)``; ``states`` ``(N, nx)`` by ``states_layout``; ``parameters`` the values that the run used, at
-    its end where there were ``parameter_changes``; ``final_state`` what a run needs to go
-    on from here, ``None`` where it failed. Of a run that was logged to a file it holds the rows that show all
-    extremes of the logged signals; the rest is in ``log``.
+    its end where there were ``parameter_changes``; ``final_state`` the state from which another run
+    continues, ``None`` for a failed run. For a run with a log file, the result has a selection of rows with
+    all extremes of the logged signals; ``log`` has the path of the file.
     """
 
     name: str

@@ -33,15 +33,16 @@ from armblocks.simulation.stretch import Stretch, first_window
 Array = NDArray[np.float64]
 
 CHUNK_SECONDS = 0.04
-"""Wall time between two looks at Ctrl-C and the clock, roughly."""
+"""Approximate wall time between two checks of Ctrl-C and the clock."""
 
 
 class Simulation:
     """One run in progress, from 0 or an ``initial_state`` to ``options.stop_time``.
 
-    :meth:`advance` goes on, :meth:`samples` gives what is recorded so far, :meth:`set` changes tunable
-    parameters from here on without compiling anything, :meth:`state` is what another run can start from,
-    :meth:`result` ends it. However a run is cut into calls of :meth:`advance`, its numbers are the same bits.
+    :meth:`advance` continues the run, :meth:`samples` returns the recorded samples, :meth:`set` changes
+    tunable parameters from the present time on without compiling, :meth:`state` is a state from which another
+    run can start, and :meth:`result` ends the run. Results do not depend on the division into calls of
+    :meth:`advance`.
 
     Raises what :func:`~armblocks.simulation.simulate` raises for options and parameters that cannot be run.
     """
@@ -58,7 +59,7 @@ class Simulation:
     ) -> None:
         if {function.block for function in calls} != set(compiled.called):
             raise InputError(
-                f"nothing says what Python calls for {', '.join(map(repr, compiled.called))}",
+                f"no function is given for the blocks {', '.join(map(repr, compiled.called))}",
                 where=compiled.name,
                 allowed="one CalledFunction for each block that is called",
                 fix="run the diagram itself, by armblocks.simulate or armblocks.begin",
@@ -83,7 +84,7 @@ class Simulation:
         self._chunk = 1000
         self._spent = 0.0
 
-    # Where the run stands.
+    # Present state.
 
     @property
     def stop_time(self) -> float:
@@ -97,19 +98,19 @@ class Simulation:
 
     @property
     def finished(self) -> bool:
-        """Whether nothing is left to do: complete, stopped or failed."""
+        """Whether the run has ended: complete, stopped or failed."""
         if self._stopped or self._failure is not None:
             return True
         return bool(self._stretches) and not self._changed and self._stretches[-1].status is not Status.PAUSED
 
     @property
     def recorded(self) -> int:
-        """How many instants are recorded so far."""
+        """The number of samples recorded so far."""
         return self._recording.recorded
 
     @property
     def planned(self) -> int:
-        """How many instants the whole run records, if nothing ends it early."""
+        """The number of samples of the whole run, unless it ends early."""
         return self._plan.instants.count
 
     @property
@@ -119,10 +120,10 @@ class Simulation:
 
     @property
     def parameters(self) -> Mapping[str, Array]:
-        """The tunable parameters as they are now."""
+        """The present values of the tunable parameters."""
         return self.compiled.parameters.unpack(self._p)
 
-    # Going on.
+    # Advancing.
 
     def advance(
         self,
@@ -132,11 +133,13 @@ class Simulation:
         wall_time: float | None = None,
         exactly: bool = False,
     ) -> None:
-        """Go on until the time ``until`` (s) is reached, for a number of ``steps``, for a ``wall_time`` (s).
+        """Continue until the time ``until`` (s) is reached, for a number of ``steps``, for a ``wall_time``
+        (s).
 
-        Whatever comes first; without any of them, to the end. A step is never cut short, so the time reached
-        may be later than ``until`` by a part of a step; what is recorded until then is the same as without
-        the pause. ``exactly`` ends a step at ``until`` and starts anew there, as at a jump of a source.
+        The first of these limits applies; without limits the run continues to its end. Steps are not
+        shortened, so the reached time may exceed ``until`` by part of a step; the samples are the same as
+        without the pause. ``exactly`` ends a step at ``until`` and starts anew there, as at a jump of a
+        source.
 
         Raises ``SimulationError``, with all that is good so far as its ``partial``, where the run cannot go
         on. Ctrl-C leaves by ``KeyboardInterrupt``; nothing is lost, and the run can go on.
@@ -158,7 +161,7 @@ class Simulation:
             self._fail(failure)
 
     def _take(self, stretch: Stretch, steps: int | None, pause: float, deadline: float) -> None:
-        """Take steps, a chunk at a time, until one of three things comes: their number, a time, a moment."""
+        """Take steps in chunks until one of three limits: number of steps, simulated time, wall time."""
         left = np.inf if steps is None else max(0, steps)
         budget = deadline - perf_counter()
         while stretch.status is Status.PAUSED and left >= 1:
@@ -182,7 +185,7 @@ class Simulation:
                 break
 
     def _look_at_end(self, stretch: Stretch) -> None:
-        """Say which block has ended the run. Raises ``SimulationError`` where it cannot go on."""
+        """Report the block that ended the run. Raises ``SimulationError`` for a failed run."""
         integration = stretch.integration
         if integration is None or stretch.status in (Status.PAUSED, Status.DONE):
             return
@@ -201,7 +204,7 @@ class Simulation:
         return max(1, min(self._chunk, int(stretch.window // 2 * max(1, stretch.taken) / recorded)))
 
     def set(self, parameters: Mapping[str, ArrayLike]) -> None:
-        """Give tunable parameters, ``block.parameter``, other values from the time reached on.
+        """Change tunable parameters, ``block.parameter``, from the present time on.
 
         Nothing is compiled. The run starts anew from its values there, exactly as another run would from
         its :meth:`state`, with the breakpoints that follow from the new values.
@@ -227,19 +230,19 @@ class Simulation:
             self._changes += (ParameterChange(time=self.time, values=values),)
 
     def stop(self, message: str) -> None:
-        """End the run where it stands; ``message`` says why in its report."""
+        """End the run at the present time; ``message`` is the reason for its report."""
         if not self.finished:
             self._stopped = True
             self._message = message
 
-    # What there is.
+    # Results.
 
     def samples(self, begin: int = 0) -> Samples:
         """Signals at the recorded instants from number ``begin`` on."""
         return self._recording.samples(begin)
 
     def state(self) -> RunState:
-        """What a run needs to go on from where this one stands."""
+        """The present state, from which another run can continue."""
         compiled = self.compiled
         integration = self._stretches[-1].integration if self._stretches else None
         checkpoint = None
@@ -263,7 +266,7 @@ class Simulation:
         )
 
     def result(self) -> SimulationResult:
-        """All that is recorded so far, and how the run went.
+        """The samples recorded so far, with the statistics of the run.
 
         Raises ``SimulationError``, with the good part as its ``partial``, where a signal is not finite.
         """
@@ -284,7 +287,7 @@ class Simulation:
         return self._recording.stretches
 
     def _current(self) -> Stretch:
-        """The stretch that goes on: made at the start, and after a change of parameters."""
+        """The present stretch, created at the start and after a change of parameters."""
         if self._stretches and not self._changed:
             return self._stretches[-1]
         instants, begin, window = self._plan.instants, self.recorded, self._recording.window
@@ -302,13 +305,13 @@ class Simulation:
             self._fail(failure)
 
     def _fail(self, failure: SimulationError) -> NoReturn:
-        """Raise with what is good so far: a signal that was not finite before is what went wrong first."""
+        """Raise the error with the valid samples; an earlier non-finite signal is the first cause."""
         self._result(failure)
         assert self._failure is not None
         raise self._failure
 
     def _result(self, failure: SimulationError | None) -> SimulationResult:
-        """What there is; ``_failure`` is what went wrong, with the result as its ``partial``."""
+        """The present result; ``_failure`` is the error, with the result as its ``partial``."""
         began = perf_counter()
         good, compiled = self._recording.good(), self.compiled
         integrations = self._recording.integrations
@@ -344,7 +347,7 @@ class Simulation:
         return result
 
     def _report(self, reached: float) -> RunReport:
-        """How the run went until the time ``reached``, s."""
+        """The statistics of the run until the time ``reached``, s."""
         runs, method, calls = self._recording.integrations, self._method, self._calls
         costs = "" if calls is None else calls.told(self._spent)
         return RunReport(

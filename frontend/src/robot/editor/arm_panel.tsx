@@ -6,7 +6,7 @@ import { fitting, type RobotScene } from '../scene'
 import { Stage } from '../stage'
 import { useDesk } from './desk'
 
-/** The robot of the editor as its tables say it and its sliders hold it. */
+/** The robot of the editor, at the joint positions of its sliders. */
 export default function ArmPanel() {
   const current = useDesk((s) => s.current)
   const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))

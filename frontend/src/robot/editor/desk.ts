@@ -10,7 +10,7 @@ export interface OpenRobot extends RobotContent {
 }
 export type Angles = 'deg' | 'rad'
 
-/** How the joints of a robot stand and move on the page: rad, m and per second. */
+/** Positions, speeds and accelerations of the joints on the page: rad, m and per second. */
 export interface Joints {
   q: number[]
   qd: number[]

@@ -6,7 +6,7 @@ import { atRest, cellText, setJoints, useDesk, type Joints } from './desk'
 const WHOLE_TURN = Math.PI
 const WITHOUT_RANGE = 1
 
-/** The three things that a joint may be given: where it stands, how fast, how much faster. */
+/** The quantities of a joint: position, speed, acceleration. */
 const KINDS = [
   { value: 'q', label: 'q' },
   { value: 'qd', label: 'qd' },

@@ -3,7 +3,10 @@ import { shortNumber, useDesk } from './desk'
 
 const ROWS = ['vx', 'vy', 'vz', 'ωx', 'ωy', 'ωz']
 
-/** What the arm does as it stands: pose of the tool, Jacobian, torques, all worked out by the server. */
+/**
+ * The read-outs of the arm in its present configuration, computed by the server: pose of the tool,
+ * Jacobian, torques.
+ */
 export function ReadingsPanel() {
   const shown = useDesk((s) => (s.current ? s.robots[s.current] : undefined))
   const readings = useDesk((s) => s.readings)

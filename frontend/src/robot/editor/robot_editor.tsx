@@ -343,7 +343,7 @@ function Convention({ shown }: { shown: OpenRobot }) {
   )
 }
 
-/** What was said while the file was read. */
+/** The notes from reading the file. */
 function Notes() {
   const notes = useDesk((s) => s.notes)
   if (!notes.length) return null

@@ -2,7 +2,7 @@ import type { CellColumn } from '../../protocol'
 import { unitOf, useDesk, type OpenRobot } from './desk'
 import { Cell } from './table'
 
-/** What there is once of a robot: its name, base, tool, gravity and friction. */
+/** The properties of the whole robot: name, base, tool, gravity and friction. */
 export function RobotFields({ shown, columns }: { shown: OpenRobot; columns: CellColumn[] }) {
   const angles = useDesk((s) => s.angles)
   const groups = [...new Set(columns.map(({ group }) => group))]

@@ -10,7 +10,7 @@ interface Fault {
   fix: string
 }
 
-/** One of the two tables: a row for each link, a column for each thing that can be typed. */
+/** One of the two tables: a row for each link, a column for each editable value. */
 export function LinkTable({
   shown,
   columns,
@@ -164,7 +164,7 @@ interface CellProps {
   finding?: RobotFinding | undefined
 }
 
-/** One cell: typing changes the arm at once, and what cannot be is said here. */
+/** One cell: typing changes the arm at once, and errors are shown here. */
 export const Cell = memo(function Cell({
   owner,
   turns,
@@ -221,7 +221,7 @@ interface TextCellProps {
   send: (text: string, gesture: string) => Promise<Fault | undefined>
   marked?: Fault | undefined
   wide?: boolean
-  /** Send once, when the cell is left: where half a text would mean something else. */
+  /** Send once, when the cell is left, because a partial text would have another meaning. */
   onlyAtTheEnd?: boolean
 }
 

@@ -1,5 +1,4 @@
-"""What an arm does in one configuration, for the read-outs beside its sliders: numbers, and singularities in
-words."""
+"""Read-outs of an arm in one configuration: numbers, and descriptions of singularities."""
 
 from __future__ import annotations
 
@@ -16,15 +15,15 @@ from armblocks.spatial import Transform
 from armblocks.studio.protocol.messages.robots import Readings
 
 SINGULAR = 1e-6
-"""Of the least singular value against the greatest: below it the arm is singular but for rounding."""
+"""Ratio of the least to the greatest singular value below which the arm counts as singular."""
 NEARLY = 0.02
-"""Below it speeds of joints become fifty times those of the tool, and more."""
+"""Ratio below which joint speeds exceed fifty times the tool speed."""
 _PART = 0.1
-"""What a joint or a direction must have of the greatest entry to be named."""
+"""Fraction of the greatest entry from which on a joint or a direction is named."""
 
 
 def readings(arm: Arm, q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Readings:
-    """Everything that is read off at ``q, qd, qdd`` (rad, m and per second), by the compiled kernels."""
+    """All read-outs at ``q, qd, qdd`` (rad, m and per second), from the compiled kernels."""
     for name, values in (("q", q), ("qd", qd), ("qdd", qdd)):
         _check_count(arm.robot, name, values)
     T, J = arm.fkine(q), arm.jacob0(q)
@@ -53,11 +52,11 @@ def _check_count(robot: Robot, name: str, values: Sequence[float]) -> None:
 
 
 def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) -> str:
-    """What the arm cannot do in a singular configuration, in words; ``""`` where nothing is lost.
+    """A description of the lost motion in a singular configuration; ``""`` if it is regular.
 
     ``J`` (6, n) as of ``jacob0``. Its linear rows are divided by ``length`` (m, the arm's reach), so that
-    metres and radians can be compared. Where joints can move and the tool stays, they are named; else the
-    direction that is lost.
+    metres and radians can be compared. It names the joints that can move without motion of the tool, or else
+    the lost direction.
     """
     scaled = J.copy()
     scaled[:3] /= length
@@ -79,7 +78,7 @@ def singularity(J: NDArray[np.float64], joints: Sequence[str], length: float) ->
 
 
 def _direction(lost: NDArray[np.float64]) -> str:
-    """The motion of the tool that is lost, in world axes."""
+    """The lost motion of the tool, in world axes."""
     linear, angular = lost[:3], lost[3:]
     slides = float(np.linalg.norm(linear)) >= float(np.linalg.norm(angular))
     way = linear if slides else angular
@@ -93,7 +92,7 @@ def _direction(lost: NDArray[np.float64]) -> str:
 
 
 def limit_words(robot: Robot, q: Sequence[float], qd: Sequence[float], tau: NDArray[np.float64]) -> list[str]:
-    """Which joints stand outside of their range, or move or pull harder than they may."""
+    """The joints outside their range, or beyond their speed or torque limits."""
     found: list[str] = []
     for link, position, speed, torque in zip(robot.moving_links, q, qd, tau.tolist()):
         limits = link.joint.limits
