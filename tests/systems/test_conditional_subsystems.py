@@ -207,6 +207,15 @@ def test_a_division_by_zero_in_a_subsystem_that_is_off_disturbs_nobody() -> None
     assert np.isfinite(result["sub/root"]).all()
     assert result["sub/y"][-1] == pytest.approx((1 - 0.1**1.5) / 1.5, rel=1e-6)
 
+    diagram = around(
+        TriggeredSubsystem,
+        lambda inner: inner.output("y", inner.add("inverse", Expression(formula="1 / u"), inner.input("u"))),
+        lambda builder: {"trigger": builder.add("when", Step(time=0.5))},
+    )
+    result = ab.simulate(diagram, stop_time=1.0)
+    assert np.isfinite(result["sub/inverse"]).all()
+    assert result["sub/y"][-1] == 2.0
+
 
 def test_conditional_subsystems_inside_each_other() -> None:
     """The inner one works where both are enabled: sin(pi t) > 0 and t > 2.5."""

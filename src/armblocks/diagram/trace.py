@@ -25,7 +25,7 @@ from armblocks.diagram.block_equations import (
     SlotKind,
     spread,
 )
-from armblocks.diagram.conditional_equations import ON
+from armblocks.diagram.conditional_equations import FIRE, ON
 from armblocks.diagram.diagram import Diagram
 from armblocks.diagram.hierarchy import FlatForm, flatten_hierarchy
 from armblocks.diagram.implicit import solve_affine
@@ -208,12 +208,13 @@ def _breakpoints(diagram: Diagram, symbols: Symbols) -> list[SX]:
 
 
 def _recorded(diagram: Diagram, flow: Tracing, value: Value) -> SX:
-    """The recorded value of a signal: a non-finite value in an inactive subsystem is replaced by 0."""
-    worked_out = flow.value(value)
-    if ON not in diagram.gates.get(value.node.block, {}):
-        return worked_out
-    on = flow.value(flow.network.input(value.node.block, ON))
-    return if_else(logic_or(on, fabs(worked_out) <= sys.float_info.max), worked_out, 0.0)
+    """The recorded value of a signal; non-finite ones in a subsystem that does not work are recorded as 0."""
+    worked_out, gate = flow.value(value), diagram.gates.get(value.node.block, {})
+    for control in (ON, FIRE):
+        if control in gate:
+            works = flow.value(flow.network.input(value.node.block, control))
+            worked_out = if_else(logic_or(works, fabs(worked_out) <= sys.float_info.max), worked_out, 0.0)
+    return worked_out
 
 
 def _same(network: Network, value: Value) -> Value:
