@@ -39,7 +39,7 @@ SEED = int(LONG) if LONG.isdigit() else 1
 CASES = [(kind, place) for kind in sorted(BLOCKS) for place in PLACES] if LONG else SHORT
 REFUSED = (
     "is a table that is read by index",
-    "acts by comparisons or by its whole part only",
+    "acts only through comparisons or its integer part",
     "at the start moves with the parameter",
     "are in one diagram",
     "calls Python, which has no derivatives",

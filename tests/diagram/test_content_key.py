@@ -35,7 +35,7 @@ from worked_examples import worked_example
 
 
 def line(*blocks: Block) -> Diagram:
-    """Blocks one behind the other, after a constant."""
+    """A chain of blocks after a constant."""
     builder = ab.DiagramBuilder("line")
     last = builder.add("start", Constant(value=1.0))
     for k, block in enumerate(blocks):
@@ -211,7 +211,7 @@ def test_the_code_of_a_function_and_all_it_names_are_in_the_key(monkeypatch: pyt
 
 
 class Law:
-    """Something whose content nobody can list."""
+    """An object whose content cannot be listed."""
 
     factor = 2.0
 

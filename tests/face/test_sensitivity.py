@@ -338,7 +338,9 @@ def test_a_source_that_a_parameter_moves_and_an_implicit_equation_together_are_r
     total = builder.add("sum", Sum(signs="+-"), builder.add("step", Step()))
     builder.connect(builder.add("cube", Expression(formula="u^3"), total), total["u2"])
     builder.add("x", Integrator(), total)
-    with pytest.raises(InputError, match=r"the parameter that says when a signal jumps and the implicit equ"):
+    with pytest.raises(
+        InputError, match=r"the parameter that determines when a signal jumps and the implicit equ"
+    ):
         ab.sensitivity(builder.build(), "step.time", "x")
 
 
@@ -367,7 +369,7 @@ def test_by_the_speed_of_a_mass_that_rests_is_refused() -> None:
 def test_a_seed_is_refused() -> None:
     builder = ab.DiagramBuilder("noise")
     builder.add("x", Integrator(), builder.add("noise", RandomNumber(sample_time=0.1)))
-    with pytest.raises(InputError, match=r"'noise.seed' acts by comparisons or by its whole part only"):
+    with pytest.raises(InputError, match=r"'noise.seed' acts only through comparisons or its integer part"):
         ab.sensitivity(builder.build(), "noise.seed", "x")
 
 

@@ -1,4 +1,4 @@
-"""``import armblocks`` brings nothing heavy with it, and neither does asking the command line for help."""
+"""``import armblocks`` and the command line's help load no heavy library."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ HEAVY = {"scipy", "matplotlib", "pandas", "pyarrow", "llvmlite", "starlette", "n
 
 
 def loaded_by(statement: str) -> set[str]:
-    """Names of the modules that a new process holds after the statement."""
+    """Names of the modules that a new process has loaded after the statement."""
     script = f"{statement}\nimport sys, json\nprint(json.dumps(sorted(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     return set(json.loads(done.stdout))

@@ -21,7 +21,7 @@ OWN = {
     "MissingLibraryError": {"where", "fix"},  # says what it is needed for, and how to install it
     "AlgebraicLoopError": {"where", "fix"},  # the loop itself is the place
 }
-"""What an error says by itself."""
+"""Errors whose class itself supplies the help."""
 PLACE_IS_ADDED = ("blocks/", "diagram/shape_rules.py")
 """A block does not know its own name: shapes are checked by ``diagram.shapes``, equations by
 ``diagram.model``, calls by ``simulation.calls``, which add the block's path."""
@@ -60,7 +60,7 @@ def test_every_error_says_where_and_what_to_do() -> None:
         for place, kind, call in found
         if (m := lacking(place, kind, call))
     ]
-    assert silent == [], f"{len(silent)} errors leave their reader alone:\n" + "\n".join(silent)
+    assert silent == [], f"{len(silent)} errors give no help:\n" + "\n".join(silent)
 
 
 def test_the_check_sees_what_is_missing() -> None:

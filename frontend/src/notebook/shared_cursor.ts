@@ -3,8 +3,8 @@ import { useCursor } from '../run/cursor'
 const REST_MS = 150
 
 /**
- * One time cursor for all views of a result, wherever in the notebook they stand: they tell each other,
- * without a kernel. `onRest` gets the instant when the cursor has come to rest.
+ * One time cursor for all views of a result in the notebook. The views exchange its time without a kernel.
+ * `onRest` gets the instant after the cursor has stopped moving.
  */
 export function shareCursor(onRest: (time: number) => void) {
   let channel: BroadcastChannel | null = null

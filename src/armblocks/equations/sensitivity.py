@@ -27,12 +27,13 @@ from armblocks.equations.traced_function import TracedFunction
 from armblocks.errors import InputError
 
 MIXED = OWN + "mixed"
-"""A discrete variable (2,): when instants of different derivatives came together first (s; -1: never), and
-the number of one of the guards there, from 1."""
+"""A discrete variable (2,): the first time at which events with different time derivatives coincided (s; -1:
+never), and the number of one of their guards, from 1."""
 
 
 def parameters_read_by_index(system: HybridSystem) -> frozenset[str]:
-    """The parameters that are long tables: no derivative by their entries is known (``table_reading``)."""
+    """The parameters that are long tables, for whose entries derivatives are not available
+    (``table_reading``)."""
     functions = (system.derivative, system.signals, system.residual, system.update, system.guards)
     tables = {
         (place, place + count)
@@ -54,8 +55,8 @@ def sensitivity_system(
     """The system with the derivatives of ``outputs`` (paths of signals) by ``parameters`` (paths) as signals.
 
     Raises ``UnknownNameError`` for names, ``InputError`` for a parameter that is a table that is read by
-    index, that acts by its whole part only, or that moves an event at the start; and for implicit equations
-    together with delays or with a parameter that says when a signal jumps.
+    index, that acts only through its integer part, or that moves an event at the start; and for implicit
+    equations together with delays or with a parameter that determines when a signal jumps.
     """
     refuse_called(system, "derivatives")
     _refuse_tables(system, parameters)
@@ -70,15 +71,15 @@ def _refuse_tables(system: HybridSystem, parameters: Sequence[str]) -> None:
             raise InputError(
                 f"the parameter '{name}' is a table that is read by index",
                 where=system.name,
-                allowed="parameters that are no entries of such tables",
-                fix="take the difference of two runs for this one",
+                allowed="parameters outside such tables",
+                fix="use the difference of two runs for this parameter",
             )
 
 
 def _refuse(system: HybridSystem, *, sources: bool) -> None:
     """Raise ``InputError`` for implicit equations whose solutions jump other than at zeros of guards."""
     if system.algebraic.size and (sources or system.delays is not None):
-        jumping = "the parameter that says when a signal jumps"
+        jumping = "the parameter that determines when a signal jumps"
         what = jumping if system.delays is None else "the delayed signals"
         raise InputError(
             f"{what} and the implicit equation of '{system.algebraic.names[0]}' are in one diagram",
@@ -89,7 +90,8 @@ def _refuse(system: HybridSystem, *, sources: bool) -> None:
 
 
 def _refuse_whole_numbers(system: HybridSystem, parameters: Sequence[str]) -> None:
-    """Raise ``InputError`` for a parameter that acts, but by comparisons or its whole part only (a seed)."""
+    """Raise ``InputError`` for a parameter that acts only through comparisons or its integer part (a
+    seed)."""
     for name in parameters:
         acts, smoothly = False, False
         for traced in _functions(system):
@@ -102,9 +104,9 @@ def _refuse_whole_numbers(system: HybridSystem, parameters: Sequence[str]) -> No
                 smoothly = not jtimes(results, p, _direction(system, name)).is_zero()
         if acts and not smoothly:
             raise InputError(
-                f"the parameter '{name}' acts by comparisons or by its whole part only",
+                f"the parameter '{name}' acts only through comparisons or its integer part",
                 where=system.name,
-                allowed="parameters that something follows smoothly",
+                allowed="parameters with a differentiable effect",
                 fix="compare runs with different values",
             )
 
@@ -159,7 +161,7 @@ class _Augmented:
         return vertcat(expression, *(self.rate(expression, k) for k in range(len(self.columns.names))))
 
     def start(self, traced: TracedFunction, letter: str) -> TracedFunction:
-        """Values at the start and their derivatives."""
+        """Initial values and their derivatives."""
         (p,) = traced.arguments
         c = self.columns
         value = vertcat(*traced.results, SX(0, 1))

@@ -45,19 +45,19 @@ from armblocks.equations.sensitivity_delays import DelayedSensitivities
 from armblocks.equations.sensitivity_layout import Columns
 
 LOCATED = 1e-8
-"""A guard that would be 0 within this time (beside the time, s) was located there; else it jumped."""
+"""A guard that would be 0 within this relative time counts as located; else it has jumped."""
 SAME_INSTANT = 2.0**-48
-"""Times that differ by less, beside their size, are one instant."""
+"""Relative tolerance of equal times."""
 SAME_DERIVATIVE = 1e-6
-"""Derivatives of two instants that differ by less, beside their size, are equal."""
+"""Relative tolerance of equal time derivatives of events."""
 BEFORE = 1.0 - 2.0**-51
-"""A time just before another one, beside it."""
+"""Relative distance of a time just before another one."""
 NEVER = -1.0
-"""The time of what has not been, s."""
+"""The time of an event that has not occurred, s."""
 
 
 class Instants:
-    """What happens to sensitivities at instants: ``update``, ``reset`` and guards of the whole system."""
+    """Changes of sensitivities at instants: ``update``, ``reset`` and guards of the whole system."""
 
     def __init__(self, columns: Columns, delays: DelayedSensitivities) -> None:
         self.columns = columns
@@ -105,7 +105,7 @@ class Instants:
         )
 
     def by_parameter(self, expression: SX, k: int) -> SX:
-        """The derivative by parameter ``k`` with the sensitivities as they stand."""
+        """The total derivative by parameter ``k`` with the present sensitivities."""
         c = self.columns
         return c.along(expression, t=0.0, x=c.S[k], z=self.delays.Z[k], w=c.W[k], p=c.seeds[k])
 
@@ -169,7 +169,7 @@ class Instants:
         leaving = logic_and(self.open, logic_not(others))
         entering = logic_and(logic_not(self.open), _any(vertcat(*instants)))
 
-        # The flow on the side that is left, or that is reached.
+        # The derivatives before or after the instant.
         left_side = logic_and(first, _any(sources))
         t = if_else(left_side, c.t * BEFORE, c.t)
         flow = c.value_at(c.system.derivative, t, c.x, d.before_arrival(arrived), c.w)

@@ -1,4 +1,4 @@
-"""The figures of a run: those of its arms, and one for every sink of the diagram."""
+"""The figures of a run: the figures of its arms, and one figure for each sink of the diagram."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ _Array = NDArray[np.float64]
 _DEGREES = 180 / math.pi
 _SPELLED = {"m/s2": "m/s²", "rad/s2": "rad/s²", "deg/s2": "deg/s²", "kg m2": "kg m²"}
 _FIRST_ENTRIES = 12
-"""A matrix has many entries; a chart names at most so many, as more lines are not told apart."""
+"""Largest number of matrix entries that one chart shows; more lines cannot be distinguished."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Figure:
-    """One picture of the report: ``name`` of its files, ``section`` it stands in, a caption in words."""
+    """One picture of the report: ``name`` of its files, ``section`` of the report, and a caption."""
 
     name: str
     section: str
     caption: str
     picture: Picture
     narrow: bool = False
-    """Stands beside others of its kind, not across the whole page."""
+    """Whether such pictures are placed side by side instead of each across the page."""
 
     @cached_property
     def svg_marks(self) -> str:
@@ -51,7 +51,7 @@ class Figure:
 
 
 def motion_figures(motion: Motion, prefix: str) -> Iterator[Figure]:
-    """The arm at six moments, the three projections of its tool's path, its joints over time."""
+    """The arm at six instants, the three projections of the tool's path, and the joints over time."""
     robot = motion.robot
     yield Figure(
         name=f"{prefix}moments",
@@ -101,19 +101,19 @@ def view_figures(diagram: Diagram, result: SimulationResult, width: float = FIGU
 
 
 def file_name(name: str) -> str:
-    """A name that every file system takes, near to that of a block."""
+    """A file name, made from a block's name, that is valid on every file system."""
     kept = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
     return kept[:48] or "unnamed"
 
 
 def for_people(values: _Array, unit: str) -> tuple[_Array, str]:
-    """Values and unit as people read them: degrees for radians, SI prefixes instead of long zeros."""
+    """Values and unit for display: degrees for radians, SI prefixes for very large or small values."""
     if unit.startswith("rad"):
         unit = "deg" + unit.removeprefix("rad")
         return values * _DEGREES, _SPELLED.get(unit, unit)
     finite = np.abs(values[np.isfinite(values)])
     factor, prefix = si_prefix(float(finite.max(initial=0.0)))
-    # Prefixes of a bare number or of a unit with powers would mislead; small and usual numbers need none.
+    # A prefix on a bare number or on a unit with powers would mislead; usual numbers need no prefix.
     if not unit or unit.startswith("kg") or unit == "s" or 1e-3 < factor < 1e3:
         return values, _SPELLED.get(unit, unit)
     return values * factor, prefix + _SPELLED.get(unit, unit)
@@ -193,7 +193,7 @@ def _joint_panel(
 
 
 def _factor(unit: str, shown_unit: str, values: _Array) -> float:
-    """What :func:`for_people` multiplied by."""
+    """The factor that :func:`for_people` applied."""
     if unit.startswith("rad"):
         return _DEGREES
     if shown_unit == _SPELLED.get(unit, unit):
@@ -226,7 +226,7 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
                 labels += slot.entries[: len(entries)]
                 continue
             labels += [f"{short}[{','.join(map(str, index))}]" if index else short for index in entries]
-        # One prefix for all of a panel, so that they can be compared.
+        # One prefix for all signals of a panel, so that they can be compared.
         values, unit = for_people(np.hstack(columns), unit)
         first = numbers[0] if len(labels) == 1 else 0
         traces = tuple(
@@ -244,7 +244,7 @@ def _scope(diagram: Diagram, block: str, view: View, result: SimulationResult, w
 
 
 def _joined(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str, ...]:
-    """What a Mux puts together, by entry: the blocks that the entries come from; nothing for other blocks."""
+    """The names of the source blocks of the entries of a Mux's output; empty for other blocks."""
     flat = flat_diagram(diagram)
     name = path.rpartition("/")[0]
     block = flat.blocks.get(name)
@@ -261,7 +261,7 @@ def _joined(diagram: Diagram, path: str, result: SimulationResult) -> tuple[str,
 
 
 def _compared(block: str, view: View, result: SimulationResult) -> list[list[int]]:
-    """Which signals share a panel: scalars of one unit are there to be compared, all else stands alone."""
+    """Group the signals into panels: scalars of one unit share a panel, other signals have their own."""
     panels: list[list[int]] = []
     by_unit: dict[str, list[int]] = {}
     for number, signal in enumerate(view.signals):
@@ -279,7 +279,7 @@ def _compared(block: str, view: View, result: SimulationResult) -> list[list[int
 def _spectrum(block: str, view: View, result: SimulationResult, width: float) -> Picture:
     try:
         lines, settings = _spectra(block, view, result)
-    except InputError as error:  # the run may have ended early; all else of the report is still wanted
+    except InputError as error:  # the run may have ended early; the rest of the report is still written
         picture = Picture(width=width, height=48.0, title=f"Spectrum {block}", description=str(error))
         picture.add(Text(14.0, 28.0, f"No spectrum: {error}", SMALL_SIZE, Tone.MUTED))
         return picture
@@ -322,7 +322,7 @@ def _xy_graph(block: str, view: View, result: SimulationResult) -> Picture:
     paths = [result.resolve(f"{block}/{signal}") for signal in view.signals[:2]]
     flats = [result[path].reshape(len(result.time), -1)[:, 0] for path in paths]
     units = [result.units[path] for path in paths]
-    if units[0] == units[1]:  # one prefix for both, so that one unit is as long both ways
+    if units[0] == units[1]:  # one prefix for both axes, so that a unit has the same length on both
         both, x_unit = for_people(np.stack(flats), units[0])
         (x, y), y_unit = both, x_unit
     else:

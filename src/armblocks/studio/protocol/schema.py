@@ -26,7 +26,7 @@ def message_schema() -> dict[str, Any]:
         for name, member in definition.get("properties", {}).items():
             member.pop("title", None)  # it would become a type of its own
             if "const" in member and name not in definition.setdefault("required", []):
-                definition["required"].append(name)  # what tells the messages apart is always there
+                definition["required"].append(name)  # the discriminator of a message is required
     members: dict[str, Any] = {
         "envelope": schemas["Envelope", "validation"],
         "server": schemas["ServerMessage", "serialization"],

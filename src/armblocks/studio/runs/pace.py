@@ -8,7 +8,7 @@ from time import perf_counter
 
 
 class Pace:
-    """The simulated time that is due by the clock; ``speed`` is ``None`` where nothing waits for it."""
+    """The relation of simulated time to clock time; ``speed`` ``None`` means as fast as possible."""
 
     def __init__(self, speed: float | None, clock: Callable[[], float] = perf_counter) -> None:
         self.speed = speed
@@ -16,12 +16,12 @@ class Pace:
         self.count_from(0.0)
 
     def count_from(self, time: float) -> None:
-        """Let the simulated ``time`` (s) be what is due now."""
+        """Set the simulated ``time`` (s) that corresponds to the present clock time."""
         self._time, self._since = time, self._clock()
 
     @property
     def due(self) -> float:
-        """Simulated time (s) up to which a run is to be shown by now; infinite without a speed."""
+        """Simulated time (s) that a run should have reached by now; infinite without a speed."""
         if self.speed is None:
             return math.inf
         return self._time + self.speed * (self._clock() - self._since)
