@@ -127,7 +127,7 @@ def test_an_edit_of_what_the_other_page_changed_is_told_and_both_agree(
     page.keyboard.press("ArrowDown")
     expect(page.get_by_role("button", name="Undo move Gain (Ctrl+Z)")).to_be_enabled()
     other.keyboard.press("ArrowRight")  # of the place where Gain is not any more
-    wait_until(page, lambda: any("changed in another page" in str(said) for said in line.waiting))
+    wait_until(page, lambda: any("change from another page" in str(said) for said in line.waiting))
     line.release()
     expect(other.get_by_text("your change conflicts with a change from another page")).to_be_visible()
     other.locator(".react-flow__pane").click(position={"x": 5, "y": 5})

@@ -142,7 +142,7 @@ def test_a_parameter_that_a_formula_reads_is_not_removed(document: Document) -> 
         ([declared("k", was="nothing")], "unknown mask parameter|no mask parameter"),
         ([declared("k", was="k"), declared("k")], "declared twice"),
         ([declared("2k", was="k")], "cannot be the name"),
-        ([declared("k", "++", was="k")], "no formula|no value"),
+        ([declared("k", "++", was="k")], "not a formula|no value"),
         ([declared("k", "maybe", was="k", kind="boolean")], "the value is 'maybe'"),
         ([declared("k", was="k"), declared("mode", "c", kind="choice", choices=["a", "b"])], "one of a, b"),
     ],

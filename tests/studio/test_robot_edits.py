@@ -205,7 +205,7 @@ def test_what_no_body_can_have_is_marked_at_its_cells() -> None:
     assert "exceeds the sum of the other two" in marked["link3"].what
     mended = typed(typed(typed(robot, "link1", "Iyy", "0"), "link1", "mass", "1"), "link3", "Izz", "0.03")
     assert robot_content(mended).findings == []
-    with pytest.warns(UserWarning, match="friction drives"):
+    with pytest.warns(UserWarning, match="friction accelerates"):
         bad = typed(robot, "link2", "Tc-", "0.1")
     found = robot_content(bad).findings
     assert [(f.link, f.columns) for f in found if "Friction" in f.what] == [("link2", ["Tc-"])]
@@ -254,7 +254,7 @@ EDITS = st.one_of(
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(EDITS, max_size=12))
-@pytest.mark.filterwarnings("ignore:.*friction drives")
+@pytest.mark.filterwarnings("ignore:.*friction accelerates")
 def test_any_sequence_of_edits_undone_gives_the_same_file(edits: list[dict[str, Any]]) -> None:
     history = History(load_robot("kr180"))
     before, forms = write_robot(history.value), [write_robot(history.value)]
