@@ -1,4 +1,4 @@
-"""Formulas: the values that Python and NumPy give, and refusal of everything that is no arithmetic."""
+"""Formulas: values equal to those of Python and NumPy, and errors for all other syntax."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ U = np.array([0.3, -1.2, 2.5])
         ("t * u[1]", 0.21),
     ],
 )
-def test_formulas_mean_what_they_say(formula: str, expected: float) -> None:
+def test_formulas_equal_the_same_expression_in_python(formula: str, expected: float) -> None:
     found = evaluate(Expression(formula=formula), U, t=0.7)["y"]
     assert found.shape == ()
     assert found == pytest.approx(expected, rel=1e-14, abs=1e-15)
 
 
-def test_vectors_are_worked_on_by_element() -> None:
+def test_vectors_are_processed_elementwise() -> None:
     assert evaluate(Expression(formula="exp(u) + 1"), U)["y"] == pytest.approx(np.exp(U) + 1, rel=1e-15)
     two = Expression(formula="u1 * u2 - u1[1]", inputs=2)
     assert evaluate(two, U, 2.0)["y"] == pytest.approx(U * 2 - 0.3, rel=1e-15)
@@ -104,13 +104,13 @@ def test_a_long_sum_is_not_deep() -> None:
         "\x00",
     ],
 )
-def test_all_else_is_refused(formula: str) -> None:
+def test_other_syntax_is_refused(formula: str) -> None:
     with pytest.raises(ArmblocksError) as found:
         evaluate(Expression(formula=formula), U)
     assert "Allowed: " in str(found.value)
 
 
-def test_messages_say_place_and_way_out() -> None:
+def test_messages_name_the_position_and_a_fix() -> None:
     with pytest.raises(
         InputError,
         match=r"'sin\(u' is not a formula: .*Allowed: numbers, names.*correct the formula",

@@ -93,7 +93,7 @@ def test_rows_of_numbers_stay_on_one_line() -> None:
         ("[.5]", "not valid JSON"),
     ],
 )
-def test_what_is_not_strict_json_is_refused(text: str | bytes, message: str) -> None:
+def test_json_that_is_not_strict_is_refused(text: str | bytes, message: str) -> None:
     with pytest.raises(FormatError, match=message):
         read(text)
 
@@ -117,7 +117,7 @@ def test_document_beyond_the_cap_is_refused() -> None:
         ("\ud800", "a text cannot be written, as it is not valid Unicode"),
     ],
 )
-def test_what_json_cannot_hold_is_not_written(value: object, message: str) -> None:
+def test_values_without_a_json_form_are_not_written(value: object, message: str) -> None:
     with pytest.raises(FormatError, match=message):
         canonical_bytes(value)
 
@@ -140,7 +140,7 @@ def test_place_is_the_line_of_the_value() -> None:
     assert path_text(("layout", "XY Graph", 0)) == 'layout."XY Graph"[0]'
 
 
-def test_a_value_of_the_wrong_kind_is_said_in_words() -> None:
+def test_the_message_names_the_expected_kind() -> None:
     root = read('{"n": null, "t": "x", "b": true, "f": false, "i": 3, "l": [1], "o": {}}').members()
     for key, words in {
         "n": "the value is null. Allowed: a number",
@@ -190,6 +190,6 @@ def test_random_text_is_read_or_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ['{"a": NaN}', '{"a": 1e999}', '{"a": 1, "a": 2}', f'{{"a": {"1" * 30}}}'])
-def test_a_refused_value_says_its_line_and_what_to_do(text: str) -> None:
+def test_the_message_for_a_refused_value_has_its_line_and_a_fix(text: str) -> None:
     with pytest.raises(FormatError, match=r"d.json:1: .*Fix: correct that line\."):
         read_document(text.encode(), "d.json", 1000)

@@ -1,4 +1,4 @@
-"""Typing into the tables of a robot: what texts mean, what is refused, and that every edit can be undone."""
+"""Editing the tables of a robot: parsing of cell texts, refused values, and undo of every edit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def typed(robot: Robot, link: str, column: str, text: str, angles: str = "deg") 
         ("90*deg - 1 rad", "deg", 90 * (math.pi / 180) - 1),
     ],
 )
-def test_angles_are_read_in_degrees_or_as_they_say_themselves(text: str, unit: Any, rad: float) -> None:
+def test_angles_are_read_in_degrees_or_in_the_unit_given(text: str, unit: Any, rad: float) -> None:
     assert angle_value(text, "here", unit) == rad
 
 
@@ -145,9 +145,7 @@ def test_cells_without_a_value_can_be_emptied() -> None:
         ("", "gravity_x", "1e999", "'1e999' is too large"),
     ],
 )
-def test_what_no_robot_can_have_is_refused_with_the_place(
-    link: str, column: str, text: str, words: str
-) -> None:
+def test_invalid_values_are_refused_with_their_cell(link: str, column: str, text: str, words: str) -> None:
     robot = load_robot("puma560")
     with pytest.raises(ArmblocksError, match=words):
         typed(robot, link, column, text)
@@ -179,7 +177,7 @@ def test_joints_are_added_taken_out_moved_and_renamed() -> None:
     assert edited(tree, "add_joint", after="").links[1].parent is None
 
 
-def test_a_joint_that_begins_to_slide_forgets_its_angles() -> None:
+def test_a_joint_made_prismatic_loses_its_angles() -> None:
     robot = load_robot("puma560")
     name = robot.links[1].name
     slid = typed(robot, name, "joint", "prismatic").link(name)
@@ -188,7 +186,7 @@ def test_a_joint_that_begins_to_slide_forgets_its_angles() -> None:
     assert typed(robot, name, "joint", "revolute") == robot
 
 
-def test_links_that_stand_by_transforms_say_so_in_their_cells() -> None:
+def test_cells_show_that_a_link_is_placed_by_a_transform() -> None:
     robot = replace(KIND.new(), links=(Link(name="plain"), Link(name="next", parent="plain")))
     shown = robot_content(robot)
     assert "not by a D-H row" in shown.links[0].locked["alpha"]
@@ -196,7 +194,7 @@ def test_links_that_stand_by_transforms_say_so_in_their_cells() -> None:
     assert typed(robot, "plain", "offset", "10").links[0].joint.offset == math.radians(10)
 
 
-def test_what_no_body_can_have_is_marked_at_its_cells() -> None:
+def test_non_physical_values_are_marked_at_their_cells() -> None:
     robot = load_robot("kr180")
     shown = robot_content(robot)
     marked = {finding.link: finding for finding in shown.findings}
@@ -290,7 +288,7 @@ def test_letters_of_one_gesture_are_one_step() -> None:
         history.undo()
     history.redo()
     assert (history.value, history.version) == (3, 10)
-    history.replace("typing", 7, "a")  # after a redo another gesture begins, whatever it is called
+    history.replace("typing", 7, "a")  # after a redo a new gesture begins, even with the same name
     history.undo()
     assert history.value == 3
 

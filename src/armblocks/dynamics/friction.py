@@ -1,4 +1,4 @@
-"""Friction and rotor inertia of the motors, seen through the gears."""
+"""Friction and rotor inertia of the motors, referred to the joints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from armblocks.spatial.vectors import Scalar
 
 
 def joint_friction(robot: Robot, qd: Sequence[Scalar]) -> list[Scalar]:
-    """The torque that overcomes friction (N m, N): of the sign of ``qd``, to be added to ``tau``.
+    """The torque that overcomes friction (N m, N): with the sign of ``qd``, to be added to ``tau``.
 
     The formula is the robot's :class:`FrictionModel`; at ``qd = 0`` there is no Coulomb friction.
     """
@@ -32,5 +32,5 @@ def joint_friction(robot: Robot, qd: Sequence[Scalar]) -> list[Scalar]:
 
 
 def rotor_torques(robot: Robot, qdd: Sequence[Scalar]) -> list[Scalar]:
-    """The torque ``G^2 Jm qdd`` that accelerates the rotors (their gyroscopic moments are left out)."""
+    """The torque ``G^2 Jm qdd`` that accelerates the rotors (without their gyroscopic moments)."""
     return [motor.reflected_inertia * rate if motor else 0.0 for motor, rate in zip(robot.motors, qdd)]

@@ -1,4 +1,4 @@
-"""The course of a system without ticks and events: segments between breakpoints."""
+"""Integration of a system without ticks and events: segments between breakpoints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armblocks.routines.values import Boolean, Real
 
 
 class Segments(Course):
-    """Each segment starts anew where the one before it ends."""
+    """Integrate segment by segment, with a restart at each breakpoint."""
 
     def __init__(self, frame: Frame, method: Method, records: Records) -> None:
         self.frame = frame
@@ -20,7 +20,7 @@ class Segments(Course):
         self.records = records
 
     def enter(self, stages: Stages) -> None:
-        """Go on with a step, or at the start of a segment."""
+        """Continue with a step, or with the start of a segment."""
         with self.frame.r.when(self.frame.count[Count.STARTED].value == Stage.RUNNING):
             stages.go(STEP)
 
@@ -29,18 +29,18 @@ class Segments(Course):
         choose_first_step(self.frame, self.method, self.records, time)
 
     def try_finite(self, trial: Trial, time: Real, new_time: Real) -> None:
-        """Try a fixed step; return where its end is not finite."""
+        """Try a fixed step; return if its result is not finite."""
         trial(time, new_time)
         method = self.method
         finite = method.all_finite(method.y, method.K(method.tableau.end_row))
         self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def not_finite(self, time: Real, finite: Boolean, accepted: Part) -> None:
-        """Return where steps as short as they can be are not finite."""
+        """Return if steps of the minimum length are not finite."""
         self.frame.leave_unless(finite, Status.NON_FINITE)
 
     def accept(self, stages: Stages) -> None:
-        """Samples of the step, then the new point becomes the old one; at a segment's end, start anew."""
+        """Record the samples of the step and accept it; at the end of a segment, restart."""
         f, records = self.frame, self.records
         new_time = f.new_time.value
         records.extra_done.value = 0
@@ -64,7 +64,7 @@ class Segments(Course):
 
 
 def choose_first_step(frame: Frame, method: Method, records: Records, time: Real) -> None:
-    """The length of the first step, from the derivative; the run's end may bound it."""
+    """The length of the first step, from the derivative and limited by the end of the run."""
     interval = frame.end.value - time
     length, bounded = method.first_step(time, interval, frame.max_step)
     records.checkpoint(bounded & (frame.end.value >= frame.last_end))
